@@ -24,7 +24,6 @@ from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key
-from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import plain_values
@@ -41,7 +40,6 @@ SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
-DIRECT_SEEDS = 2_000_000
 INPUT_SEEDS = 3_000_000
 ADAPTIVE_SEEDS = 4_000_000
 CALIBRATION_SEEDS = 5_000_000
@@ -140,23 +138,6 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
     return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *effort, *settings.set])
 
 
-def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
-    """A scene an evaluation of the direct front (n, k), numbered from ``first``: few replicates, a seed of its own.
-
-    As long as a design run unless the study says otherwise.
-    """
-    data, direct = read_scene(study), study.file.direct
-    overrides = [*study.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
-    if direct.discard_turns is not None:
-        overrides.append(f"numerics.discard_turns={direct.discard_turns!r}")
-    if direct.turns is not None:
-        usual = scene_at(study, data, study.baseline, direct.seed, overrides).numerics.warm_up_turns
-        # What is left after the transient; check_direct names a study that leaves nothing.
-        overrides.append(f"numerics.turns={max(direct.turns - usual, 1e-3)!r}")
-    seeded = enumerate(points, direct.seed + DIRECT_SEEDS + first)
-    return [scene_at(study, data, point, seed, [*overrides, *direct.set]) for seed, point in seeded]
-
-
 def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
     """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
     data, adaptive = read_scene(study), study.file.adaptive
@@ -165,29 +146,6 @@ def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], firs
     overrides = [[*study.scene.set, f"numerics.replicates={count}", *shared] for count in replicates]
     runs = enumerate(zip(points, overrides, strict=True), adaptive.seed + ADAPTIVE_SEEDS + first)
     return [scene_at(study, data, point, seed, keys) for seed, (point, keys) in runs]
-
-
-def check_direct(study: Study) -> None:
-    """Raises InputError where the runs of a direct search are impossible or hold no whole window of the impact."""
-    (scene,) = direct_scenes(study, study.baseline[None], 0)
-    counted, window = scene.numerics.turns, scene.numerics.impact_window_turns
-    if "impact_force_N" in study.responses and counted < window:
-        given = "without turns" if study.file.direct.turns is None else f"turns = {study.file.direct.turns:g}"
-        least = scene.numerics.warm_up_turns + window
-        few = f"after {scene.numerics.warm_up_turns:g} discarded turns too few are counted for one window of the impact"
-        mend = f"numerics.impact_window_turns = {window:g}; give turns = {least:g} at least"
-        raise InputError([f"{study.path}: direct.{given}: {few}, {mend}"])
-
-
-def direct_run(study: Study) -> str:
-    """What one run of a direct search is, in words."""
-    (scene,) = direct_scenes(study, study.baseline[None], 0)
-    numerics = scene.numerics
-    windows = int(numerics.turns / scene.impact_window_turns + 1e-9)
-    return (
-        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({counted(windows, 'whole window')} of the "
-        f"impact, {scene.impact_window_turns:g} turns each) after {numerics.warm_up_turns:g} discarded ones"
-    )
 
 
 @dataclass(frozen=True)
@@ -280,22 +238,21 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
 def _in_threads(
     scenes: Mapping[str, Scene], workers: int | None, hear: Hear, points: Sequence[Point], ledger: Ledger
 ) -> None:
-    """Engine of this process. The thread that runs a point claims it before and stores it after: what is claimed is under
-    way, and processes share the work. ``hear`` gets how far each point under way is."""
+    """Engine of this process. The thread that runs a point notes that it begins, and stores it after. ``hear`` gets how far each
+    point under way is."""
     from rbdyn.dynamics.ensemble import Ended, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
 
     stop, threads = Stop(), workers or os.cpu_count() or 1
 
-    def run(point: Point, inside: int) -> Ran | None:
-        if not ledger.take([point]):
-            return None
+    def run(point: Point, inside: int) -> Ran:
+        ledger.begin(point)
         ran = attempt(scenes[point.key], stop, inside, None if hear is None else partial(_heard, hear, point.key))
         ledger.keep(point, ran)
         return ran
 
-    def runs() -> Iterator[Callable[[], Ran | None]]:
+    def runs() -> Iterator[Callable[[], Ran]]:
         # Compiled once here, lest every thread wait for the same compilation; faults are the run's to tell.
         with suppress(Exception):
             prepare(scenes[points[0].key], roller_bearing(scenes[points[0].key]))
@@ -303,10 +260,9 @@ def _in_threads(
             # Of the last points the replicates go side by side too, lest threads wait for the longest point.
             yield partial(run, point, threads if left < 2 * threads else 1)
 
-    def end(one: Ended[Ran | None]) -> None:
+    def end(one: Ended[Ran]) -> None:
         if one.fault is not None:
             raise one.fault
-        # None: another process has claimed it.
         if one.found is not None:
             ledger.give(points[one.place], one.found)
 
@@ -317,19 +273,15 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
     from doe.running.cluster import run_on_cluster
 
-    taken: list[Point] = []
-
-    def tasks() -> list[str]:
-        taken.extend(ledger.queue(points))
-        return [texts[point.key] for point in taken]
-
     work = partial(attempt_text, version=code_version(SIMULATION))
 
     def end(place: int, ran: Ran) -> None:
-        ledger.keep(taken[place], ran)
-        ledger.give(taken[place], ran)
+        ledger.keep(points[place], ran)
+        ledger.give(points[place], ran)
 
-    run_on_cluster(scheduler, work, tasks, end, lambda place: ledger.begin(taken[place]))
+    run_on_cluster(
+        scheduler, work, [texts[point.key] for point in points], end, lambda place: ledger.begin(points[place])
+    )
 
 
 def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, done: int, total: int) -> None:

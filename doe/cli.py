@@ -16,12 +16,15 @@ with Loading():
     from doe.commands.study import study
     from doe.commands.uncertainty import uncertainty
     from rbdyn.cli import streams
-    from rbdyn.cli.options import Version
+    from rbdyn.cli.options import Version, refusing
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-for command in (new, study, status, design, fit, front, chain, uncertainty, calibrate, keys):
+for command in (new, status, design, fit, chain, uncertainty, calibrate, keys):
     app.command()(command)
+former = refusing({"--direct": "run python examples/benchmarks/direct_front.py STUDY.toml --out DIR"})
+app.command(cls=former)(study)
+app.command(cls=former)(front)
 
 
 @app.callback()

@@ -220,10 +220,17 @@ def main(
 def compare(scene: Path, turns: float) -> None:
     """Measure both and print. Raises InputError, RunError."""
     from rbdyn import Scene
+    from rbdyn.accuracy.integrators import OURS, Method, by_scipy
+    from rbdyn.accuracy.methods import (
+        attempts_of,
+        compiling,
+        curve,
+        reference,
+        starts_after_transient,
+        table,
+        times_faster,
+    )
     from rbdyn.accuracy.report import processor
-    from rbdyn.accuracy.rollers.comparison import attempts_of, compiling, curve, table, times_faster
-    from rbdyn.accuracy.rollers.methods import OURS, Method, by_scipy
-    from rbdyn.accuracy.rollers.trajectory import reference, starts_after_transient
     from rbdyn.cli.terminal import print_table
 
     stretches = starts_after_transient(Scene.load(scene), turns)

@@ -27,8 +27,7 @@ import pandas as pd
 import typer
 from numpy.typing import NDArray
 
-from rbdyn.accuracy.balls.cases import Problem
-from rbdyn.accuracy.balls.solvers import problem_of, timed
+from rbdyn.accuracy.ball_solvers import Problem, problem_of, timed
 from rbdyn.cli.terminal import print_table
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of

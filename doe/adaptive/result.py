@@ -8,7 +8,7 @@ from doe.adaptive.candidates import Region
 from doe.adaptive.emulators import Emulators
 from doe.adaptive.runs import Face
 from doe.arrays import Array, Rows, Whole
-from doe.pareto.direct import DirectFront, Samples
+from doe.pareto.simulated import Samples, SimulatedFront
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class AdaptiveFront:
     of the emulators and of the choice of runs.
     """
 
-    front: DirectFront
+    front: SimulatedFront
     archive: Array
     shown: Rows
     foretold: Array

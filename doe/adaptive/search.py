@@ -1,7 +1,7 @@
 """The search: design, batches where most is to be gained, a check of what is foretold, fresh runs at the finalists.
 
 What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
-made afresh at the finalists and alone are reported, as at the end of `doe.pareto.direct`; what they tell helps to choose
+made afresh at the finalists and alone are reported, which had no part in their choice; what they tell helps to choose
 the finalists that are left, but has no say in what was chosen.
 """
 
@@ -23,9 +23,9 @@ from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Border, Evaluate, Face, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
 from doe.arrays import Array, Whole
-from doe.pareto.direct import DirectFront, Samples
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
+from doe.pareto.simulated import Samples, SimulatedFront
 from doe.threads import one_thread
 from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
@@ -325,7 +325,7 @@ class _Search:
             if violations[row].any():
                 raise InfeasibleError(self.centre + self.step * points[row], violations[row])
 
-    def _front(self, finals: _Finals) -> DirectFront:
+    def _front(self, finals: _Finals) -> SimulatedFront:
         """The finalists as their fresh runs found them, in ascending order of the first cost believed, picked by what was
         believed before."""
         goals = self.goals
@@ -340,7 +340,7 @@ class _Search:
         every = self.runs.plus(finals.runs).plus(finals.base)
         actual = [self.centre + self.step * part.points for part in (ours, self.runs, every)]
         failed = actual[2][~every.good]
-        return DirectFront(
+        return SimulatedFront(
             points=actual[0],
             values=values,
             standard_errors=errors,

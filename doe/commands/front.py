@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath
-from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
+from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath
+from doe.commands.steps import Effort, fitted, keeping_runs, save
 from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
@@ -29,7 +29,6 @@ def front(
     scheduler: Scheduler = None,
     retry: Retry = False,
     point: Point = None,
-    direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
@@ -52,10 +51,6 @@ def front(
             import numpy as np
 
             record["point"] = given_point_record(loaded, surfaces, found, np.array(values))
-        if direct:
-            from doe.report.steps.confirmation import direct_record
-
-            record["direct"] = direct_record(loaded, searched(loaded, found, effort))
         save(out, path, "front.json", record)
         hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
 

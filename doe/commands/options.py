@@ -13,9 +13,6 @@ Scheduler = Annotated[
     str | None, valued("ADDRESS", "Run on the dask cluster of this scheduler.", "threads of this machine")
 ]
 Retry = Annotated[bool, flag("--retry", says="Run points again that failed before.")]
-Direct = Annotated[
-    bool, flag("--direct", says="Also search the front on the simulator itself and tell what surfaces lose.")
-]
 Adaptive = Annotated[
     bool, flag("--adaptive", says="Also search the front in few runs, chosen by emulators; the pick is of it.")
 ]

@@ -12,11 +12,9 @@ from rbdyn.faults import RunError
 
 if TYPE_CHECKING:
     from doe.clearance import Simulations
-    from doe.pareto import ParetoFront
     from doe.response_surface import Surface
     from doe.running.keeper import AgendaKeeper
     from doe.running.runner import Progress
-    from doe.study.direct import Direct
     from doe.study_file import Study
 
 
@@ -32,10 +30,10 @@ def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> N
 def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
     """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
     study of the file ``source`` runs there."""
-    from doe.running.owner import at_work
+    from doe.running.lock import at_work
     from doe.study.runs import STORE
 
-    with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out):
+    with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out / STORE):
         yield
 
 
@@ -120,18 +118,6 @@ def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]"
     out, workers, scheduler, retry, quiet = effort
     with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
         return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
-
-
-def searched(study: "Study", found: "ParetoFront", effort: Effort) -> "Direct":
-    """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
-    from doe.study.direct import find_direct
-
-    out, workers, scheduler, retry, quiet = effort
-    with (
-        _store_folder(out, study.path) as folder,
-        simulations_in(folder, study.path, workers, scheduler, retry, quiet) as simulations,
-    ):
-        return find_direct(study, found, simulations)
 
 
 @contextmanager

@@ -6,11 +6,10 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Adaptive, Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
+from doe.commands.options import Adaptive, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, stages
 from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
-from rbdyn.faults import InputError
 
 
 def study(
@@ -19,7 +18,6 @@ def study(
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
-    direct: Direct = False,
     adaptive: Adaptive = False,
     robust: Robust = False,
     as_json: Json = False,
@@ -31,13 +29,11 @@ def study(
     with guarded(as_json), keeping_runs(folder, path):
         from doe.study_file import Study
 
-        if direct and adaptive:
-            raise InputError(["--direct, --adaptive: the pick can follow one front only; give one of them"])
         loaded = Study.load(path)
         output_folder(folder, "doe", path)
         from doe.study.finished import finished, inputs_digest
 
-        digest = inputs_digest(loaded, direct, adaptive, robust)
+        digest = inputs_digest(loaded, adaptive, robust)
         if not (verbose or retry) and (record := finished(folder, digest)):
             if not as_json:
                 print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
@@ -49,7 +45,7 @@ def study(
         from doe.report.study.files import write
         from doe.study.whole import run_study
 
-        options = {"direct": direct, "adaptive": adaptive, "robust": robust}
+        options = {"adaptive": adaptive, "robust": robust}
         with noted_agenda(folder, "doe study", workers, quiet, options, digest) as agenda:
             with stages(quiet or as_json, workers) as progress:
                 bars = agenda.announced(progress)

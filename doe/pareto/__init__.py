@@ -5,7 +5,7 @@
   the surfaces' errors make of it and of a gain
 - ``manufacture``: what tolerances leave of a point, and the front of that
 - ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
-- ``direct``, ``direct_tolerance``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
+- ``simulated``, ``simulated_tolerance``: a front run on the simulator, and what manufacture leaves of its points
 """
 
 from doe.pareto.front import ParetoFront, front

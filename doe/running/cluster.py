@@ -25,23 +25,23 @@ LOOK_S = 1.0
 def run_on_cluster(
     address: str,
     work: Callable[[str], Ran],
-    tasks: Callable[[], Sequence[str]],
+    tasks: Sequence[str],
     ended: Callable[[int, Ran], None],
     begun: Callable[[int], None] = lambda place: None,
 ) -> None:
-    """Run ``work`` on every text of ``tasks()`` and hand over each result, with its place, as it ends; and, in another thread,
+    """Run ``work`` on every text of ``tasks`` and hand over each result, with its place, as it ends; and, in another thread,
     its place as it begins.
 
-    ``tasks`` is called once the cluster is there. A task whose worker is lost runs again on another; one that was lost
+    A task whose worker is lost runs again on another; one that was lost
     again and again is handed over as lost. Raises InputError when there is no cluster to start on, or its workers run
     other code; StoppedError when it goes away.
     """
     with _client(address) as client:
         # All at once, so that workers which join later find work.
-        texts, topic = tasks(), f"rbdyn-{uuid.uuid4().hex}"
+        topic = f"rbdyn-{uuid.uuid4().hex}"
         client.subscribe_topic(topic, lambda event: begun(event[1]))
         announced = partial(_announced, work, topic)
-        futures = dict(enumerate(client.map(announced, range(len(texts)), texts, pure=False)))
+        futures = dict(enumerate(client.map(announced, range(len(tasks)), list(tasks), pure=False)))
         answers: queue.SimpleQueue[int] = queue.SimpleQueue()
         for number, future in futures.items():
             future.add_done_callback(lambda _, number=number: answers.put(number))

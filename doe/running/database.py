@@ -15,13 +15,12 @@ from rbdyn.faults import InputError
 FORMAT, VERSION = "doe.store", "2"
 SCHEMA = (
     "CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
-    "CREATE TABLE owners (owner TEXT PRIMARY KEY, host TEXT, machine TEXT, pid INTEGER, born TEXT, beat REAL)",
     """CREATE TABLE runs (
         key TEXT PRIMARY KEY,
         status TEXT NOT NULL CHECK (status IN ('claimed', 'done', 'failed')),
         result TEXT, digest TEXT, cause TEXT,
         study TEXT, label TEXT, run INTEGER, factors TEXT,
-        started REAL, ended REAL, seconds REAL, host TEXT, pid INTEGER, owner TEXT
+        started REAL, ended REAL, seconds REAL, host TEXT, pid INTEGER
     )""",
 )
 # How long to wait for another process that writes [s].

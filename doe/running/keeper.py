@@ -185,7 +185,7 @@ class AgendaKeeper:
         """Runs that go at once: threads, or what a cluster has under way."""
         if not self._cluster or self._store is None:
             return float(self.agenda.threads)
-        return float(max(sum(claim.since is not None for claim in self._store.claims()), 1))
+        return float(max(len(self._store.running()), 1))
 
     def finish(self, files: Sequence[str]) -> None:
         """All files of the answer are written."""

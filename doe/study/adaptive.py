@@ -16,12 +16,12 @@ from doe.adaptive.candidates import Region
 from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.pareto.direct import DirectFront, Samples
 from doe.pareto.search import InfeasibleError
+from doe.pareto.simulated import Samples, SimulatedFront
 from doe.response_surface import Surface
 from doe.running.failure import Failure, grouped
+from doe.running.runner import Progress
 from doe.study.design import design_of
-from doe.study.direct import Direct, Evaluator
 from doe.study.front import named_faults
 from doe.study.goals import goals_of, region_of
 from doe.study.runs import Runs, ordered_runs, runs_of
@@ -29,6 +29,7 @@ from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
 from doe.threads import one_thread
 from rbdyn.faults import InputError, MethodError, RunError, check_all, refuse
+from rbdyn.scene import Scene
 
 SIGNIFICANT = 0.05
 # Where a drawing has no resolution, points are twins within this share of the half range of the region.
@@ -47,7 +48,7 @@ class Adaptive:
 
     name: ClassVar[str] = "adaptive"
     found: AdaptiveFront
-    front: DirectFront
+    front: SimulatedFront
     study: Study
     runs: Runs
     edges: Array
@@ -55,7 +56,35 @@ class Adaptive:
     seconds: float
 
 
-Searched = Direct | Adaptive
+class Evaluator:
+    """Runs batches of scenes on the simulator, every one with a seed of its own: a running number.
+
+    So a search that is begun again asks for the same runs in the same order, and the store answers at once.
+    """
+
+    def __init__(self, study: Study, simulations: Simulations, progress: Progress, total: int) -> None:
+        self._study, self._simulations = study, simulations
+        self._progress, self._total = progress, total
+        self.done = 0
+        self.failures: list[Failure] = []
+
+    def run(self, scenes: list[Scene], label: str) -> tuple[Array, Array, Whole]:
+        """Responses (n, m) of scenes, 95 % half-widths (n, m) and how many values are behind these (n, m); NaN where a run
+        failed."""
+        labels = [f"{label} {self.done + row}" for row in range(1, len(scenes) + 1)]
+        results = self._simulations.run(scenes, labels, self._watch)
+        self.done += len(scenes)
+        values = np.full((len(scenes), len(self._study.responses)), np.nan)
+        errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
+        for row, result in enumerate(results):
+            if isinstance(result, Failure):
+                self.failures.append(result)
+            else:
+                (values[row],), (errors[row],), (samples[row],) = clearance.figures(self._study.responses, [result])
+        return values, errors, samples
+
+    def _watch(self, done: int, total: int) -> None:
+        self._progress(self.done + done, max(self._total, self.done + total))
 
 
 def check_adaptive(study: Study, wanted: bool) -> None:
@@ -170,7 +199,7 @@ def _design_at(study: Study, simulations: Simulations) -> Runs:
     return runs_of(study, ordered, simulations, simulations.progress(f"design runs with {words}"))
 
 
-def _at_levels(study: Study, front: DirectFront, levels: tuple[int, ...]) -> DirectFront:
+def _at_levels(study: Study, front: SimulatedFront, levels: tuple[int, ...]) -> SimulatedFront:
     """The points of a front with categories at these places, in numbers alone."""
     rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
     parts = ("points", "values", "standard_errors", "costs", "cost_errors", "freedom")
@@ -253,7 +282,7 @@ class _Evaluator(Evaluator):
         words = f"adaptive front: hypervolume {state.hypervolume:.3f}, at most {left:.1f} % to gain"
         self._progress = self._simulations.progress(words)
 
-    def batch(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
+    def __call__(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
         """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these."""
         # As a drawing writes them: no trace of how they were worked out.
         scenes = []
@@ -263,8 +292,6 @@ class _Evaluator(Evaluator):
             scenes += clearance.adaptive_scenes(study, drawn[None], [count], number)
         values, errors, samples = self.run(scenes, "adaptive run")
         return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
-
-    __call__ = batch  # type: ignore[assignment]
 
 
 def _known(study: Study, each: Mapping[tuple[int, ...], Runs], plan: Plan) -> Known:

@@ -1,6 +1,6 @@
 """How far a pick stays back from a limit, so that it keeps it although what foretells the responses errs.
 
-What foretells (surfaces, or the runs of a direct search) has a standard error at every point. Its error is taken as a
+What foretells (surfaces, or the fresh runs of a search) has a standard error at every point. Its error is taken as a
 field, alike within a coded unit (`doe.response_surface.model_error`). Where points were simulated, design runs or picks,
 what was missed there is known: the field is conditioned on it, after its scale has been raised so far that these misses
 are likely, if they are not (maximum likelihood). Source: Sacks, Welch, Mitchell and Wynn, Stat. Sci. 4 (1989), section 4.

@@ -16,7 +16,6 @@ def check_study(study: Study, adaptive: bool = False) -> Runs | None:
         (
             lambda: check_runs(study, ordered_runs(study).design),
             lambda: clearance.confirmation_scene(study, study.baseline),
-            lambda: clearance.check_direct(study),
             lambda: check_chains(study),
             lambda: check_adaptive(study, adaptive),
         )

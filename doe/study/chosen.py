@@ -11,45 +11,45 @@ from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.failure import Failure
-from doe.study.adaptive import Searched
+from doe.study.adaptive import Adaptive
 from doe.study.confirmation import Choice, Confirmed, confirm
-from doe.study.direct_pick import DirectPick, direct_pick
 from doe.study.front import find_front
 from doe.study.goals import rounded_within
 from doe.study.limits import ORDER, Limit, limits_of, verdict_of
+from doe.study.searched_pick import SearchedPick, searched_pick
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """The front that the pick is of, the pick of the direct front if that was searched, all points simulated by name
+    """The front that the pick is of, the pick of the searched front if that was searched, all points simulated by name
     ("baseline", "pick", other picks, then "try_1" and so on: picks that did not keep their limits), and failures.
 
     ``tried`` counts the points simulated as the pick.
     """
 
     front: ParetoFront
-    direct: DirectPick | None
+    searched: SearchedPick | None
     confirmed: dict[str, Confirmed]
     failures: list[Failure]
     tried: int
 
 
 def choose(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, direct: Searched | None, simulations: Simulations
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, searched: Adaptive | None, simulations: Simulations
 ) -> Chosen:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
     Of points none of which keeps all limits, the best stands. Raises RunError, InputError, KeyboardInterrupt.
     """
-    tried: list[tuple[Confirmed, ParetoFront, DirectPick | None]] = []
+    tried: list[tuple[Confirmed, ParetoFront, SearchedPick | None]] = []
     baseline: list[Confirmed] = []
     front = found
     while True:
         simulated = [*baseline, *(each for each, _, _ in tried)] if tried else []
-        chosen = None if direct is None else direct_pick(study, surfaces, direct, simulated, len(tried))
-        wanted = choices(study, front, direct, chosen)
+        chosen = None if searched is None else searched_pick(study, surfaces, searched, simulated, len(tried))
+        wanted = choices(study, front, searched, chosen)
         if any(np.array_equal(wanted["pick"].point, each.point) for each, _, _ in tried):
             break
         confirmed, _ = confirm(study, {"pick": wanted["pick"]}, simulations)
@@ -58,7 +58,7 @@ def choose(
         kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
         if kept or len(tried) == study.file.confirmation.tries:
             break
-        if direct is None:
+        if searched is None:
             try:
                 front = find_front(study, surfaces, [*baseline, *(each for each, _, _ in tried)], len(tried))
             except InputError:
@@ -66,7 +66,7 @@ def choose(
                 break
     best = min(range(len(tried)), key=lambda place: _badness(limits_of(study, tried[place][0])))
     pick, front, chosen = tried[best]
-    wanted = choices(study, front, direct, chosen)
+    wanted = choices(study, front, searched, chosen)
     for number, (each, _, _) in enumerate(tried, 1):
         if each is not pick:
             wanted[f"try_{number}"] = Choice(each.point, f"try {number} for the pick: {each.reason}")
@@ -81,16 +81,16 @@ def _badness(limits: Sequence[Limit]) -> tuple[int, float]:
 
 
 def choices(
-    study: Study, front: ParetoFront, direct: Searched | None, chosen: DirectPick | None = None
+    study: Study, front: ParetoFront, searched: Adaptive | None, chosen: SearchedPick | None = None
 ) -> dict[str, Choice]:
-    """The pick, then the picks by the other rules and of the direct front, by name.
+    """The pick, then the picks by the other rules and of the searched front, by name.
 
-    What was ``chosen`` of the direct front is the pick, and the pick of the surfaces stands beside it. Where the study asks
+    What was ``chosen`` of the searched front is the pick, and the pick of the surfaces stands beside it. Where the study asks
     for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot tell apart
     the first stands for all, and its reason says so.
     """
     wanted: dict[str, Choice] = {}
-    for name, point, reason in _candidates(study, front, direct, chosen):
+    for name, point, reason in _candidates(study, front, searched, chosen):
         rounded = rounded_within(study, point)
         twin = next((known for known, each in wanted.items() if np.array_equal(each.point, rounded)), None)
         if twin is None:
@@ -101,11 +101,11 @@ def choices(
 
 
 def _candidates(
-    study: Study, front: ParetoFront, direct: Searched | None, chosen: DirectPick | None
+    study: Study, front: ParetoFront, searched: Adaptive | None, chosen: SearchedPick | None
 ) -> Iterator[tuple[str, Array, str]]:
     aware, name = front.tolerance_aware, "pick"
-    if direct is not None and chosen is not None:
-        yield "pick", direct.front.points[chosen.row], chosen.reason
+    if searched is not None and chosen is not None:
+        yield "pick", searched.front.points[chosen.row], chosen.reason
         name = "pick_of_surfaces"
     if aware is None:
         yield name, front.points[front.pick], front.pick_reason
@@ -115,5 +115,5 @@ def _candidates(
         yield "without_tolerances", front.points[front.pick], front.pick_reason
     for rule, row in front.picks.items():
         yield rule, front.points[row], f"the pick by {rule}"
-    if direct is not None:
-        yield direct.name, direct.front.points[direct.front.pick], f"the pick of the {direct.name} front"
+    if searched is not None:
+        yield searched.name, searched.front.points[searched.front.pick], f"the pick of the {searched.name} front"

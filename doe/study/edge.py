@@ -90,13 +90,13 @@ class Edge(Record):
     beyond_runs: bool
     factors: dict[str, Outward] = derived(lambda self: {each.factor: each for each in self.outward})
     front_share: float
-    direct_share: float | None = keyed("direct_front_share")
+    searched_share: float | None = keyed("direct_front_share")
     sentence: str = derived(lambda self: self._sentence())
 
     def _sentence(self) -> str:
         shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces"
-        if self.direct_share is not None:
-            shares += f" and {100.0 * self.direct_share:.0f} % of the simulator's own front"
+        if self.searched_share is not None:
+            shares += f" and {100.0 * self.searched_share:.0f} % of the simulator's own front"
         shares += f" lies within {100.0 * NEAR:g} % of a bound of the region"
         if not self.outward:
             where = f"between the bounds of the region, but {BEYOND}" if self.beyond_runs else "inside the region"
@@ -130,7 +130,7 @@ def edge_of(
     surfaces: Sequence[Surface],
     pick: Confirmed,
     front: Array,
-    direct: Array | None,
+    searched: Array | None,
     simulations: Simulations | None,
     ends: Array | None = None,
 ) -> Edge:
@@ -153,7 +153,7 @@ def edge_of(
         goals = {response.name: response.goal for response in study.file.response}
         which = "upper" if side > 0 else "lower"
         outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
-    far = None if direct is None else float(_sides(direct, ends).any(axis=1).mean())
+    far = None if searched is None else float(_sides(searched, ends).any(axis=1).mean())
     return Edge(tuple(outward), beyond_runs(study, study.coded(pick.point)), share_at_edge(study, front), far)
 
 

@@ -15,12 +15,12 @@ from rbdyn.result import read_json, versions
 CODE = ("rbdyn.dynamics.simulate", "doe.study.whole", "doe.report.study.files")
 
 
-def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bool = False) -> str:
+def inputs_digest(study: Study, adaptive: bool = False, robust: bool = False) -> str:
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
     named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
     named += [study.file.design.augment, *_samples(study)]
-    asked = json.dumps([direct, adaptive, robust, versions()], sort_keys=True)
+    asked = json.dumps([adaptive, robust, versions()], sort_keys=True)
     texts = study.path.name, study.file.model_dump_json(), asked, source_digest(*CODE)
     files = (_content(study.beside(name)) for name in named if name is not None)
     return digest_of(b"".join([*(text.encode() for text in texts), *files]))

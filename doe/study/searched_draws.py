@@ -5,30 +5,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.direct_tolerance import Neighbourhood
-from doe.study.adaptive import Adaptive, Searched, drawn_by_emulators
+from doe.pareto.simulated_tolerance import Neighbourhood
+from doe.study.adaptive import Adaptive, drawn_by_emulators
 from doe.study.confirmation import Confirmed
 from doe.study.shares import DRAWS, Drawn
 from doe.study.surface_draws import CHUNK
 from doe.study_file import Study
 
 
-def draws_about(study: Study, searched: Searched, here: Neighbourhood, pick: Confirmed, baseline: Confirmed) -> Drawn:
+def draws_about(study: Study, searched: Adaptive, here: Neighbourhood, pick: Confirmed, baseline: Confirmed) -> Drawn:
     """Draws of the responses of parts about a pick, coded points (n, k), and of the baseline, the last of them.
 
-    An adaptive search draws functions from its emulators, of which the change from the pick counts; of a direct one the shape
-    is that of its ``here``. The levels of pick and baseline are those of their own runs, with Student's errors.
+    Functions are drawn from the search's emulators, of which the change from the pick, ``here``, counts. The levels of pick and baseline are those of their own runs, with Student's errors.
     """
 
     def drawn(coded: Array) -> Iterator[Array]:
         parts, random = coded[:-1], np.random.default_rng(study.file.front.seed)
-        fixed = (here.parts(parts - here.points[0])[0] - here.values[0])[None]
         for first in range(0, DRAWS, CHUNK):
             count = min(CHUNK, DRAWS - first)
-            change = fixed
-            if isinstance(searched, Adaptive):
-                values = drawn_by_emulators(study, searched, np.vstack([parts, here.points]), count, random)
-                change = values[:, :-1] - values[:, -1:]
+            values = drawn_by_emulators(study, searched, np.vstack([parts, here.points]), count, random)
+            change = values[:, :-1] - values[:, -1:]
             levels = [_levels(each, count, random)[:, None] for each in (pick, baseline)]
             yield np.concatenate([levels[0] + change, levels[1]], axis=1)
 

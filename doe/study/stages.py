@@ -17,7 +17,7 @@ BATCH_S = 0.6
 DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
 
 
-def study_stages(study: Study, direct: bool = False, adaptive: bool = False, robust: bool = False) -> list[Stage]:
+def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
     """Stages of ``doe study`` with these options, to the end. Raises InputError where the study is impossible.
 
     Further points, where a limit is not kept, are among the most that a stage may run: nobody knows whether they are needed.
@@ -28,12 +28,6 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
         for key, work in design_works(study.at(at))
     }
     stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
-    if direct:
-        (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
-        evaluations = study.file.direct.evaluations
-        # Then as many fresh runs of the surfaces' front as the search makes of its own.
-        most = round(evaluations * (1.0 + study.file.direct.resample))
-        stages.append(Stage.of("direct front", evaluations, work_of(scene), most=most))
     if adaptive:
         from doe.adaptive.search import FRESH
 
@@ -46,11 +40,11 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
         stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
-    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)
+    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
     one = work_of(clearance.confirmation_scene(study, study.baseline))
     limited = any(each.lower is not None or each.upper is not None for each in study.file.response)
     tries = study.file.confirmation.tries - 1 if limited else 0
-    most = points + tries + (len(study.factors) if direct or adaptive else 0)
+    most = points + tries + (len(study.factors) if adaptive else 0)
     # Picks by several rules may be one point of the drawing.
     stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region", fewest=2, most=most))
     if robust or clearance.declares_unknowns(study):

@@ -15,9 +15,9 @@ from doe import clearance
 from doe.clearance import points_of
 from doe.running.agenda import Agenda, Stage, agendas_of
 from doe.running.failure import Failure, grouped
+from doe.running.lock import folders_of
 from doe.running.outlook import forecast_of
-from doe.running.owner import folders_of
-from doe.running.store import Claim, EndedRun, Point, RunResult, Store
+from doe.running.store import CurrentRun, EndedRun, Point, RunResult, Store
 from doe.study.finished import finished, inputs_digest
 from doe.study.runs import STORE, ordered_runs
 from doe.study.stages import DESIGN, design_works, study_stages
@@ -34,11 +34,11 @@ LEAST_S, OVERDUE = 1.0, 0.3
 
 @dataclass(frozen=True)
 class Content:
-    """What a store holds: results and failures of points, claims of live processes, ended runs, and agendas, the newest last,
-    each with whether its process lives."""
+    """What a store holds: results and failures of points, runs under way, ended runs, and agendas, the newest last, each with
+    whether its process lives."""
 
     outcomes: Mapping[str, RunResult]
-    claims: Sequence[Claim]
+    running: Sequence[CurrentRun]
     ended: Sequence[EndedRun]
     agendas: Sequence[tuple[Agenda, bool]]
 
@@ -48,15 +48,8 @@ class Content:
         if not (folder / STORE).exists():
             return cls({}, [], [], [])
         with Store(folder / STORE, read_only=True) as store:
-            outcomes, claims = store.outcomes(points, clearance.sound), store.claims()
-            return cls(
-                outcomes, [each for each in claims if each.key not in outcomes], store.ended(), agendas_of(store)
-            )
-
-    @property
-    def running(self) -> list[Claim]:
-        """Runs under way; what waits for a worker of a cluster is not."""
-        return [claim for claim in self.claims if claim.since is not None]
+            outcomes, running = store.outcomes(points, clearance.sound), store.running()
+            return cls(outcomes, [run for run in running if run.key not in outcomes], store.ended(), agendas_of(store))
 
     @property
     def alive(self) -> list[Agenda]:
@@ -75,7 +68,8 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     content = Content.of(folder, points)
     works, agenda = dict(design_works(study)), content.agenda
-    options = {"direct": False, "adaptive": False, "robust": False} | (agenda.options if agenda else {})
+    given = agenda.options if agenda else {}
+    options = {name: given.get(name, False) for name in ("adaptive", "robust")}
     answered = bool(finished(folder, inputs_digest(study, **options))) if agenda else _answered(study, folder)
     if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
         # Nothing was planned for the study as it stands now.
@@ -88,7 +82,7 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
             agenda.measured = agenda.measured.plus(work, seconds)
     keys = set(works)
     failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
-    running = [claim for claim in content.running if claim.key in keys]
+    running = [run for run in content.running if run.key in keys]
     counts = {
         "total": len(keys),
         "done": len(content.outcomes) - len(failures),
@@ -159,10 +153,8 @@ def runs_digest(path: Path, overrides: Sequence[str]) -> str:
 
 def _answered(study: Study, folder: Path) -> bool:
     """Whether the folder holds the answer to the study with any options."""
-    for direct, adaptive, robust in product((False, True), repeat=3):
-        if not (direct and adaptive) and finished(folder, inputs_digest(study, direct, adaptive, robust)):
-            return True
-    return False
+    asked = product((False, True), repeat=2)
+    return any(finished(folder, inputs_digest(study, adaptive, robust)) for adaptive, robust in asked)
 
 
 def _count_design(stages: Sequence[Stage], works: Mapping[str, float], outcomes: Mapping[str, RunResult]) -> None:
@@ -184,7 +176,7 @@ def _record(
     failures: Sequence[Failure],
 ) -> dict[str, Any]:
     # A live process whose answer is written has nothing left to run.
-    alive = any(each.files is None for each in content.alive) or bool(content.claims and not answered)
+    alive = any(each.files is None for each in content.alive) or bool(content.running and not answered)
     answered = answered and not alive
     stage, left_s = agenda.stage, 0.0 if answered else _left_s(agenda, content)
     forecast = None if answered else forecast_of(agenda, _threads(agenda, content), agenda.measured)
@@ -201,7 +193,7 @@ def _record(
         "stages": [_stage(agenda, place, answered) for place in range(len(agenda.stages))],
         "points": dict(counts),
         "failures": grouped(failures),
-        "running": [_running(claim) for claim in content.running],
+        "running": [_running(run) for run in content.running],
         "other": dict(other),
         "spent_s": sum(run.seconds or 0.0 for run in content.ended),
         "left_s": left_s,
@@ -222,16 +214,16 @@ def _stage(agenda: Agenda, place: int, answered: bool) -> dict[str, Any]:
     return {"name": stage.name, "state": state, "done": done, "runs": stage.runs, "most": most}
 
 
-def _running(claim: Claim) -> dict[str, Any]:
+def _running(run: CurrentRun) -> dict[str, Any]:
     return {
-        **{key: getattr(claim, key) for key in ("label", "run", "host", "pid")},
-        "since": datetime.fromtimestamp(claim.since or 0.0, UTC).isoformat(timespec="seconds"),
-        "for_s": _for_s(claim, time.time()),
+        **{key: getattr(run, key) for key in ("label", "run", "host", "pid")},
+        "since": datetime.fromtimestamp(run.since, UTC).isoformat(timespec="seconds"),
+        "for_s": _for_s(run, time.time()),
     }
 
 
-def _for_s(claim: Claim, now: float) -> float:
-    return max(0.0, now - (claim.since or 0.0))
+def _for_s(run: CurrentRun, now: float) -> float:
+    return max(0.0, now - run.since)
 
 
 def _left_s(agenda: Agenda, content: Content) -> float | None:
@@ -250,7 +242,7 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
         seconds, at_once = pace * max(work, 0.0), float(threads)
         if begun and content.alive and stage.since is not None:
             at_once = _at_once(stage.since, content, now) or at_once
-            seconds -= sum(min(_for_s(claim, now), pace * work / len(content.running)) for claim in content.running)
+            seconds -= sum(min(_for_s(run, now), pace * work / len(content.running)) for run in content.running)
             overdue_s = OVERDUE * (now - stage.since) if stage.besides_s else 0.0
             besides_s = max(stage.besides_s - (now - stage.since), overdue_s)
         else:
@@ -270,7 +262,5 @@ def _at_once(since: float, content: Content, now: float) -> float | None:
     begin = min((run.started for run in rows if run.started is not None), default=now)
     if len(rows) < 2 or now <= begin:
         return None
-    busy = sum(run.seconds or 0.0 for run in rows) + sum(
-        min(_for_s(claim, now), now - begin) for claim in content.running
-    )
+    busy = sum(run.seconds or 0.0 for run in rows) + sum(min(_for_s(run, now), now - begin) for run in content.running)
     return max(busy / (now - begin), 0.1)

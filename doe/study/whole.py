@@ -18,15 +18,13 @@ from doe.running.failure import Failure
 from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Progress
 from doe.running.store import Store
-from doe.study.adaptive import Adaptive, Searched, advice, find_adaptive
+from doe.study.adaptive import Adaptive, advice, find_adaptive
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import Chosen, choose
-from doe.study.compared import Compared, compared, kept_direct
+from doe.study.compared import Compared, compared
 from doe.study.confirmation import Confirmed, Gain, gains, whirl_sentence
 from doe.study.design import check_given, design_of
-from doe.study.direct import Direct, find_direct
-from doe.study.direct_pick import DirectPick, neighbourhood
 from doe.study.edge import Edge, edge_of
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front, with_survival
@@ -37,6 +35,7 @@ from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
 from doe.study.searched_draws import draws_about
+from doe.study.searched_pick import SearchedPick, neighbourhood
 from doe.study.stages import FRONT, TOLERANCES, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
@@ -51,7 +50,7 @@ class StudyResult:
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
     gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
-    None where the study asks for none, ``direct``, ``adaptive``, what it is ``compared`` with and ``direct_pick``, of either, unless it was run, ``robust``
+    None where the study asks for none, ``adaptive``, what it is ``compared`` with and its ``searched_pick`` unless it was run, ``robust``
     where nothing is declared as unknown and it was not wanted.
     """
 
@@ -61,9 +60,8 @@ class StudyResult:
     runs: Runs
     surfaces: list[Surface]
     front: ParetoFront
-    direct: Direct | None
     adaptive: Adaptive | None
-    direct_pick: DirectPick | None
+    searched_pick: SearchedPick | None
     compared: Compared | None
     robust: Robust | None
     edge: Edge
@@ -142,35 +140,33 @@ def run_study(
     progress: Callable[[str], Progress],
     scheduler: str | None = None,
     retry: bool = False,
-    direct: bool = False,
     adaptive: bool = False,
     robust: bool = False,
     agenda: AgendaKeeper | None = None,
 ) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
-    ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself, ``adaptive``: in
-    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
+    ``retry``: run those again that failed before. ``adaptive``: also search the front of the simulator
+    itself. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
     where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
     """
-    clock, inputs = _Clock(agenda), inputs_digest(study, direct, adaptive, robust)
+    clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
     check_given(study, folder)
     if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
-    clock.plan(study_stages(study, direct, adaptive, robust))
+    clock.plan(study_stages(study, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
     turns = runs.turns
     surfaces, found = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
-        searched: Searched | None = find_direct(study, found, simulations) if direct else None
-        if adaptive:
-            searched = find_adaptive(study, runs, simulations)
+        searched = find_adaptive(study, runs, simulations) if adaptive else None
+        if searched is not None:
             study, runs, surfaces, found = _with_its_categories(searched, runs, surfaces, found)
-        clock.lap("adaptive_s" if adaptive else "direct_s")
+            clock.lap("adaptive_s")
         chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, pick = chosen.confirmed, chosen.confirmed["pick"].point
         edge = _edge(study, surfaces, chosen, searched, simulations)
@@ -189,10 +185,9 @@ def run_study(
         runs=runs,
         surfaces=surfaces,
         front=with_survival(study, surfaces, chosen.front, confirmed),
-        direct=searched if isinstance(searched, Direct) else None,
-        adaptive=searched if isinstance(searched, Adaptive) else None,
-        direct_pick=chosen.direct,
-        compared=_compared(study, searched, found, folder),
+        adaptive=searched,
+        searched_pick=chosen.searched,
+        compared=None if searched is None else compared(study, searched, found.points),
         robust=judged,
         edge=edge,
         tried=chosen.tried,
@@ -216,16 +211,9 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _offers(study: Study, surfaces: list[Surface], searched: Searched | None, judged: Robust | None) -> list[str]:
+def _offers(study: Study, surfaces: list[Surface], searched: Adaptive | None, judged: Robust | None) -> list[str]:
     """What further searches would bring that were not made."""
     return [*([] if searched else advice(study, surfaces)), *([] if judged else robust_advice(study))]
-
-
-def _compared(study: Study, searched: Searched | None, found: ParetoFront, folder: Path) -> Compared | None:
-    """An adaptive search beside the surfaces and beside a direct search that was finished in the folder."""
-    if not isinstance(searched, Adaptive):
-        return None
-    return compared(study, searched, found.points, kept_direct(folder, study))
 
 
 def _with_its_categories(
@@ -239,18 +227,17 @@ def _with_its_categories(
 
 
 def _edge(
-    study: Study, surfaces: list[Surface], chosen: Chosen, searched: Searched | None, simulations: Simulations
+    study: Study, surfaces: list[Surface], chosen: Chosen, searched: Adaptive | None, simulations: Simulations
 ) -> Edge:
     """Where the pick lies at the edge of what was searched; the simulator tells what is beyond where it was searched."""
     pick, front = chosen.confirmed["pick"], chosen.front.points
     if searched is None:
         return edge_of(study, surfaces, pick, front, None, None)
-    ends = searched.edges if isinstance(searched, Adaptive) else None
-    return edge_of(study, surfaces, pick, front, searched.front.points, simulations, ends)
+    return edge_of(study, surfaces, pick, front, searched.front.points, simulations, searched.edges)
 
 
 def _tolerances(
-    study: Study, surfaces: list[Surface], searched: Searched | None, confirmed: Mapping[str, Confirmed]
+    study: Study, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
 ) -> WidestTolerances | None:
     pick, wished = confirmed["pick"], study.file.tolerances
     if wished is None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.direct_tolerance import Neighbourhood
+from doe.pareto.simulated_tolerance import Neighbourhood
 from doe.pareto.tolerance import WidestTolerances, widest_tolerances
 from doe.response_surface import Surface
 from doe.study.confirmation import Confirmed

@@ -1,4 +1,4 @@
-"""Goals of the responses, the front, the direct front and the widest tolerances of STUDY.toml."""
+"""Goals of the responses, the front, its searches and the widest tolerances of STUDY.toml."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -63,35 +63,6 @@ class Front(Strict):
     """How parts scatter within the tolerances."""
     tolerance_samples: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
     """Parts drawn for a quantile."""
-
-
-class Direct(Consistent):
-    """NSGA-II on the simulator itself."""
-
-    evaluations: Annotated[int, Field(ge=50, le=10_000_000)] = 2000
-    """Runs of the simulator that the search may make."""
-    population: Annotated[int, Field(ge=8, le=10000)] = 50
-    """Points of a generation."""
-    replicates: Annotated[int, Field(ge=2, le=10000)] = 3
-    """Replicates of each evaluation; fewer than a design run has: the search makes up for it by the number of its runs.
-    """
-    turns: Annotated[float, Field(gt=0.0)] | None = None
-    """Shaft turns of an evaluation, the discarded ones included; as long as a design run where left out. What is
-    counted must hold a whole window of the impact."""
-    discard_turns: Annotated[float, Field(ge=0.0)] | None = None
-    """Of those turns, the first ones that are left out as transient."""
-    seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of the search and its runs."""
-    confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
-    """Confidence at which differences count in the search."""
-    resample: Annotated[float, Field(ge=0.1, le=0.9)] = 0.3
-    """Share of the evaluations for fresh runs of the points of the front."""
-    set: list[str] = []
-    """Keys of the scene that are replaced, as "key=value"."""
-
-    def faults(self) -> Iterator[str]:
-        if self.turns is not None and (self.discard_turns or 0.0) >= self.turns:
-            yield f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"
 
 
 class Adaptive(Strict):

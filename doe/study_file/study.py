@@ -15,11 +15,15 @@ from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
-from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
+from doe.study_file.front_section import Adaptive, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS
-from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, read_toml, validated
+from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, read_toml, refuse, validated
 from rbdyn.fields import Number
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
+
+FORMER_TABLE = (
+    "[direct] is no table any more; take it out and run python examples/benchmarks/direct_front.py STUDY.toml"
+)
 
 MOST_FACTORS = 8
 
@@ -92,8 +96,6 @@ class StudyFile(Consistent):
     """Which runs are made."""
     front: Front = Front()
     """The search on the surfaces."""
-    direct: Direct = Direct()
-    """The search on the simulator, with --direct."""
     adaptive: Adaptive = Adaptive()
     """The search with emulators, with --adaptive."""
     robust: Robust = Robust()
@@ -174,12 +176,8 @@ class StudyFile(Consistent):
         replicates = ("numerics", "replicates")
         own: dict[str, dict[tuple[str, ...], str]] = {
             "confirmation": {replicates: "confirmation.replicates says it; write it there"},
-            "direct": {replicates: "direct.replicates says it; write it there"},
             "adaptive": {replicates: "the search chooses it for each run; leave it out"},
         }
-        for name in ("turns", "discard_turns"):
-            if getattr(self.direct, name) is not None:
-                own["direct"][("numerics", name)] = f"direct.{name} says it; keep one of them"
         faults = assignment_faults("scene.set", self.scene.set, claims) if self.scene else []
         for name, more in own.items():
             faults += assignment_faults(f"{name}.set", getattr(self, name).set, claims | more)
@@ -199,7 +197,14 @@ class Study:
     def load(cls, path: Path | str) -> Self:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
-        return cls(path, validated(StudyFile, read_toml(path), str(path)))
+        data = read_toml(path)
+        faults = [f"{path}: {FORMER_TABLE}"] if data.pop("direct", None) is not None else []
+        try:
+            file = validated(StudyFile, data, str(path))
+        except InputError as error:
+            raise InputError([*faults, *error.faults]) from None
+        refuse(faults)
+        return cls(path, file)
 
     @property
     def scene(self) -> SceneFile:

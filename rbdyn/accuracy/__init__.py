@@ -1,11 +1,17 @@
 """How far the numbers are from true ones, and what that costs in time.
 
-Studies, each a module with ``study(scene, progress) -> Report``; the command ``rbdyn accuracy`` runs them by name:
-``rollers`` in time, ``balls`` in equilibrium. ``choice``: which study a command line means; ``judgement``: what errors
-allow to conclude; ``report``: tables, files; ``page``: the parts of ``measured.toml`` on the shipped examples, as one page.
+Studies, each a module with ``study(scene, progress) -> Report``; ``rbdyn accuracy SCENE.toml STUDY`` runs them by name:
+
+- ``tolerances``: bias of the statistics at each tolerance, and error of the motion; what an error allows to be said
+- ``methods``: ours and other ``integrators`` at equal error, all on the compiled right-hand side (``fixed_step``); of a ball
+  bearing its solvers (``ball_solvers``)
+- ``coverage``: how often stated intervals hold the truth; ``options``: what each option costs; ``stability``: how extreme
+  variants (``variants.toml``) of a scene end
+- ``report``: tables, sentences, files
 
 A reference is a much tighter run that two methods agree on; an error and a time come from separate runs, the first
-call never counts; what fails stays in the table. From Python::
+call never counts; what fails stays in the table. Studies that only developers need are scripts of ``examples/benchmarks``.
+From Python::
 
     from rbdyn import Scene, accuracy
 
@@ -20,42 +26,47 @@ Names are fetched when first used: importing the package loads neither numba nor
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from rbdyn.faults import InputError
+from rbdyn.scene import BallScene, Scene
+
 if TYPE_CHECKING:
+    from rbdyn.accuracy.methods import times_faster
     from rbdyn.accuracy.report import Report, show, write
-    from rbdyn.accuracy.rollers.comparison import times_faster
-    from rbdyn.accuracy.rollers.tolerances import statistics_bias
+    from rbdyn.accuracy.tolerances import statistics_bias
     from rbdyn.dynamics.ensemble import Reporter
-    from rbdyn.scene import BallScene, Scene
 
-__all__ = ["BALL_STUDIES", "STUDIES", "Report", "show", "statistics_bias", "study", "times_faster", "write"]
+__all__ = ["STUDIES", "Report", "chosen", "show", "statistics_bias", "study", "times_faster", "write"]
 
-BALL_STUDIES = {"solvers": "rbdyn.accuracy.balls.solvers", "battery": "rbdyn.accuracy.balls.battery"}
-STUDIES = {
-    "tolerances": "rbdyn.accuracy.rollers.work_precision",
-    "methods": "rbdyn.accuracy.rollers.comparison",
-    "slices": "rbdyn.accuracy.rollers.slicing",
-    "replicates": "rbdyn.accuracy.rollers.replication",
-    "coverage": "rbdyn.accuracy.rollers.coverage",
-    "options": "rbdyn.accuracy.rollers.option_cost",
-    "stability": "rbdyn.accuracy.rollers.stability",
-    "scaling": "rbdyn.accuracy.rollers.scaling",
-    **BALL_STUDIES,
-}
+STUDIES = {name: f"rbdyn.accuracy.{name}" for name in ("tolerances", "methods", "coverage", "options", "stability")}
+# Of ball bearings, which are solved to rounding: no tolerance, no interval, no option of a right-hand side.
+BALL_STUDIES = {"methods": "rbdyn.accuracy.ball_solvers"}
 _HOMES = {
     "Report": "rbdyn.accuracy.report",
     "show": "rbdyn.accuracy.report",
     "write": "rbdyn.accuracy.report",
-    "statistics_bias": "rbdyn.accuracy.rollers.tolerances",
-    "times_faster": "rbdyn.accuracy.rollers.comparison",
+    "statistics_bias": "rbdyn.accuracy.tolerances",
+    "times_faster": "rbdyn.accuracy.methods",
 }
 
 
-def study(name: str, scene: "Scene | BallScene", progress: "Reporter" = None, **options: Any) -> "Report":
-    """Run the study ``name`` of ``STUDIES``; ``progress(done, total)`` is called as it goes on.
+def chosen(name: str | None, scene: Scene | BallScene) -> str:
+    """Name of a study, or of the first that the kind of bearing has. Raises InputError for one that it has not."""
+    homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
+    if name is not None and name not in homes:
+        raise InputError(
+            [f"{name}: is no study of a bearing of kind {scene.bearing.kind!r}; choose {' or '.join(homes)}"]
+        )
+    return name or next(iter(homes))
 
-    Raises KeyError for an unknown name, InputError where the scene has nothing to study, RunError, KeyboardInterrupt.
+
+def study(name: str | None, scene: Scene | BallScene, progress: "Reporter" = None) -> "Report":
+    """Run a study by name, the first of its kind of bearing unless named; ``progress(done, total)`` is called as it goes on.
+
+    Raises InputError for a study that the kind of bearing has not, or where the scene has nothing to study, RunError,
+    KeyboardInterrupt.
     """
-    report: Report = import_module(STUDIES[name]).study(scene, progress, **options)
+    homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
+    report: Report = import_module(homes[chosen(name, scene)]).study(scene, progress)
     return report
 
 

@@ -25,6 +25,24 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
 # Length of the history that --out draws.
 TRACE_TURNS = 10.0
+# Options that ``rbdyn accuracy`` had, and what took their place.
+SCRIPT = "run python examples/benchmarks/{}"
+FORMER = {
+    **{
+        f"--{name}": f"write rbdyn accuracy SCENE.toml {name}"
+        for name in ("methods", "coverage", "options", "stability")
+    },
+    "--slices": SCRIPT.format("slicing.py SCENE.toml"),
+    "--replicates": SCRIPT.format("replication.py SCENE.toml"),
+    "--scaling": SCRIPT.format("scaling.py SCENE.toml"),
+    "--battery": SCRIPT.format("ball_battery.py SCENE.toml"),
+    "--scenes": SCRIPT.format("ball_battery.py SCENE.toml --scenes N"),
+    "--page": SCRIPT.format("measured_page.py FILE"),
+    "--part": SCRIPT.format("measured_page.py FILE --part NAME"),
+    "--repeats": "rbdyn accuracy SCENE.toml coverage makes 200 repeats",
+    "--trajectory": "rbdyn accuracy SCENE.toml tolerances compares motions over 0.25 turns",
+    "--sought-percent": "rbdyn accuracy SCENE.toml tolerances judges biases of 1 %",
+}
 
 app.command()(ball)
 app.command("keys")(keys)
@@ -72,35 +90,20 @@ def simulate(
         terminal.hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
 
 
-@app.command()
+@app.command(cls=given.refusing(FORMER))
 def accuracy(
-    scene: Annotated[Path | None, typer.Argument(metavar="SCENE.toml", help="Scene to study.")] = None,
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
+    study: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[tolerances|methods|coverage|options|stability]",
+            help="Error by tolerance; other integrators, or solvers of a ball bearing; how often the stated intervals hold "
+            "the truth; what each option costs; how extreme variants of the scene end.",
+            show_default="tolerances; methods of a ball bearing",
+        ),
+    ] = None,
     assignments: given.Set = None,
     out: Annotated[Path | None, given.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
-    methods: Annotated[bool, given.study_flag("--methods", "Other integrators beside ours")] = False,
-    slices: Annotated[bool, given.study_flag("--slices", "Slices of a profiled roller")] = False,
-    replicates: Annotated[bool, given.study_flag("--replicates", "Statistical error against run time")] = False,
-    coverage: Annotated[bool, given.study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
-    repeats: Annotated[int | None, given.count_option(2, "Repeats of the coverage.", 200)] = None,
-    options: Annotated[bool, given.study_flag("--options", "What each option costs")] = False,
-    stability: Annotated[
-        bool, given.study_flag("--stability", "How stiff and extreme variants of the scene end")
-    ] = False,
-    scaling: Annotated[bool, given.study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
-    battery: Annotated[bool, given.study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
-    scenes: Annotated[int | None, given.count_option(1, "Scenes of the battery.", 5000)] = None,
-    trajectory: Annotated[
-        float | None, given.valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")
-    ] = None,
-    sought: Annotated[
-        float | None, given.valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
-    ] = None,
-    page: Annotated[
-        Path | None, given.valued("FILE", "Measure the shipped examples and write one page of Markdown.", "no page")
-    ] = None,
-    part: Annotated[
-        list[str] | None, given.valued("NAME", "With --page, run this part only; repeatable.", "all parts")
-    ] = None,
     as_json: given.Json = False,
     quiet: given.Quiet = False,
     verbose: Annotated[bool, given.verbose_flag("Also versions.")] = False,
@@ -108,26 +111,13 @@ def accuracy(
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
     with terminal.guarded(as_json):
         from rbdyn import accuracy as studies
-        from rbdyn.accuracy.choice import chosen_study
         from rbdyn.scene import Scene
 
-        flags = {
-            **{"methods": methods, "slices": slices, "replicates": replicates, "coverage": coverage},
-            **{"options": options, "stability": stability, "scaling": scaling, "battery": battery},
-        }
-        typed = {"turns": trajectory, "scenes": scenes, "repeats": repeats, "sought": sought}
-        limits = {key: value for key, value in typed.items() if value is not None}
-        if scene is None or page or part:
-            others = bool(scene or assignments or out or limits or any(flags.values()))
-            _measure(page, part or [], others, as_json, quiet)
-            return
         loaded = Scene.load(scene, assignments or [])
-        name = chosen_study(flags, limits, loaded)
-        if "sought" in limits:
-            limits["sought"] *= 0.01
+        name = studies.chosen(study, loaded)
         folder = terminal.output_folder(out, "rbdyn accuracy", scene) if out else None
         with terminal.progress_bar(name, quiet or as_json) as progress:
-            report = studies.study(name, loaded, progress, **limits)
+            report = studies.study(name, loaded, progress)
         files = studies.write(report, folder) if folder else []
         terminal.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
     if report.failed:
@@ -206,29 +196,6 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     if turns is not None or replicates is not None:
         raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
     return target_of(target)
-
-
-def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, quiet: bool) -> None:
-    """Write the page of measured figures. Raises InputError where it is not named, or something else is asked for too."""
-    from rbdyn.accuracy.page import measure
-    from rbdyn.faults import InputError
-
-    if page is None:
-        known = "goes with --page FILE only" if parts else "is missing; name the scene to study, or --page FILE"
-        raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
-    if others:
-        raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
-    found = measure(page, parts, lambda name: terminal.progress_bar(name, quiet or as_json))
-    failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
-    record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
-    measured = [name for name, each in found.items() if each["status"] == "ok"]
-    terminal.hand_over(
-        lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}")
-    )
-    for name, status in failed.items():
-        print(f"{name} {status}", file=sys.stderr)
-    if failed:
-        raise typer.Exit(terminal.FAILED)
 
 
 def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:

@@ -1,9 +1,14 @@
 """Arguments and options that several commands share. Help tells the default of each: ``show_default`` where it is None."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
+
+from rbdyn.cli.terminal import guarded
+from rbdyn.faults import InputError
 
 
 def flag(*names: str, says: str, **more: Any) -> Any:
@@ -16,6 +21,21 @@ def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> A
     return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
 
 
+def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
+    """A kind of command, for ``cls``, that refuses options it had once by what took their place."""
+
+    class Refusing(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """Refuse former options before any other."""
+            option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
+            if option is not None:
+                with guarded("--json" in args):
+                    raise InputError([f"{option}: is no option any more; {former[option]}"])
+            return super().parse_args(ctx, args)
+
+    return Refusing
+
+
 def folder_option(says: str, default: str = "nothing is written") -> Any:
     """``--out`` of a command that writes other files than ``Out`` says."""
     return valued("DIR", says, default, "--out")
@@ -24,16 +44,6 @@ def folder_option(says: str, default: str = "nothing is written") -> Any:
 def verbose_flag(says: str) -> Any:
     """``--verbose`` of a command that tells other things than ``Verbose`` says."""
     return flag("--verbose", "-v", says=says)
-
-
-def study_flag(name: str, studies: str) -> Any:
-    """A flag that asks for another study than the usual one."""
-    return flag(name, says=f"{studies}, instead.")
-
-
-def count_option(least: int, says: str, default: int) -> Any:
-    """A number of things to run."""
-    return valued("N", says, str(default), min=least, max=100_000)
 
 
 def _tell_version(wanted: bool) -> None:

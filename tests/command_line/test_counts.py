@@ -45,7 +45,6 @@ def command(program, *arguments):
             "numerics.turns = 1000000000000.0: must be at",
         ),
         (("simulate", EXAMPLE, "--turns", "1e6", "--replicates", "10000"), "numerics"),
-        (("accuracy", *BALL, "--battery", "--scenes", "99999999999"), "100000"),
     ],
 )
 def test_a_count_beyond_memory_is_refused(arguments, words):

@@ -20,7 +20,7 @@ from forked import forked
 from in_process import in_process
 from short_studies import short_study
 
-from rbdyn.accuracy.rollers import coverage
+from rbdyn.accuracy import coverage
 
 EXAMPLES = ROOT / "examples"
 BALL = f"rbdyn ball {EXAMPLES}/angular_contact_ball.toml"
@@ -49,7 +49,7 @@ RUN = (
 SIMULATED = [
     RUN,
     f"rbdyn map {EXAMPLE} --speed 20000 --load 900 --turns 2 --replicates 1 --set numerics.companion=false",
-    f"rbdyn accuracy {EXAMPLE} --coverage --repeats 2 --set numerics.turns=1 --set numerics.discard_turns=1 "
+    f"rbdyn accuracy {EXAMPLE} coverage --set numerics.turns=1 --set numerics.discard_turns=1 "
     "--set numerics.replicates=2 --set numerics.extend=false --set numerics.companion=false",
 ]
 HELP = ["rbdyn --help", "doe study --help"]
@@ -64,6 +64,8 @@ def brief(tmp_path_factory):
     short_study(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BRIEF", str(folder))
+        patch.setattr(coverage, "REPEATS", 2)
+        patch.setattr(coverage, "TRUTH_REPLICATES", 2)
         # What commands load and compile is loaded here once, not in each child.
         for line in (BALL, *COMMANDS[-2:], RUN):
             assert in_process(*shlex.split(os.path.expandvars(line))).returncode == 0

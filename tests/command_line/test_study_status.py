@@ -23,7 +23,7 @@ from doe.cli import app
 from doe.commands.status import print_status
 from doe.running.agenda import ANSWER_S, Stage
 from doe.running.keeper import agenda_in
-from doe.running.owner import at_work
+from doe.running.lock import STALE_S, at_work
 from doe.running.store import Point, Store
 from doe.study.finished import inputs_digest
 from doe.study.runs import STORE, run_design
@@ -62,7 +62,7 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
             passed.setdefault(done, time.perf_counter() - begun)
             records.setdefault(done, study_status(study, tmp_path))
 
-    options = {"direct": False, "adaptive": False, "robust": False}
+    options = {"adaptive": False, "robust": False}
     with agenda_in(tmp_path / STORE, "doe study", 2, options, inputs_digest(study, **options)) as keeper:
         keeper.plan(study_stages(study))
         run_design(study, tmp_path, 2, keeper.announced(lambda title: look)("design runs"), agenda=keeper)
@@ -103,7 +103,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
     run_design(Study.load(path), out, 2, silent)
     with Store(out / STORE) as store:
         store.put("a confirmation", {})
-        store.claim([Point("another", "pick")])
+        store.begin(Point("another", "pick"))
         before = files(out)
         monkeypatch.chdir(tmp_path)
         shown = doe_process("status", "study.toml", "--json")
@@ -114,7 +114,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
         "format", "status", "study", "store", "points", "failures", "running", "other", "spent_s", "left_s", "command", "stage",
         "stages", "stopped_by", "left_range_s", "runs_left", "predicted_s", "took_s",
     }  # fmt: skip
-    # The claim of a live process is seen, whatever it is for.
+    # A run of a live process is seen, whatever it is for.
     assert record["points"]["done"] == 20 and record["status"] == "running"
     assert record["other"] == {"done": 1, "failed": 0, "running": 1}
     words = doe_process("status", "study.toml").stdout
@@ -141,20 +141,24 @@ def test_a_running_study_is_found_by_its_file(tmp_path, monkeypatch):
         shown = doe("status", str(path), "-q")
         return shown.stdout + shown.stderr
 
+    far.mkdir()
+    other.mkdir()
     assert "nothing has run yet in study_results" in asked()
-    with at_work(path, far):
+    with at_work(path, far / STORE), Store(far / STORE):
         assert str(far / STORE) in asked()
-        with at_work(path.parent / "cylindrical_roller.toml", other):
+        with at_work(path.parent / "cylindrical_roller.toml", other / STORE), Store(other / STORE):
             assert str(far / STORE) in asked()
-        with at_work(path, other):
+        with at_work(path, other / STORE), Store(other / STORE):
             assert f"runs in {far} and in {other}; name one of them by --out" in asked()
-    killed = f"from doe.running.owner import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
+    killed = f"from doe.running.lock import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
     subprocess.run([sys.executable, "-c", killed], check=True)
-    notes = tmp_path / "cache" / "rbdyn" / "at_work"
-    assert len(list(notes.iterdir())) == 1 and "study_results" in asked()
-    with at_work(path, far):
-        assert len(list(notes.iterdir())) == 1
-    assert not list(notes.iterdir())
+    (left,) = (tmp_path / "cache" / "rbdyn" / "at_work").iterdir()
+    assert "study_results" in asked()
+    long_ago = time.time() - 2.0 * STALE_S
+    os.utime(left, (long_ago, long_ago))
+    with at_work(path, far / STORE):
+        assert not left.exists()
+    assert not list(left.parent.iterdir())
 
 
 class Killed(BaseException):
@@ -189,7 +193,6 @@ def study_command(path: Path, out: Path, **options) -> None:
         ({}, 10, "design runs"),
         ({}, clearance.CONFIRMATION_SEEDS, "confirmation"),
         ({"adaptive": True}, clearance.ADAPTIVE_SEEDS, "adaptive front"),
-        ({"direct": True}, clearance.DIRECT_SEEDS, "direct front"),
         ({"robust": True}, clearance.INPUT_SEEDS, "robust"),
     ],
 )
@@ -274,7 +277,6 @@ def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
     assert searched["adaptive front"].runs == study.file.adaptive.budget - 20
     sets = study.file.robust.points
     assert searched["robust"].runs >= 2 * sets * (1 + study.file.robust.settle) + sets
-    assert study_stages(study, direct=True)[2].runs == study.file.direct.evaluations
 
 
 def test_uncertainty_of_a_scene_has_a_status_too(tmp_path, monkeypatch, capsys):

@@ -586,5 +586,5 @@ def test_a_study_is_not_finished_once_its_sample_changes(tmp_path: Path, where: 
         file.write('\n[uncertain]\nsample = "posterior.csv"\n')
     for rows in ("1\n2\n", "1\n3\n"):
         (tmp_path / "posterior.csv").write_text(f"cage.mass_g\n{rows}", "utf-8")
-        digests.append(inputs_digest(Study.load(study.path), direct=False))
+        digests.append(inputs_digest(Study.load(study.path)))
     assert digests[0] != digests[1]

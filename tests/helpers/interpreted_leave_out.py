@@ -14,7 +14,7 @@ import pytest
 from conftest import law_types, make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
-from rbdyn.accuracy.rollers.option_cost import OPTIONS
+from rbdyn.accuracy.options import OPTIONS
 from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact

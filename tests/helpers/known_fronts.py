@@ -10,12 +10,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from direct_search import direct_front
 from scipy import ndimage
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, Runs, adaptive_front
 from doe.adaptive.candidates import Region
-from doe.pareto.direct import direct_front
 from doe.pareto.goals import Goals
 from doe.pareto.search import best_for_hypervolume, hypervolume, non_dominated, spread
 

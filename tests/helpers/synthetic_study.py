@@ -127,7 +127,6 @@ def summary() -> dict[str, Any]:
             "tolerance_aware": {"kind": "worst_case", "quantile": None,
                                 "front": [{**each, "robust": each["responses"]} for each in front[:6]]},
         },
-        "direct": {"front": front[2:7], "hypervolume": 0.9, "hypervolume_error": 0.012, "surrogate_front": front[4:6], "sentence": "The surfaces lose 1.0 ± 0.5 %."},
         "pick": chosen,
         "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
         "confirmation": {

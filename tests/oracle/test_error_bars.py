@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from rbdyn.accuracy.rollers import coverage
+from rbdyn.accuracy import coverage
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate
 from rbdyn.dynamics.statistics.bias import bias_scale, companion_error, companion_tolerance

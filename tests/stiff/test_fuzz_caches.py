@@ -15,7 +15,7 @@ import pytest
 from cached_entries import ARGUMENTS, FUNCTIONS, fill, fresh, is_whole, remove, spoil
 from conftest import ROOT
 
-from doe.running.owner import at_work, folders_of
+from doe.running.lock import at_work, folders_of
 from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.sweep import run as sweeps
@@ -95,7 +95,7 @@ def test_fuzz_processes_share_compiled_code(fuzz_cases, tmp_path):
 @pytest.mark.slow
 def test_fuzz_spoilt_parts_of_a_sweep(fuzz_cases, tmp_path, monkeypatch):
     """Fuzz: whatever became of what an interrupted sweep left, the whole sweep has the same figures."""
-    monkeypatch.setattr(sweeps, "CHUNK", 4)
+    monkeypatch.setattr(sweeps, "ROW", 4)
     scene, keys = BallScene.load(ROOT / "examples" / "angular_contact_ball.toml"), {
         "operation.axial_load_N": np.linspace(200.0, 400.0, 12).tolist()
     }  # fmt: skip
@@ -117,12 +117,17 @@ def test_fuzz_spoilt_parts_of_a_sweep(fuzz_cases, tmp_path, monkeypatch):
             remove(file)
             file.write_bytes(content)
         way, solved = spoil(draw, path, other), []
-        left = 4 if is_whole(path, data) else 0
-        resumed = sweep(scene, keys, lambda done, total, solved=solved: solved.append(done), path)
+        untouched = is_whole(path, data)
+        try:
+            resumed = sweep(scene, keys, lambda done, total, solved=solved: solved.append(done), path)
+        except OSError:
+            assert "folder" in way or "link" in way, (case, way)
+            continue
         assert all(np.array_equal(resumed.columns[name], column) for name, column in whole.columns.items()), (case, way)
-        assert solved[0] == left + 4, (case, way)
-        ends["resumed" if left else "anew"] += 1
-    assert 0 < ends["resumed"] < ends["anew"], ends
+        # The first row is kept when the interrupt comes, the second is not yet.
+        assert solved[0] == 5 or (solved[0] == 1 and not untouched), (case, way)
+        ends["resumed" if solved[0] == 5 else "anew"] += 1
+    assert min(ends["resumed"], ends["anew"]) > 0, ends
 
 
 @pytest.mark.slow
@@ -193,9 +198,12 @@ def test_fuzz_spoilt_notes_of_studies_at_work(fuzz_cases, tmp_path, monkeypatch)
     """Fuzz: a spoilt note of a running study hides that study at most."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     draw, study, folders = random.Random("notes"), tmp_path / "study.toml", Counter()
-    keys = ("study", "folder", "owner", "host", "machine", "pid", "born", "token")
+    keys = ("study", "store")
     values = (None, 0, -1, 10**30, "x", "\x00", [], {}, "/" * 5000, 1e308)
-    with at_work(study, tmp_path / "one"), at_work(study, tmp_path / "two"):
+    stores = [tmp_path / name / "study.sqlite" for name in ("one", "two")]
+    for store in stores:
+        store.parent.mkdir()
+    with at_work(study, stores[0]), at_work(study, stores[1]), Store(stores[0]), Store(stores[1]):
         notes = sorted((tmp_path / "cache").rglob("*.json"))
         texts = [note.read_bytes() for note in notes]
         for case in range(fuzz_cases):
@@ -206,15 +214,14 @@ def test_fuzz_spoilt_notes_of_studies_at_work(fuzz_cases, tmp_path, monkeypatch)
                 way = spoil(draw, *draw.sample(notes, 2))
             else:
                 way, content = draw.choice(keys), json.loads(texts[0])
-                table = content if way in content else content["owner"]
                 if draw.random() < 0.3:
-                    del table[way]
+                    del content[way]
                 else:
-                    table[way] = draw.choice(values)
+                    content[way] = draw.choice(values)
                 notes[0].write_text(json.dumps(content), encoding="utf-8")
             there = folders_of(study)
-            assert set(there) <= {tmp_path / "one", tmp_path / "two"} or way in ("a bit", "folder"), (case, way, there)
+            assert set(there) <= {tmp_path / "one", tmp_path / "two"} or way in ("a bit", "store"), (case, way, there)
             folders[len(there)] += 1
-            with at_work(tmp_path / "another.toml", tmp_path / "three"):
+            with at_work(tmp_path / "another.toml", tmp_path / "three" / "study.sqlite"):
                 pass
     assert folders[1] > 0 and folders[2] > 0, folders

@@ -25,14 +25,14 @@ from doe.study_file import Study
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of, sign
 
-OPTIONS = ({}, {"adaptive": True}, {"direct": True}, {"robust": True})
+OPTIONS = ({}, {"adaptive": True}, {"robust": True})
 SPOILT = ("", "{}", "[]", "null", "{", '{"stages": 5}', "\x00", '{"command": 1, "stages": []}')
 
 
 def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dict[str, int]:
     """A store as a command leaves it somewhere on its way; returns what is true of it."""
     given = draw.choice(OPTIONS)
-    options = {"direct": False, "adaptive": False, "robust": False} | given
+    options = {"adaptive": False, "robust": False} | given
     digest = inputs_digest(study, **options) if draw.random() < 0.8 else "of another"
     ordered = ordered_runs(study)
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
@@ -59,9 +59,9 @@ def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dic
                 truth["failed"] += 1
             else:
                 store.put(point.key, result, seconds=draw.choice([None, 0.0, 3.0, 1e5]))
-        store.claim(points[ended : ended + taken], queued=draw.random() < 0.3)
-        # The process is killed: its claims stay, its notes too.
-        store.release = lambda: None  # type: ignore[method-assign]
+        # The process is killed: what it has under way stays, its notes too.
+        for point in points[ended : ended + taken]:
+            store.begin(point)
     if draw.random() < 0.3:
         with sqlite3.connect(folder / STORE) as connection:
             connection.execute("UPDATE meta SET value = ? WHERE name LIKE ?", (draw.choice(SPOILT), f"{NOTE}%"))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rbdyn.accuracy.rollers.option_cost import OPTIONS
+from rbdyn.accuracy.options import OPTIONS
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import InputError, RunError
 from rbdyn.scene import Scene

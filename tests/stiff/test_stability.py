@@ -7,10 +7,9 @@ import json
 import pandas as pd
 import pytest
 
-from rbdyn.accuracy import write
-from rbdyn.accuracy.rollers import stability
-from rbdyn.accuracy.rollers.option_cost import with_options
-from rbdyn.accuracy.rollers.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
+from rbdyn.accuracy import stability, write
+from rbdyn.accuracy.options import with_options
+from rbdyn.accuracy.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
@@ -118,9 +117,9 @@ def test_command_line_exit_codes(monkeypatch):
         monkeypatch.setattr(
             stability, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
         )
-        done = CliRunner().invoke(app, ["accuracy", EXAMPLE, "--stability", "--json"])
+        done = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "--json"])
         assert done.exit_code == code and json.loads(done.stdout)["cases"][0]["status"] == status
-        shown = CliRunner().invoke(app, ["accuracy", EXAMPLE, "--stability", "-q"])
+        shown = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "-q"])
         assert shown.exit_code == code and "a case: why" in shown.stdout
 
 

@@ -6,13 +6,16 @@ import json
 
 import numpy as np
 import pytest
-from conftest import lacking
+import replication
+import slicing
+from conftest import ROOT, lacking
 
 from rbdyn import accuracy
-from rbdyn.accuracy.rollers import replication, slicing, tolerances, work_precision
-from rbdyn.accuracy.rollers.pictures import SMALLEST_BIAS
+from rbdyn.accuracy import methods, tolerances
+from rbdyn.cli.app import FORMER
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.faults import InputError, RunError
+from rbdyn.plots.error_against_time import SMALLEST_BIAS
 
 EXAMPLE = "examples/cylindrical_roller.toml"
 
@@ -54,7 +57,7 @@ def test_unit_failed_tolerances_stay_in_the_table(make_scene):
 
 def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path, drawn):
     """Unit: record, sheets and pictures of both; keys that others read."""
-    report = work_precision.study(outer, turns=0.02, rtols=(1e-2, 1e-3))
+    report = tolerances.study(outer, turns=0.02, rtols=(1e-2, 1e-3))
     files = accuracy.write(report, tmp_path)
     assert files == ["accuracy.json", "accuracy.csv", "trajectory.csv", "accuracy.png", "trajectory.png"]
     saved = json.loads((tmp_path / "accuracy.json").read_text())
@@ -92,7 +95,7 @@ def test_unit_slices_study(everything, tmp_path):
 def test_unit_slices_of_a_cylinder_are_refused(outer):
     """Unit: one slice is exact for it."""
     with pytest.raises(InputError, match=r"bearing\.roller_profile = 'cylinder'"):
-        accuracy.study("slices", outer)
+        slicing.study(outer)
 
 
 def test_unit_expected_half_width_is_that_of_student():
@@ -124,33 +127,47 @@ def test_unit_replicates_study(outer, tmp_path):
     assert accuracy.write(report, tmp_path) == ["replicates.json", "replicates.csv", "replicates.png"]
 
 
-def test_command_accuracy(command, tmp_path):
-    """Command line: JSON alone on standard output, files beside it."""
+def test_command_accuracy(command, tmp_path, monkeypatch):
+    """Command line: the study of tolerances unless another is named; JSON alone on standard output, files beside it."""
     settings = ("numerics.turns=2", "numerics.discard_turns=1", "numerics.replicates=2")
     sets = [word for setting in settings for word in ("--set", setting)]
-    good = command("accuracy", EXAMPLE, *sets, "--trajectory", "0.02", "--json", "--out", tmp_path)
+    monkeypatch.setattr(methods, "SPANS", (0.25,))
+    good = command("accuracy", EXAMPLE, *sets, "--json", "--out", tmp_path)
     assert good.returncode == 0, good.stderr
     record = json.loads(good.stdout)
-    assert record["trajectory"]["turns"] == 0.02 and len(record["rows"]) == len(tolerances.TOLERANCES)
+    assert record["trajectory"]["turns"] == 0.25 and len(record["rows"]) == len(tolerances.TOLERANCES)
     assert (tmp_path / "trajectory.png").exists()
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("words", "says"),
     [
-        (("--methods", "--slices"), "--methods and --slices"),
-        (("--trajectory", "3"), "--trajectory 3: past a turn"),
-        (("--replicates", "--trajectory", "0.5"), "leave it out"),
-        (("--slices",), "bearing.roller_profile"),
-        (("--options", "--sought-percent", "2"), "--sought-percent 2: --options judges no means"),
-        (("--set", "numerics.replicates=1", "--slices"), "bearing.roller_profile"),
-        (("--set", "numerics.replicates=1", "--methods"), "numerics.replicates = 1"),
+        (("--methods", "--slices"), "--methods: is no option any more; write rbdyn accuracy SCENE.toml methods"),
+        (("--slices",), "run python examples/benchmarks/slicing.py SCENE.toml"),
+        (("--repeats=3", "--coverage"), "--repeats: is no option any more; "),
+        (("--trajectory", "0.5"), "compares motions over 0.25 turns"),
+        (("--page", "x.md"), "run python examples/benchmarks/measured_page.py FILE"),
+        (
+            ("slices",),
+            "slices: is no study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods or ",
+        ),
+        (("tolerances", "--set", "numerics.replicates=1"), "numerics.replicates = 1"),
     ],
 )
-def test_command_accuracy_refuses(command, flags, told):
-    """Command line: one sentence and exit code 2 for studies that cannot be."""
-    bad = command("accuracy", EXAMPLE, *flags)
-    assert bad.returncode == 2 and told in bad.stderr and "Traceback" not in bad.stderr
+def test_command_accuracy_refuses(command, words, says):
+    """Command line: one sentence and exit code 2 for studies that cannot be; a former option names what took its place."""
+    bad = command("accuracy", EXAMPLE, *words, "--json")
+    assert bad.returncode == 2 and "Traceback" not in bad.stderr
+    (fault,) = json.loads(bad.stdout)["faults"]
+    assert says in fault and fault in bad.stderr
+
+
+def test_command_former_options_need_no_scene(command):
+    """Command line: what was asked for without a scene is refused by the same sentence; the scripts named are there."""
+    bad = command("accuracy", "--page", "x.md")
+    assert bad.returncode == 2 and bad.stderr.startswith("--page: is no option any more")
+    named = [words.split()[2] for words in FORMER.values() if words.startswith("run python ")]
+    assert len(named) == 7 and all((ROOT / script).exists() for script in named)
 
 
 def test_unit_package_is_cheap_to_import():

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 
+import method_bias
 import numpy as np
 import pytest
+import replication
+import slicing
 
-from rbdyn.accuracy.balls import solvers as ball_solvers
-from rbdyn.accuracy.judgement import about, check_replicates, judged, overall, replicates_needed, turns_needed
-from rbdyn.accuracy.rollers import method_bias, replication, slicing, tolerances
-from rbdyn.accuracy.rollers.tolerances import OUTPUTS, Bias
+from rbdyn.accuracy import ball_solvers, tolerances
+from rbdyn.accuracy.tolerances import (
+    OUTPUTS,
+    Bias,
+    about,
+    check_replicates,
+    judged,
+    overall,
+    replicates_needed,
+    turns_needed,
+)
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 from rbdyn.faults import InputError
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from direct_search import direct_front
 from known_fronts import (
     THREE,
     bearing,
@@ -25,7 +26,6 @@ from doe.adaptive import Plan, adaptive_front
 from doe.adaptive.candidates import Region
 from doe.adaptive.runs import Runs
 from doe.designs import central_composite
-from doe.pareto.direct import direct_front
 
 
 @pytest.mark.slow

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import json
 
+import ball_battery
+import minpack
 import numpy as np
 import pytest
-from conftest import EXAMPLE, ROOT
+from ball_battery import CONTROLS, LOADS, cases, posed
+from conftest import ROOT
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import Scene
-from rbdyn.accuracy.balls import battery as ball_battery
-from rbdyn.accuracy.balls import solvers as ball_solvers
-from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, cases, posed
-from rbdyn.accuracy.balls.solvers import problem_of
+from rbdyn.accuracy import ball_solvers
+from rbdyn.accuracy.ball_solvers import problem_of
 from rbdyn.accuracy.report import Progress
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
-from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
+from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
 from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
 from rbdyn.quasistatic.rivals.full_system import evaluate, forces, system_of, unknowns
 from rbdyn.quasistatic.row import equilibrium
@@ -116,7 +117,14 @@ def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
 
 
 @pytest.mark.parametrize(
-    "solver", [plain_newton.solve, finite_search.solve, minpack.hybrid, minpack.levenberg_marquardt, limited.solve]
+    "solver",
+    [
+        plain_newton.solve,
+        finite_search.solve,
+        minpack.SOLVERS["MINPACK hybrid"],
+        minpack.SOLVERS["MINPACK LM"],
+        limited.solve,
+    ],
 )
 def test_oracle_all_solvers_find_the_same_equilibrium(solver):
     """At a load where each of them converges."""
@@ -191,7 +199,7 @@ def test_extreme_a_rival_that_fails_says_why():
     for solver, told in (
         (plain_newton.solve, "2 steps"),
         (finite_search.solve, "searches"),
-        (minpack.hybrid, "MINPACK"),
+        (minpack.SOLVERS["MINPACK hybrid"], "MINPACK"),
     ):
         stopped = solver(*problem, limit=2)
         assert not stopped.found and told in stopped.status
@@ -255,7 +263,7 @@ def test_unit_battery_study(tmp_path):
 
     found = ball_battery.study(Scene.load(BALLS), scenes=3)
     solvers = {row["solver"]: row for row in found.record["solvers"]}
-    assert set(solvers) == set(ball_solvers.WHOLE)
+    assert set(solvers) == set(ball_battery.SOLVERS) > set(ball_solvers.WHOLE)
     for row in solvers.values():
         assert round(row["solved"] * 3) + sum(row["causes"].values()) == row["problems"] == 3
         assert 0.0 < row["median_us"] <= row["longest_us"]
@@ -281,20 +289,15 @@ def test_unit_progress_and_failed_references(problem):
         ball_solvers.work_precision(impossible, (1,), Progress(None, 1))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        ((BALLS, "--methods"), "--methods: studies roller bearings in time"),
-        ((BALLS, "--trajectory", "0.5"), "integrates no trajectories"),
-        ((BALLS, "--scenes", "5"), "goes with --battery only"),
-        ((EXAMPLE, "--battery"), "--battery: studies ball bearings"),
-        ((BALLS, "--battery", "--options"), "choose one"),
-    ],
-)
-def test_command_line_refuses_studies_of_the_other_kind(command, arguments, told):
-    ended = command("accuracy", *arguments)
+def test_command_line_has_the_studies_of_the_kind_of_bearing(command):
+    """A ball bearing has the study of its solvers, which is also the usual one; others are refused by name."""
+    from rbdyn import accuracy
+
+    scene = BallScene.load(BALLS)
+    assert accuracy.chosen(None, scene) == accuracy.chosen("methods", scene) == "methods"
+    ended = command("accuracy", BALLS, "coverage")
     assert ended.returncode == 2
-    assert told in ended.stderr
+    assert ended.stderr.startswith("coverage: is no study of a bearing of kind 'angular_contact_ball'; choose methods")
 
 
 def test_unit_two_rows_are_refused():

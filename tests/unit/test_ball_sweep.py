@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,11 +17,9 @@ from rbdyn.faults import InputError
 from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.quasistatic.result import reference_capacities, solution_life
-from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare, Spinning
-from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
+from rbdyn.quasistatic.row.equilibrium import LOST
 from rbdyn.quasistatic.sweep import run as sweeps
-from rbdyn.quasistatic.sweep.march import leaves, with_numbers
-from rbdyn.quasistatic.sweep.points import Axis, axes_of, snake
+from rbdyn.quasistatic.sweep.points import Axis, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import BallScene
@@ -148,25 +147,18 @@ def test_invariant_a_snake_visits_all_and_steps_by_one(sizes):
         assert (np.abs(np.diff(order, axis=0)).sum(axis=1) == 1).all()
 
 
-def test_unit_controls_keep_their_numbers():
-    """Unit: a control taken apart and put together is itself, whatever its kind."""
-    spinning = Spinning(*(0.1 * i for i in range(1, 10)))
-    for control in (CommonCage(3.0), FixedShare(0.5, spinning), FrictionShare(1.1, spinning)):
-        assert with_numbers(control, np.array(leaves(control))) == control
-
-
 @pytest.fixture(scope="module")
 def broken():
     """A sweep in which two points of five are declared lost."""
 
-    def lose(*arguments):
-        march(*arguments)
-        arguments[-1].outcome[1:3] = RACE_CONTROL_LOST
-        return True
+    def lose(scene, *before):
+        found = solve(scene, *before)
+        lost = scene.operation.inner_speed_rpm in (10e3, 15e3)
+        return SimpleNamespace(found=False, status=LOST) if lost else found
 
-    march = sweeps.march_through
+    solve = sweeps.equilibrium
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeps, "march_through", lose)
+        patch.setattr(sweeps, "equilibrium", lose)
         return sweep(scene_with(), {SPEED: [5e3, 10e3, 15e3, 20e3, 25e3]})
 
 
@@ -193,18 +185,11 @@ def test_unit_overloaded_points_are_those_of_single_equilibria():
     assert list(found.statuses) == alone and found.failures == {"overloaded": [1, 2]}
 
 
-def test_unit_a_lost_point_is_followed_by_a_fresh_start():
-    """Unit: the loop goes on after a point that no control can hold, and starts the next from nothing."""
-    scene = scene_with()
-    axes = axes_of(scene, {SPEED: [5e3, 10e3, 15e3]})
-    model, points, _ = sweeps._packed(scene, axes, snake(axes))
-    points.load[1] = np.nan
-    row, found = model.row, sweeps.empty(3, model.row.cosine.size)
-    at = sweeps.space(row.cosine.size)
-    arrived = sweeps.march_through(model.control, row.cosine, row.sine, points, 0, 3, False, at, found)
-    assert arrived and (found.outcome == 0).tolist() == [True, False, True]
-    assert found.cold.tolist() == [1, 1, 1]
-    assert found.figures[2, :, 0] == pytest.approx(equilibrium(scene_with(f"{SPEED}=15e3")).rows[0].inner_load)
+def test_unit_a_lost_point_is_followed_by_a_fresh_start(broken):
+    """Unit: the loop goes on after points without an equilibrium, and starts the next from nothing."""
+    assert [status == "ok" for status in broken.statuses] == [True, False, False, True, True]
+    assert broken.cold == 4  # all but the last
+    assert_as_alone(broken, 3, scene_with(f"{SPEED}=20e3"))
 
 
 def test_unit_a_double_decker_goes_point_by_point(tmp_path):

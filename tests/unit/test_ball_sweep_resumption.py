@@ -22,22 +22,22 @@ def scene_with(*assignments, file="angular_contact_ball.toml"):
         (scene_with("model.solver=newton"), {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]}),
         (scene_with(file="double_decker.toml"), {LOAD: np.linspace(200.0, 900.0, 6).tolist()}),
     ],
-    ids=["compiled", "another solver", "double-decker"],
+    ids=["a single row", "another solver", "double-decker"],
 )
 def test_an_interrupted_sweep_goes_on_to_the_same_bits(scene, keys, tmp_path, monkeypatch):
     """Unit: stopped by Ctrl-C, what is done is kept; the rest alone is solved, and no figure differs."""
-    monkeypatch.setattr(sweeps, "CHUNK", 7)
-    whole, path, seen = sweep(scene, keys), tmp_path / "sweep.part.npz", []
+    monkeypatch.setattr(sweeps, "ROW", 2)
+    whole, path, seen = sweep(scene, keys), tmp_path / "sweep.part", []
 
     def stop(done, total):
         seen.append(done)
-        if len(seen) == 3:
+        if len(seen) == 5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         sweep(scene, keys, stop, path)
     assert path.exists()
-    path.with_name("other.npz").write_bytes(path.read_bytes())
+    path.with_name("other").write_bytes(path.read_bytes())
     resumed = sweep(scene, keys, None, path)
     assert not path.exists()
     for name, column in whole.columns.items():
@@ -45,25 +45,31 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bits(scene, keys, tmp_path, mo
     assert (resumed.statuses, resumed.notes, resumed.cold) == (whole.statuses, whole.notes, whole.cold)
     assert resumed.balls().equals(whole.balls())
     # Of another sweep, or broken: all is solved.
-    other = path.with_name("other.npz")
+    other = path.with_name("other")
     assert sweep(scene, {**keys, SPEED: [5e3, 6e3]}, None, other).statuses
     path.write_bytes(b"PK nonsense")
     assert sweep(scene, keys, None, path).statuses == whole.statuses
 
 
 def test_a_resumed_sweep_solves_only_what_is_left(tmp_path, monkeypatch):
-    """Unit: the first points of a resumed sweep are not solved again."""
-    monkeypatch.setattr(sweeps, "CHUNK", 10)
-    path, seen = tmp_path / "sweep.part.npz", []
+    """Unit: whole rows of what was done are not solved again; a row that was spoilt, and those after it, are."""
+    monkeypatch.setattr(sweeps, "ROW", 10)
+    path, seen = tmp_path / "sweep.part", []
 
     def stop(done, total):
         seen.append(done)
-        if done == 30:
+        if done == 34:
             raise KeyboardInterrupt
 
     keys = {SPEED: np.linspace(5e3, 30e3, 60).tolist()}
     with pytest.raises(KeyboardInterrupt):
         sweep(scene_with(), keys, stop, path)
+    kept = path.read_text()
     seen.clear()
     sweep(scene_with(), keys, lambda done, total: seen.append(done), path)
-    assert seen == [30, 40, 50, 60]
+    assert seen == list(range(31, 61))
+    first, second, third = filter(None, kept.splitlines())
+    path.write_text("\n".join((first, second[:-9], third)))
+    seen.clear()
+    sweep(scene_with(), keys, lambda done, total: seen.append(done), path)
+    assert seen == list(range(11, 61))

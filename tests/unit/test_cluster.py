@@ -95,7 +95,7 @@ def collected(address: str, texts: list[str], ended: Callable[[int, Ran], None] 
         if ended is not None:
             ended(place, ran)
 
-    cluster.run_on_cluster(address, slow_echo, lambda: texts, take)
+    cluster.run_on_cluster(address, slow_echo, texts, take)
     return found
 
 
@@ -137,11 +137,7 @@ def test_only_what_a_worker_of_a_cluster_runs_is_under_way(tmp_path, monkeypatch
     ended: list[tuple[int, int]] = []
     with started(tmp_path, 2) as there:
         cluster.run_on_cluster(
-            there.address,
-            slow_echo,
-            lambda: ["0.4"] * 10,
-            lambda place, ran: ended.append((place, len(begun))),
-            begun.append,
+            there.address, slow_echo, ["0.4"] * 10, lambda place, ran: ended.append((place, len(begun))), begun.append
         )
     assert sorted(begun) == list(range(10))
     assert all(place in begun[:so_far] and so_far <= done + 2 for done, (place, so_far) in enumerate(ended, 1))
@@ -182,7 +178,7 @@ def test_worker_with_other_sources_is_refused(tmp_path, monkeypatch):
     with started(tmp_path, 1) as there, pytest.raises(InputError, match="runs another version of rbdyn"):
         run_design(study, tmp_path, None, silent, there.address)
     with Store(tmp_path / STORE, read_only=True) as store:
-        assert store.ended() == [] and store.claims() == []
+        assert store.ended() == [] and store.running() == []
 
 
 def test_scheduler_that_is_not_there_is_one_sentence(tmp_path):
@@ -195,7 +191,7 @@ def test_scheduler_that_is_not_there_is_one_sentence(tmp_path):
         "--scheduler 127.0.0.1:1: no dask scheduler answers there within 2 s; check the address"
     ]  # fmt: skip
     with Store(tmp_path / STORE, read_only=True) as store:
-        assert store.claims() == []
+        assert store.running() == []
 
 
 @pytest.mark.parametrize("answer", [None, b"", b"HTTP/1.0 400 Bad Request\r\n\r\n", b"SSH-2.0\r\n", b"\0" * 64])

@@ -260,15 +260,6 @@ CATEGORY = '[[factor]]\nname = "guidance"\nkey = "cage.guidance"\ncategories = [
         (('set = ["', 'set = ["numerics.seed=3", "'), "scene.set = 'numerics.seed=3': every run has a seed of its own"),
         (('set = ["', 'set = ["uncertain.points=16", "'), "scene.set = 'uncertain.points=16': no run depends on it"),
         (('set = ["', 'set = ["numerics.turns=30", "'), "replaces what stands before it in this list"),
-        (
-            ('set = ["numerics.extend_limit=4"]', 'set = ["cage.pocket_clearance_mm=0.2"]'),
-            "direct.set = 'cage.pocket_c",
-        ),
-        (('set = ["numerics.extend_limit=4"]', 'set = ["numerics.replicates=4"]'), "direct.replicates says it"),
-        (
-            ('set = ["numerics.extend_limit=4"]', 'turns = 60\nset = ["numerics.turns=40"]'),
-            "direct.set = 'numerics.turns=40': direct.turns says it",
-        ),
         (("replicates = 16", 'replicates = 16\nset = ["numerics.replicates=4"]'), "confirmation.replicates says it"),
         (("replicates = 16", 'replicates = 16\nset = ["cage.pocket_clearance_mm=0.2"]'), "confirmation.set = 'cage.p"),
         (('"cage.guide_clearance_mm"', '"uncertain.points"'), "factor.key = 'uncertain.points': no run depends on it"),

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import law_types
+from footprint import added_modules, parameter_bytes
 
 import rbdyn.contact
 import rbdyn.dynamics
-from rbdyn.accuracy.rollers.footprint import added_modules, parameter_bytes
-from rbdyn.accuracy.rollers.option_cost import OPTIONS, with_options
+from rbdyn.accuracy.options import OPTIONS, with_options
 from rbdyn.contact.cage_film import journal_film_force, wall_film
 from rbdyn.contact.hertz_line import sum_of_slices
 from rbdyn.contact.rolling_resistance import film_forces
@@ -109,7 +109,7 @@ MODULES = {
 NOT_NEEDED = (
     "pandas", "matplotlib", "pymoo", "sklearn", "doe", "rich",
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
-    "rbdyn.accuracy", "rbdyn.accuracy.rollers.option_cost", "rbdyn.accuracy.rollers.footprint", "rbdyn.accuracy.rollers.scaling", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
+    "rbdyn.accuracy", "rbdyn.accuracy.options", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
     "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion.history", "rbdyn.dynamics.forces.observe",
     "rbdyn.dynamics.motion.rating", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
     *(module for modules in MODULES.values() for module in modules),

@@ -9,12 +9,13 @@ import sys
 import time
 from pathlib import Path
 
+import footprint
 import numpy as np
 import pytest
 from conftest import lacking
 
 from rbdyn import accuracy
-from rbdyn.accuracy.rollers.option_cost import OPTIONS, option_costs, study, with_options
+from rbdyn.accuracy.options import OPTIONS, option_costs, study, with_options
 from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.ranges import axis_values
 from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
@@ -227,11 +228,19 @@ def test_unit_option_costs(outer, tmp_path):
     assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
     # The same types of laws: the compiled code is shared, so both cost the same but for noise.
     assert row.difference_ns == row.with_ns - row.without_ns
-    assert row.holds == row.plain_holds and row.modules == ()
-    assert row.holds.state == 60 and row.holds.instructions > 1000
     found = study(outer, options=options)
     assert accuracy.write(found, tmp_path) == ["options.json", "options.csv"]
     assert found.record["format"] == "rbdyn.options/1"
     saved = found.record["options"][0]
-    assert saved["option"] == row.option
-    assert saved["with_parameter_bytes"] == saved["without_parameter_bytes"] > 0
+    assert saved["option"] == row.option and saved["with_ns"] > 0.0
+
+
+def test_unit_footprint_of_options(outer):
+    """Unit: an option of the plain scene's law types holds what that does; a clock adds its number, modules and code."""
+    options = {name: OPTIONS[name] for name in ("contact law of ISO/TS 16281", "rotating load, with clock")}
+    report = footprint.study(outer, options=options)
+    plain, alike, clocked = report.record["options"]
+    assert plain["state"] == 60 and plain["instructions"] > 1000 and plain["modules"] == ""
+    assert alike == {**plain, "option": "contact law of ISO/TS 16281"}
+    assert clocked["state"] == 63 and clocked["instructions"] > plain["instructions"]
+    assert "rbdyn.dynamics.forces.schedule" in clocked["modules"].split()

@@ -1,16 +1,17 @@
-"""``rbdyn accuracy --page``: parts that run replace their tables, all others keep theirs and say so."""
+"""The page of measured figures: parts that run replace their tables, all others keep theirs and say so."""
 
 from __future__ import annotations
 
-import json
 import shlex
+import subprocess
+import sys
 import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 
+import measured_page as page
 import pytest
 
-from rbdyn.accuracy import page
 from rbdyn.accuracy.report import Report, Table
 from rbdyn.faults import InputError, RunError
 
@@ -64,7 +65,7 @@ def test_unit_folder_is_one_for_a_part(measured):
         line.split(" --out ")[1].split()[0] for line in text.splitlines() if line.startswith("told") and "--out" in line
     }
     assert len(used) == 1 and "TMP" not in used
-    assert "`doe study examples/clearance_study.toml --out TMP --direct`, " in text
+    assert "`python examples/benchmarks/direct_front.py examples/clearance_study.toml --out TMP`, " in text
 
 
 def test_unit_unknown_part_is_refused(measured):
@@ -78,7 +79,7 @@ def test_unit_tables_become_markdown(monkeypatch):
     report = Report("x", {}, [Table("one", ("a", "b"), [("1|2", "3")])], ["So it is."], {})
     asked = []
     monkeypatch.setattr(page, "study", lambda *given: asked.append(given) or report)
-    line = f"rbdyn accuracy {ROOT}/examples/cylindrical_roller.toml --options --set numerics.turns=7"
+    line = f"rbdyn accuracy {ROOT}/examples/cylindrical_roller.toml options --set numerics.turns=7"
     assert page._run(line, None).endswith("**one**\n\n| a | b |\n| --- | --- |\n| 1\\|2 | 3 |\n\nSo it is.")
     assert asked[0][0] == "options" and asked[0][1].numerics.turns == 7
 
@@ -110,17 +111,9 @@ def test_unit_commands_name_files_and_keys_that_exist(line, monkeypatch):
         page._run(line, None)
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ((), "SCENE.toml: is missing"),
-        (("--part", "battery"), "--part: goes with --page FILE only"),
-        (("--page", "x.md", "--battery"), "--page x.md: lists its own commands"),
-        (("--page", "x.md", "--part", "speed"), "--part speed: is none"),
-    ],
-)
-def test_command_line_refuses_what_does_not_go_together(command, words, told):
-    """Command line: one sentence, exit code 2, one JSON object."""
-    ran = command("accuracy", *words, "--json")
-    assert ran.returncode == 2
-    assert json.loads(ran.stdout)["faults"][0].startswith(told)
+def test_script_refuses_an_unknown_part(tmp_path):
+    """Script: one sentence, exit code 2, nothing written."""
+    program = [sys.executable, page.__file__, tmp_path / "x.md", "--part", "speed"]
+    ran = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert ran.returncode == 2 and ran.stderr.startswith("--part speed: is none; the parts are tolerances, ")
+    assert not list(tmp_path.iterdir())

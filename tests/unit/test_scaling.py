@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-from conftest import lacking
+from conftest import ROOT, lacking
+from scaling import Memory, Point, Scaling, fit, peak_memory, report, scaling, with_rollers, with_slices
 
 from rbdyn.accuracy import write
-from rbdyn.accuracy.rollers.scaling import (
-    Memory,
-    Point,
-    Scaling,
-    fit,
-    peak_memory,
-    report,
-    scaling,
-    with_rollers,
-    with_slices,
-)
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
@@ -94,12 +86,14 @@ def test_unit_memory_of_a_process(outer):
 
 
 @pytest.mark.slow
-def test_command_scaling(command, tmp_path):
-    """Command line: one JSON object, files beside it; memory over turns a hundred times as many."""
-    shown = command("accuracy", "examples/cylindrical_roller.toml", "--scaling", "--json", "--out", tmp_path)
+def test_script_scaling(tmp_path):
+    """Script: sentences and files; memory over turns a hundred times as many."""
+    program = [sys.executable, ROOT / "examples" / "benchmarks" / "scaling.py", "--out", tmp_path]
+    shown = subprocess.run(program, capture_output=True, text=True, check=False)
     assert shown.returncode == 0, shown.stderr
-    record = json.loads(shown.stdout)
+    assert "4000 counted turns: at most " in shown.stdout
+    record = json.loads((tmp_path / "scaling.json").read_text())
     assert [len(record[kind]) for kind in ("rollers", "slices", "memory")] == [6, 6, 2]
     few, many = (memory["peak_MiB"] for memory in record["memory"])
     assert abs(many - few) < 5.0
-    assert {file.name for file in tmp_path.iterdir()} == {"scaling.json", "scaling.csv", "scaling.png", "made_by.json"}
+    assert {file.name for file in tmp_path.iterdir()} == {"scaling.json", "scaling.csv", "scaling.png"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,7 +21,6 @@ from doe.report.sections.blocks import Figures
 from doe.report.sections.searches import in_few_runs
 from doe.report.steps.search_words import SURE, held_sentence
 from doe.report.study.files import write
-from doe.study.compared import kept_direct
 from doe.study.goals import goals_of
 from doe.study.held import pulls
 from doe.study.limits import Limit
@@ -34,7 +32,7 @@ GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
 
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):
-    """A search in a folder of its own, and one in the folder of a direct search of the same study."""
+    """A search of a short study, what it found, its record and its folder."""
     patch = pytest.MonkeyPatch()
     instantly(patch.setattr)
     coarsely(patch.setattr)
@@ -43,17 +41,12 @@ def studied(tmp_path_factory):
     source = tmp_path_factory.mktemp("study")
     path = short_study(source, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
     text = path.read_text(encoding="utf-8").replace("population = 100", "population = 24")
-    text = text.replace("evaluations = 2000", "evaluations = 130").replace("population = 50", "population = 20")
     path.write_text(f"{text}\n[adaptive]\nbudget = 36\nbatch = 6\n", encoding="utf-8")
-    study, found = Study.load(path), {}
-    for name, searches in (("alone", ("adaptive",)), ("beside", ("direct", "adaptive", "adaptive"))):
-        folder = tmp_path_factory.mktemp(name)
-        for search in searches:
-            outcome = run_study(study, folder, 1, lambda title: silent, **{search: True})
-            found[name, search] = outcome, write(outcome, folder)
-        found[name] = folder
+    study, folder = Study.load(path), tmp_path_factory.mktemp("out")
+    outcome = run_study(study, folder, 1, lambda title: silent, adaptive=True)
+    record = write(outcome, folder)
     patch.undo()
-    return study, found
+    return study, outcome, record, folder
 
 
 def dominated(costs: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> float:
@@ -65,15 +58,12 @@ def dominated(costs: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> float:
 
 
 def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
-    """Oracle: levels counted; of the front foretold, of the surfaces' front as it is drawn, of the direct front by its runs."""
-    study, found = studied
-    outcome, record = found["beside", "adaptive"]
-    _, direct = found["beside", "direct"]
+    """Oracle: levels counted; of the front foretold, of the surfaces' front as it is drawn, of the search's fresh runs."""
+    study, outcome, record, _ = studied
     goals, emulators = goals_of(study), outcome.adaptive.found.emulators
     told = record["adaptive"]["compared"]
-    values = np.array([list(point["responses"].values()) for point in direct["direct"]["front"]])
-    both = np.vstack([goals.costs(values), goals.costs(outcome.adaptive.found.foretold)])
-    front = [row for row in both if not ((both <= row).all(axis=1) & (both < row).any(axis=1)).any()]
+    costs = goals.costs(outcome.adaptive.found.foretold)
+    front = [row for row in costs if not ((costs <= row).all(axis=1) & (costs < row).any(axis=1)).any()]
     scale = np.min(front, axis=0), np.max(front, axis=0)
     assert list(told["ideal"].values()) == pytest.approx(scale[0])
     assert list(told["nadir"].values()) == pytest.approx(scale[1])
@@ -82,52 +72,23 @@ def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     for mine, costs in (
         (told["search"][-1], goals.costs(outcome.adaptive.found.foretold)),
         (told["surfaces"], goals.costs(on_surfaces)),
-        (told["direct"]["hypervolume"], goals.costs(values)),
         (told["fresh"]["hypervolume"], outcome.adaptive.found.front.costs),
     ):
         assert mine == pytest.approx(dominated(costs, *scale), rel=0.03)
     assert len(told["search"]) == len(record["adaptive"]["history"])
 
 
-def test_the_direct_front_stands_beside_where_the_folder_holds_it(studied):
-    _, found = studied
-    for name, there in (("alone", False), ("beside", True)):
-        outcome, record = found[name, "adaptive"]
-        compared = record["adaptive"]["compared"]
-        assert ("direct" in compared) == there and "direct" not in record
-        page = (found[name] / "report.html").read_text(encoding="utf-8")
-        (picture,) = re.findall(r'<svg[^>]*aria-label="Hypervolume of the search.*?</svg>', page, re.DOTALL)
-        assert ("direct front of" in page) == there == ('class="line direct"' in picture)
-        assert picture.count('class="line surrogate"') == 1
-        assert (outcome.compared.direct_reached is not None) == there
-    # On its own the scale is that of the front foretold, as in the history.
-    _, record = found["alone", "adaptive"]
+def test_the_page_draws_the_fronts_and_the_scale_is_that_of_the_history(studied):
+    _, _, record, folder = studied
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    (picture,) = re.findall(r'<svg[^>]*aria-label="Hypervolume of the search.*?</svg>', page, re.DOTALL)
+    assert picture.count('class="line surrogate"') == 1 and "found in few runs, simulated" in page
     history = [each["hypervolume"] for each in record["adaptive"]["history"]]
     assert record["adaptive"]["compared"]["search"] == pytest.approx(history, rel=1e-12)
-    _, direct = found["beside", "direct"]
-    _, record = found["beside", "adaptive"]
-    assert record["adaptive"]["compared"]["direct"]["front"] == json.loads(json.dumps(direct["direct"]["front"]))
-    assert record["adaptive"]["compared"]["direct"]["evaluations"] == direct["direct"]["evaluations"]
-
-
-def test_a_direct_front_of_another_study_is_none(studied, tmp_path):
-    study, found = studied
-    assert kept_direct(found["beside"], study) is not None, "a second search in the folder hands it on"
-    assert kept_direct(found["alone"], study) is None
-    other = study.file.front.model_copy(update={"seed": 7})
-    assert kept_direct(found["beside"], replace(study, file=study.file.model_copy(update={"front": other}))) is None
-    assert kept_direct(tmp_path, study) is None
-    whole = (found["beside"] / "summary.json").read_text(encoding="utf-8")
-    assert kept_direct(tmp_path, study) is None and '"evaluations": ' in whole
-    changed = whole.replace('"evaluations": ', '"evaluations": 1')
-    for text in ("no json", "[1]", '{"adaptive": 3}', '{"direct": {"front": []}}', "[" * 100_000, changed):
-        (tmp_path / "summary.json").write_text(text, encoding="utf-8")
-        assert kept_direct(tmp_path, study) is None
 
 
 def test_the_picture_has_every_run_by_its_reason(studied):
-    _, found = studied
-    _, record = found["alone", "adaptive"]
+    _, _, record, _ = studied
     drawn = [block for block in in_few_runs(record) if isinstance(block, Figures)]
     assert len(drawn) == 2
     adaptive = record["adaptive"]
@@ -143,8 +104,7 @@ def test_the_picture_has_every_run_by_its_reason(studied):
 
 
 def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
-    _, found = studied
-    outcome, record = found["beside", "adaptive"]
+    _, outcome, record, folder = studied
     answer, spent, held, trust, beside = record["adaptive"]["sentences"]
     for name, value in record["pick"].items():
         assert f"{name[:-3].replace('_', ' ')} {value:.4g} mm" in answer
@@ -158,8 +118,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     assert ("no more than they knew" in trust) == bool((claimed <= SURE).all())
     compared = record["adaptive"]["compared"]
     assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
-    assert f"direct front of {compared['direct']['evaluations']} evaluations" in beside
-    page = (found["beside"] / "report.html").read_text(encoding="utf-8")
+    page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.index("The pick has") < page.index('class="tiles"') < page.index("The search ended because")
 
 

@@ -11,7 +11,7 @@ from short_studies import short_study
 
 from doe.adaptive.emulators import fit_emulators
 from doe.adaptive.runs import Runs
-from doe.pareto.direct_tolerance import Neighbourhood
+from doe.pareto.simulated_tolerance import Neighbourhood
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of, region_of

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbdyn.accuracy.rollers import coverage
+from rbdyn.accuracy import coverage
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
@@ -320,19 +320,18 @@ def test_unit_repeats_are_of_one_bearing(make_scene):
 
 
 def test_command_line_coverage(command, monkeypatch):
-    """The command runs its repeats and says what they cost; repeats belong to it alone."""
+    """The command runs its repeats and says what they cost."""
     monkeypatch.setattr(coverage, "TRUTH_REPLICATES", 2)  # in place of 64
     scene = "examples/cylindrical_roller.toml"
     short = ("numerics.turns=1", "numerics.discard_turns=1", "numerics.replicates=2", "numerics.extend=false")
     sets = [part for item in short for part in ("--set", item)]
-    shown = command("accuracy", scene, "--coverage", "--repeats", "2", *sets, "--json")
+    monkeypatch.setattr(coverage, "REPEATS", 2)
+    shown = command("accuracy", scene, "coverage", *sets, "--json")
     assert shown.returncode == 0
     found = json.loads(shown.stdout)
     assert found["format"] == "rbdyn.coverage/1" and found["repeats"] == 2
     assert {row["figure"] for row in found["rows"]} >= {"impact_force_N", "power_loss_W"}
     assert found["mean_turns"] == pytest.approx(2.0 * (2 + 1))
-    refused = command("accuracy", scene, "--repeats", "2")
-    assert refused.returncode == 2 and "goes with --coverage only" in refused.stderr
 
 
 @pytest.mark.slow

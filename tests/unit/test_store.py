@@ -1,23 +1,21 @@
-"""The store of runs: what it refuses, what survives a cut log and a full disk, who may run what."""
+"""The store of runs: what it refuses, what survives a cut log and a full disk, who may work on it."""
 
 from __future__ import annotations
 
 import os
-import re
 import shutil
+import socket
 import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from doe.running import owner
+from doe.running import lock
 from doe.running.failure import Failure, grouped
-from doe.running.owner import LEASE_S, this_process
 from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import digest_of
@@ -38,7 +36,8 @@ def path(tmp_path) -> Path:
 def test_results_and_failures_are_kept_with_their_facts(path):
     with Store(path, "clearance") as store:
         assert store.get("key 1") is None
-        assert store.claim(POINTS[:2]) == {"key 1", "key 2"}
+        store.begin(POINTS[0])
+        store.begin(POINTS[1])
         store.put("key 1", {"x": 1.5}, seconds=2.0)
         store.put("key 1", {"x": 2.5})
         store.fail("key 2", "it broke", seconds=1.0)
@@ -165,11 +164,11 @@ def test_log_cut_anywhere_gives_back_whole_results_in_order(path, tmp_path):
         assert found == {f"key {number}": result(number) for number in range(1, reported + 1)}, length
 
 
-def test_results_are_on_the_disk_when_put_returns_and_claims_need_not_be(path):
+def test_results_are_on_the_disk_when_put_returns_and_beginnings_need_not_be(path):
     with Store(path) as store:
         said: list[str] = []
         store._connection.set_trace_callback(said.append)
-        store.claim(POINTS[:1])
+        store.begin(POINTS[0])
         store.put("key 1", result(1))
         store._connection.set_trace_callback(None)
     settings = [line.rpartition("=")[2] for line in said if line.startswith("PRAGMA synchronous")]
@@ -198,39 +197,37 @@ def test_spoilt_result_is_told_and_not_read_but_run_again(path, spoilt, capsys):
     with Store(path) as store:
         assert store.outcomes(POINTS[:1]) == store.outcomes(POINTS[:1]) == {}
         assert capsys.readouterr().err == f"{path}: kept results that cannot be read count as not done: design run 1\n"
-        assert store.claim(POINTS[:1]) == {"key 1"}
+        store.begin(POINTS[0])
         store.put("key 1", result(1))
         assert store.get("key 1") == result(1)
 
 
-def test_queued_run_is_under_way_once_it_begins(path):
-    with Store(path) as store, Store(path) as other:
-        assert store.claim(POINTS[:2], queued=True) == {"key 1", "key 2"}
-        assert other.claim(POINTS[:2]) == set()
-        other.begin("key 1")
-        assert [claim.since for claim in other.claims()] == [None, None]
-        store.begin("key 2")
+def test_run_is_under_way_from_when_it_begins_until_it_ends(path):
+    with Store(path) as store, Store(path, read_only=True) as reader:
         before = time.time()
-        one, two = sorted(other.claims(), key=lambda claim: claim.key)
-        assert one.since is None and two.since is not None and before - 5.0 < two.since <= before
+        for point in POINTS[:3]:
+            store.begin(point)
+        store.put("key 2", result(2))
+        one, three = reader.running()
+        assert (one.key, one.label, one.run, one.pid) == ("key 1", "design run 1", 1, os.getpid())
+        assert three.key == "key 3" and before <= one.since <= three.since <= time.time()
+        store.release()
+        assert reader.running() == [] and [run.key for run in reader.ended()] == ["key 2"]
 
 
-def test_spoilt_times_and_signs_of_life_stop_nobody(path):
-    with Store(path) as store, Store(path) as other:
+def test_spoilt_times_stop_nobody(path):
+    with Store(path) as store:
         store.put("key 1", result(1), seconds=2.0)
-        other.claim(POINTS[1:3])
+        store.begin(POINTS[1])
         times = "started = 'then', ended = CASE key WHEN 'key 1' THEN 'now' END, seconds = NULL"
         store._connection.execute(f"UPDATE runs SET {times}")
         assert store.get("key 1") == result(1) and store.ended() == []
-        assert [claim.since for claim in store.claims()] == [0.0, 0.0]
-        for beat in ("NULL", "'soon'"):
-            store._connection.execute(f"UPDATE owners SET beat = {beat}")
-            assert store.claims() == []
+        assert [run.since for run in store.running()] == [0.0]
 
 
 def test_failure_dated_ahead_by_another_clock_is_tried_again(path):
     with Store(path) as store:
-        store.claim(POINTS[:1])
+        store.begin(POINTS[0])
         store.fail("key 1", "it broke")
     foreign(path, f"UPDATE runs SET ended = {time.time() + 1e5}")
     with Store(path) as store:
@@ -255,91 +252,70 @@ def test_full_disk_is_one_sentence_and_keeps_what_was_finished(path):
         assert store.get("key 8") == result(8)
 
 
-def test_only_one_gets_a_run_until_it_is_given_back(path):
-    with Store(path) as one, Store(path) as two:
-        assert one.claim(POINTS[:3]) == {"key 1", "key 2", "key 3"}
-        assert two.claim(POINTS[:4]) == {"key 4"}
-        assert [(claim.key, claim.pid) for claim in two.claims()] == [(f"key {n}", os.getpid()) for n in (1, 2, 3, 4)]
-        one.put("key 1", result(1))
-        one.release()
-        assert two.claim(POINTS[:3]) == {"key 2", "key 3"}
-        two.close()
-        assert one.claim(POINTS[1:4]) == {"key 2", "key 3", "key 4"}
-
-
-def claimed_by(path: Path, someone: owner.Owner, beat: float) -> set[str]:
-    """Which points a new store gets when all are claimed by ``someone``, last seen at ``beat``."""
-    with Store(path) as store:
-        store.claim(POINTS)
-        with store._transaction(durable=True) as connection:
-            connection.execute("DELETE FROM owners")
-            connection.execute(
-                "INSERT INTO owners VALUES (?, ?, ?, ?, ?, ?)",
-                (someone.token, someone.host, someone.machine, someone.pid, someone.born, beat),
-            )
-            connection.execute("UPDATE runs SET owner = ?", (someone.token,))
-    with Store(path) as store:
-        return store.claim(POINTS)
-
-
-def test_claims_of_the_dead_are_taken_over_and_those_of_the_living_are_not(path):
-    keys = {point.key for point in POINTS}
-    sleeper = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    alive = replace(this_process(), pid=sleeper.pid, born=owner._born(sleeper.pid))
-    # However long ago it was heard of: its process is there.
-    assert claimed_by(path, alive, 0.0) == set()
-    # Another process had its number before.
-    assert claimed_by(path, replace(alive, born="1"), time.time()) == keys
-    sleeper.kill()
-    os.waitid(os.P_PID, sleeper.pid, os.WEXITED | os.WNOWAIT)
-    # Killed, but not fetched by its parent: a zombie.
-    assert claimed_by(path, alive, time.time()) == keys
-    sleeper.wait()
-    assert claimed_by(path, alive, time.time()) == keys
-
-
-def test_claims_of_another_machine_last_as_long_as_the_lease(path):
-    keys = {point.key for point in POINTS}
-    elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
-    assert claimed_by(path, elsewhere, time.time() - 0.5 * LEASE_S) == set()
-    assert claimed_by(path, elsewhere, time.time() - 1.1 * LEASE_S) == keys
-
-
-def test_claim_from_the_future_is_told_and_lasts_one_lease_from_when_it_was_first_seen(path, monkeypatch, capsys):
-    monkeypatch.setattr(owner, "LEASE_S", 0.3)
-    elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
-    assert claimed_by(path, elsewhere, time.time() + 86400.0) == set()
-    assert re.fullmatch(
-        rf"{path}: process {os.getpid()} on elsewhere gave its last sign of life 86\d\d\d s ahead of this clock; set both "
-        r"clocks right\. Unless it gives another within 60 s, its runs are taken over\n",
-        capsys.readouterr().err,
+def working(path: Path) -> subprocess.Popen:
+    """Another process that works on a store, once it has run 1 under way."""
+    code = (
+        "import sys, time; from pathlib import Path; from doe.running.store import Point, Store\n"
+        "with Store(Path(sys.argv[1])) as store:\n"
+        "    store.begin(Point('key 1', 'design run 1', 1))\n"
+        "    print('begun', flush=True)\n"
+        "    sys.stdin.read()"
     )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "begun\n"
+    return process
+
+
+def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, monkeypatch):
+    """Who it is and what to do; a reader sees what it does; once it is killed nothing of it is left."""
+    monkeypatch.setattr(lock, "PATIENCE_S", 0.1)
+    process = working(path)
+    with pytest.raises(InputError) as refused:
+        Store(path)
+    host = socket.gethostname()
+    assert refused.value.faults == [
+        f"{path}: process {process.pid} on {host} works on it; wait until it has ended, or name another folder"
+    ]
+    with Store(path, read_only=True) as reader:
+        assert [(run.key, run.pid) for run in reader.running()] == [("key 1", process.pid)]
+        process.kill()
+        process.wait()
+        assert reader.running() == []
     with Store(path) as store:
-        time.sleep(0.2)
-        store._connection.execute("UPDATE owners SET beat = beat + 5")
-        time.sleep(0.2)
-        # Older than a lease since the first sign, but there was another.
-        assert store.claim(POINTS) == set()
-        time.sleep(0.4)
-        assert store.claim(POINTS) == {point.key for point in POINTS}
+        assert store._connection.execute("SELECT count(*) FROM runs").fetchone() == (0,)
+        assert store.outcomes(POINTS) == {}
 
 
-def test_a_live_process_gives_signs_of_life(path, monkeypatch):
-    monkeypatch.setattr("doe.running.store.BEAT_S", 0.02)
-    with Store(path) as store, Store(path) as other:
-        store.claim(POINTS[:1])
-        query = "SELECT beat FROM owners"
-        (first,) = other._connection.execute(query).fetchone()
-        deadline = time.monotonic() + 10.0
-        while other._connection.execute(query).fetchone() == (first,) and time.monotonic() < deadline:
-            time.sleep(0.01)
-        assert other._connection.execute(query).fetchone() > (first,)
+def test_stores_of_one_process_share_its_lock_until_the_last_is_closed(path):
+    one, two = Store(path), Store(path)
+    one.close()
+    assert lock.is_held(path)
+    two.put("key 1", result(1))
+    two.close()
+    assert not lock.is_held(path) and not lock.is_held(path.with_name("none"))
+    process = working(path)
+    assert lock.is_held(path)
+    process.communicate()
+    assert not lock.is_held(path)
+
+
+def test_notes_tell_whether_their_process_lives(path):
+    with Store(path) as store:
+        store.note("plan ", "first")
+        assert store.notes("plan ") == [("first", True)]
+    with Store(path) as store:
+        assert store.notes("plan ") == [("first", False)]
+        store.note("plan ", "second")
+        store.sign("plan ")
+        assert store.notes("plan ") == [("second", True)]
 
 
 def test_reading_leaves_the_folder_as_it_was(path, tmp_path):
     with Store(path) as store:
         store.put("key 1", result(1))
-        store.claim(POINTS[1:2])
+        store.begin(POINTS[1])
         # As a killed process leaves it: with its log.
         killed = tmp_path / "killed"
         killed.mkdir()
@@ -354,20 +330,20 @@ def test_reading_leaves_the_folder_as_it_was(path, tmp_path):
         assert {file.name: file.stat().st_size for file in folder.iterdir()} == before
 
 
-def test_many_openings_at_once_make_one_store(path):
+def test_of_many_openings_at_once_one_makes_the_store_and_the_others_wait_or_are_refused(path):
     code = (
-        "import sys; from pathlib import Path; from doe.running.store import Point, Store\n"
-        "with Store(Path(sys.argv[1])) as store:\n"
-        "    print(len(store.claim([Point(f'k{n}', 'p') for n in range(50)])))\n"
-        "    store.put('k' + sys.argv[2], {})"
+        "import sys; from pathlib import Path; from doe.running.store import Store; from rbdyn.faults import InputError\n"
+        "try:\n"
+        "    with Store(Path(sys.argv[1])) as store:\n"
+        "        store.put('k' + sys.argv[2], {})\n"
+        "except InputError as error:\n"
+        "    sys.exit(2 if 'works on it' in str(error) else 3)"
     )
-    processes = [
-        subprocess.Popen([sys.executable, "-c", code, str(path), str(number)], stdout=subprocess.PIPE, text=True)
-        for number in range(3)
-    ]
-    assert all(process.wait(60) == 0 for process in processes)
+    processes = [subprocess.Popen([sys.executable, "-c", code, str(path), str(number)]) for number in range(3)]
+    codes = [process.wait(60) for process in processes]
+    assert set(codes) <= {0, 2} and 0 in codes
     with Store(path) as store:
-        assert {run.key for run in store.ended()} == {"k0", "k1", "k2"}
+        assert {run.key for run in store.ended()} == {f"k{number}" for number, code in enumerate(codes) if code == 0}
 
 
 def test_causes_that_differ_in_numbers_are_one_and_the_most_frequent_comes_first():

@@ -74,11 +74,11 @@ def test_a_finished_study_is_not_done_again(finished):
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "finished before, nothing has changed since" in shown
     assert f"pick: {outcome.pick.reason}" in shown
-    asked = inputs_digest(outcome.study, direct=False)
+    asked = inputs_digest(outcome.study)
     assert is_finished(folder, asked)["pick"] == dict(
         zip(outcome.study.factors, outcome.pick.point.tolist(), strict=True)
     )
-    assert is_finished(folder, inputs_digest(outcome.study, direct=True)) is None
+    assert is_finished(folder, inputs_digest(outcome.study, adaptive=True)) is None
     (folder / "front.csv").rename(folder / "aside.csv")
     assert is_finished(folder, asked) is None
     (folder / "aside.csv").rename(folder / "front.csv")
@@ -181,48 +181,6 @@ def test_killed_study_loses_no_finished_run(finished, tmp_path):
     finished_rows = rows(store)
     assert len(finished_rows) == 20
     assert survived.items() <= finished_rows.items()
-
-
-@pytest.mark.slow
-def test_direct_front_killed_in_its_search_resumes_with_the_same_bits(tmp_path):
-    short = SHORT.replace("turns=3,", "turns=12,")
-    path = short_study(tmp_path, short)
-    text = path.read_text(encoding="utf-8")
-    direct = text[text.index("[direct]") : text.index("[tolerances]")]
-    brief = "[direct]\nevaluations = 60\npopulation = 8\nreplicates = 2\nturns = 13\ndiscard_turns = 1\n\n"
-    path.write_text(text.replace(direct, brief), encoding="utf-8")
-
-    def begin(out: str) -> subprocess.Popen:
-        command = [sys.executable, "-m", "doe", "study", str(path), "--direct", "--workers", "1", "--out"]
-        return subprocess.Popen([*command, str(tmp_path / out)], stdout=subprocess.DEVNULL)
-
-    assert begin("whole").wait(600) == 0
-    store = tmp_path / "out" / "study.sqlite"
-    for count in (30, 55):
-        process = begin("out")
-        deadline = time.monotonic() + 300.0
-        while stored(store) < count and time.monotonic() < deadline:
-            time.sleep(0.01)
-        process.kill()
-        process.wait()
-        survived = rows(store)
-        # In the midst of the search: after the 20 design runs, before the 60 evaluations are done.
-        assert count <= len(survived) < 80
-    assert begin("out").wait(600) == 0
-    ended = rows(store)
-    assert survived.items() <= ended.items() and ended.keys() == rows(tmp_path / "whole" / "study.sqlite").keys()
-    one, two = (json.loads((tmp_path / out / "summary.json").read_text()) for out in ("whole", "out"))
-    assert one.pop("cost") != two.pop("cost")
-    for record in (one, two):
-        del (
-            record["direct"]["seconds"],
-            record["direct"]["comparison_seconds"],
-            record["sha256"],
-            record["answer_sha256"],
-        )
-    assert one == two
-    for name in ("front.csv", "confirmation.csv", "design_runs.csv"):
-        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
 def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_path):

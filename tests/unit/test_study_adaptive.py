@@ -94,7 +94,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     told = []
     study = Study.load(written(tmp_path))
     outcome = run_study(study, tmp_path, 1, lambda title: told.append(title) or silent, adaptive=True)
-    chosen, front = outcome.direct_pick, outcome.adaptive.front
+    chosen, front = outcome.searched_pick, outcome.adaptive.front
     assert outcome.pick.point == pytest.approx(front.points[chosen.row], abs=6e-4)
     assert "adaptive front" in outcome.pick.reason and "tolerances leave" in outcome.pick.reason
     assert "pick_of_surfaces" in outcome.confirmed
@@ -108,7 +108,6 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     assert found["history"][0]["runs"] == 20
     assert {each["why"] for each in found["points"]} <= {"design", "improvement", "check"}
     assert found["chosen"]["row"] == chosen.row
-    assert "direct" not in record
     assert not any("--adaptive" in note for note in record["notes"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -284,7 +283,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
             [],
             "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 6 fresh runs at the end do not fit; give at",
         ),
-        ("both", ["--direct"], "--direct, --adaptive: the pick can follow one front only; give one of them"),
+        ("former", ["--direct"], "--direct: is no option any more; run python examples/benchmarks/direct_front.py "),
     ):
         path = written(tmp_path / folder, budget=30)
         ended = doe("study", str(path), "--adaptive", *more, "--out", str(tmp_path / folder / "out"))

@@ -1,4 +1,4 @@
-"""From the front to a confirmed choice: which points are simulated, whether gains are real, the simulator's own front."""
+"""From the front to a confirmed choice: which points are simulated, whether gains are real, chains."""
 
 from __future__ import annotations
 
@@ -8,38 +8,21 @@ import numpy as np
 import pytest
 from short_studies import SHORT, short_study, silent
 
-from doe import clearance
 from doe.clearance import Simulations
-from doe.pareto.surrogate_loss import SurrogateLoss
-from doe.report.steps.confirmation import direct_record
 from doe.running.store import Store
 from doe.study.chains import check_chains, solve_chains
 from doe.study.chosen import choices
 from doe.study.confirmation import Confirmed, Gain, gains, statement
-from doe.study.direct import Evaluator, find_direct
 from doe.study.front import find_front
-from doe.study.runs import STORE, read_runs
+from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
-BRIEF = """[direct]
-evaluations = 60
-population = 8
-replicates = 2
-turns = 3
-discard_turns = 1
-set = ["numerics.impact_window_turns=1"]
 
-[tolerances]"""
-
-
-def fitted(folder, replace=("[tolerances]", BRIEF)):
+def fitted(folder, *replace):
     """A short study on the published table, and its surfaces."""
-    text = short_study(folder).read_text(encoding="utf-8")
-    direct = text[text.index("[direct]") : text.index("[tolerances]")]
-    (folder / "study.toml").write_text(text.replace(direct, "").replace(*replace), encoding="utf-8")
-    study = Study.load(folder / "study.toml")
+    study = Study.load(short_study(folder, SHORT, *replace))
     return study, fit_surfaces(study, read_runs(study, folder / "ccd_table4.csv"))
 
 
@@ -73,49 +56,8 @@ def test_points_that_a_drawing_cannot_tell_apart_are_confirmed_once(tmp_path):
     assert {"without_tolerances", "desirability", "weights"} <= set(chosen) and "knee" not in chosen
     points = [tuple(choice.point) for choice in chosen.values()]
     assert len(set(points)) == len(points)
-    twin = SimpleNamespace(name="direct", front=SimpleNamespace(points=front.points, pick=front.picks["weights"]))
-    assert "direct front" in choices(study, front, twin)["weights"].reason
-
-
-def test_direct_front_asks_for_the_same_runs_again_and_survives_failures(tmp_path, monkeypatch):
-    study, surfaces = fitted(tmp_path)
-    front = find_front(study, surfaces)
-    with Store(tmp_path / STORE) as store:
-        first = find_direct(study, front, simulations(store))
-        stored = len(store.ended())
-        again = find_direct(study, front, simulations(store))
-        assert (
-            len(store.ended())
-            == stored
-            == first.front.evaluations + len(first.surrogate_points) * (first.front.repeats)
-        )
-    assert 40 <= first.front.evaluations <= 60
-    assert np.array_equal(first.front.values, again.front.values)
-    assert np.array_equal(first.front.points, again.front.points)
-    assert isinstance(first.loss, SurrogateLoss) and not first.failures
-    record = direct_record(study, first)
-    assert len(record["front"]) == len(first.front.points) == len(record["surrogate_front"])
-    assert list(record["pick"]["factors"]) == study.factors
-    assert list(record["front"][0]["errors"]) == study.responses
-
-    usual = clearance.direct_scenes
-
-    def some_break(study, points, first):
-        scenes = usual(study, points, first)
-        for row in range(0, len(scenes), 5):
-            scene = scenes[row]
-            scenes[row] = scene.model_copy(
-                update={"numerics": scene.numerics.model_copy(update={"step_budget_per_turn": 2})}
-            )
-        return scenes
-
-    monkeypatch.setattr(clearance, "direct_scenes", some_break)
-    with Store(tmp_path / "other.sqlite") as store:
-        evaluate = Evaluator(study, simulations(store), silent, 10)
-        values, errors = evaluate(np.tile(study.baseline, (10, 1)))
-    assert np.isnan(values[[0, 5]]).all() and np.isfinite(np.delete(values, [0, 5], axis=0)).all()
-    assert np.isfinite(np.delete(errors, [0, 5], axis=0)).all()
-    assert ["step budget" in failure.cause for failure in evaluate.failures] == [True, True]
+    twin = SimpleNamespace(name="adaptive", front=SimpleNamespace(points=front.points, pick=front.picks["weights"]))
+    assert "adaptive front" in choices(study, front, twin)["weights"].reason
 
 
 def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
@@ -138,12 +80,11 @@ def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
         (('name = "guide"', 'name = "giude"'), "no chain is named giude"),
         (('file = "bearing_chains.toml"', ""), "give the links, or the file that has them"),
         (('file = "bearing_chains.toml"', 'file = "bearing_chains.toml"\nallocate = { grades = true }'), "one or the other"),
-        (("population = 8", "population = 8\nturns = 3\ndiscard_turns = 3"), "must be below turns"),
     ],
 )  # fmt: skip
-def test_bad_chains_and_direct_settings_are_refused(tmp_path, replace, words):
+def test_bad_chains_are_refused(tmp_path, replace, words):
     text = short_study(tmp_path, SHORT).read_text(encoding="utf-8")
-    text = text.replace("turns = 40\n", "").replace("population = 50", "population = 8").replace(*replace)
+    text = text.replace(*replace)
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
         check_chains(Study.load(tmp_path / "study.toml"))

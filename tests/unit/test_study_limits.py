@@ -223,20 +223,17 @@ def test_rounding_does_not_leave_the_region(tmp_path):
         ("limit_probability = 0.95", "limit_probability = 0.4", "limit_probability"),
         ("limit_probability = 0.95", "limit_probability = 1.0", "limit_probability"),
         ("tries = 4", "tries = 0", "tries"),
-        ("[direct]", "[direct]\nturns = 10\ndiscard_turns = 1", "one window of the impact"),
+        (
+            "[tolerances]",
+            "[direct]\nturns = 10\n\n[tolerances]",
+            r"study\.toml: \[direct\] is no table any more; take it out and run",
+        ),
     ],
 )
 def test_bad_settings_are_refused(tmp_path, old, new, words):
-    path = short_study(tmp_path, SHORT.replace(",impact_window_turns=1", ""), (old, new))
+    path = short_study(tmp_path, SHORT, (old, new))
     with pytest.raises(InputError, match=words):
-        clearance.check_direct(Study.load(path))
-
-
-def test_direct_runs_are_as_long_as_design_runs_and_told_in_words(tmp_path):
-    study = Study.load(short_study(tmp_path))
-    (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
-    assert (scene.numerics.turns, scene.numerics.discard_turns, scene.numerics.replicates) == (3, 1, 3)
-    assert "3 replicates of 3 counted shaft turns (3 whole windows" in clearance.direct_run(study)
+        Study.load(path)
 
 
 @pytest.mark.slow

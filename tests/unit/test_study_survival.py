@@ -1,4 +1,4 @@
-"""What a study survives: failed points, Ctrl-C, kill -9, a full disk, another process on the same study, edits.
+"""What a study survives: failed points, Ctrl-C, kill -9, a full disk, a second process on the same study, edits.
 
 The simulations take no time here; the same with real ones stands in ``test_study``.
 """
@@ -154,34 +154,21 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     assert sorted(ran) == list(range(1, 21))
 
 
-def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
+def test_second_process_on_a_folder_is_refused_and_the_first_goes_on(tmp_path):
+    """One sentence that names the process, exit code 2; the first ends as if nobody had asked."""
     study, out = short_study(tmp_path), tmp_path / "out"
-    both = [start(study, out, 0.05, 1) for _ in range(2)]
-    answers = [process.communicate(timeout=120) for process in both]
-    assert [process.returncode for process in both] == [0, 0], answers
-    one, two = (json.loads(shown) for shown, _ in answers)
-    assert one["values"] == two["values"] and len(one["values"]) == 20
-    assert sorted(one["ran"] + two["ran"]) == list(range(1, 21))
-    with Store(out / STORE, read_only=True) as store:
-        owners = [run.owner for run in store.ended()]
-    assert len(owners) == 20 and len(set(owners)) == 2
-
-
-def test_two_doe_study_on_one_folder_both_get_runs_and_none_runs_twice(tmp_path):
-    study, out = short_study(tmp_path), tmp_path / "out"
-    both = [start(study, out, 0.1, 1, "--whole") for _ in range(2)]
-    answers = [process.communicate(timeout=200) for process in both]
-    assert [process.returncode for process in both] == [0, 0], answers
-    ran = [json.loads(said.splitlines()[-1]) for _, said in answers]
-    together = [seed for seeds in ran for seed in seeds]
-    assert all(ran) and set(range(1, 21)) < set(together)
-    # Baseline and pick are confirmed with one seed, that of no design run.
-    assert max(together.count(seed) for seed in range(1, 21)) == 1
-    with Store(out / STORE, read_only=True) as store:
-        ended = store.ended()
-    assert len(ended) == len(together) and len({run.owner for run in ended if run.seconds is not None}) >= 2
-    one, two = (json.loads(shown) for shown, _ in answers)
-    assert one["pick"] == two["pick"] and json.loads((out / "summary.json").read_text())["pick"] == one["pick"]
+    first = start(study, out, 0.1, 1, "--whole")
+    wait_for(lambda: (out / STORE).exists() and len(seeds_run(out / STORE)) > 0)
+    second = start(study, out, 0.1, 1, "--whole")
+    shown, said = second.communicate(timeout=100)
+    assert (
+        second.returncode == 2 and f"process {first.pid} on " in said and "works on it; wait until it has ended" in said
+    )
+    (fault,) = json.loads(shown)["faults"]
+    assert fault in said
+    shown, said = first.communicate(timeout=100)
+    assert first.returncode == 0, said
+    assert len(json.loads(said.splitlines()[-1])) == len(seeds_run(out / STORE)) > 20
     assert not list(out.glob("*.partial"))
 
 

@@ -14,13 +14,6 @@ from rbdyn.records.words import chance, counted, label, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
-DIRECT = (
-    ("hypervolume", "hypervolume on the simulator", "hypervolume_error"),
-    ("surrogate_hypervolume", "hypervolume through the surfaces", "surrogate_hypervolume_error"),
-    ("loss_percent", "loss of the surfaces [%]", "loss_error_percent"),
-    ("evaluations", "evaluations", ""),
-    ("seconds", "time [s]", ""),
-)
 
 
 def fronts(summary: Record) -> list[Front]:
@@ -30,9 +23,7 @@ def fronts(summary: Record) -> list[Front]:
     for role, words, points in (
         ("front", "on the surfaces", part(summary, "front", "front")),
         ("robust", "with tolerances", part(summary, "front", "tolerance_aware", "front")),
-        ("direct", "on the simulator", part(summary, "direct", "front")),
         ("direct", "found in few runs, simulated", part(summary, "adaptive", "front")),
-        ("surrogate", "of the surfaces, simulated", part(summary, "direct", "surrogate_front")),
     ):
         whole = [point for point in points or [] if complete(point, summary)]
         if not whole or not names:
@@ -165,8 +156,6 @@ def _beside(summary: Record) -> list[Block]:
         blocks.append(Words(f"{words} {chance} (error of the draws alone)."))
     if aware:
         blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
-    if direct := part(summary, "direct"):
-        blocks += _on_the_simulator(direct)
     return [*blocks, *in_few_runs(summary)]
 
 
@@ -186,17 +175,4 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
     blocks.append(Table("What manufacture leaves of the responses", ["point", *map(label, names)], rows))
     costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
     blocks.append(record_table("What the tolerances cost", costs))
-    return blocks
-
-
-def _on_the_simulator(direct: Record) -> list[Block]:
-    blocks: list[Block] = [Words(str(direct["sentence"]))] if direct.get("sentence") else []
-    if direct.get("run"):
-        blocks.append(Words(f"A run of the direct search: {direct['run']}."))
-    rows = [
-        (words, with_error(direct[key], direct.get(error)))
-        for key, words, error in DIRECT
-        if direct.get(key) is not None
-    ]
-    blocks.append(Table("Front searched on the simulator itself", ("", "value"), rows))
     return blocks

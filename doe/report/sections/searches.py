@@ -61,23 +61,18 @@ class Curve(NamedTuple):
 
 
 def curves(adaptive: Record) -> list[Curve]:
-    """The search, its points by their fresh runs, the front on the surfaces, and the direct one where it is known."""
+    """The search, its points by their fresh runs, and the front on the surfaces."""
     compared, history = adaptive["compared"], adaptive["history"]
     runs, doubt = ([float(each[key]) for each in history] for key in ("runs", "deviation"))
     search, fresh = compared["search"], compared["fresh"]
     told = f"search, foretold by its last emulators: {search[-1]:.3f} in the end; bars: what they doubted then"
     words = f"its points by their fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"
     beside = f"front on the surfaces, by the same emulators: {compared['surfaces']:.3f}"
-    found = [
+    return [
         Curve("front", told, runs, search, doubt),
         Curve("fresh", words, [runs[-1] + adaptive["fresh"]], [fresh["hypervolume"]], [fresh["error"]]),
         Curve("surrogate", beside, [], [compared["surfaces"]], [0.0]),
     ]
-    if direct := compared.get("direct"):
-        reached = with_error(direct["hypervolume"], direct["error"])
-        words = f"direct front of {direct['evaluations']} evaluations, by its own fresh runs: {reached}"
-        found.append(Curve("direct", words, [], [direct["hypervolume"]], [direct["error"]]))
-    return found
 
 
 def _progress(adaptive: Record) -> str:

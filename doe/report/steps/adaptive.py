@@ -7,7 +7,7 @@ import numpy as np
 from doe.adaptive.emulators import LEAST_DEVIATION
 from doe.arrays import Array, Rows
 from doe.emulator.likelihood import JITTER
-from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
+from doe.pareto.simulated import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
 from doe.study.adaptive import Adaptive, levels_at
 from doe.study.compared import Compared
@@ -77,19 +77,15 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
 
 def compared_record(study: Study, adaptive: Adaptive, compared: Compared) -> dict[str, Any]:
     """Hypervolumes between one ``ideal`` and ``nadir``, in costs: of the fronts foretold in the course of the ``search`` and of
-    the ``surfaces``' front by the last emulators; of the search's points, ``fresh``, and of the direct front's, ``direct``, by
-    their own fresh runs, with 95 % half widths."""
+    the ``surfaces``' front by the last emulators; of the search's points, ``fresh``, by their fresh runs, with 95 % half
+    widths."""
     names = [study.responses[index] for index in adaptive.front.goals.objectives]
-    record = {
+    return {
         **{key: dict(zip(names, getattr(compared, key).tolist(), strict=True)) for key in ("ideal", "nadir")},
         "search": compared.search.tolist(),
         "surfaces": compared.surfaces,
         "fresh": {"hypervolume": compared.fresh[0], "error": 1.96 * compared.fresh[1]},
     }
-    if compared.direct is not None and compared.direct_reached is not None:
-        reached, error = compared.direct_reached
-        record["direct"] = {"hypervolume": reached, "error": 1.96 * error, **compared.direct}
-    return record
 
 
 def _actual(study: Study, factor: int, coded: float) -> float:

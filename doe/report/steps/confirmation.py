@@ -1,15 +1,10 @@
-"""Confirmed points, their gains and the direct front, as plain numbers."""
+"""Confirmed points and their gains, as plain numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from doe import clearance
 from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
-from doe.study.direct import Direct
 from doe.study.limits import Limit, limits_of
 from doe.study.predicted import PredictedGain
 from doe.study.whole import StudyResult
@@ -57,30 +52,6 @@ def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
 def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
     """JSON of gains, simulated or predicted, by response."""
     return {gain.response: gain.as_dict() for gain in gains}
-
-
-def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
-    """The direct front beside that of the surfaces run on the simulator, and what these lose."""
-    front, loss = direct.front, direct.loss
-    rows = zip(front.points, front.values, front.half_widths, strict=True)
-    surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
-    points = [point_record(study, *row) for row in rows]
-    return {
-        "front": points,
-        "pick": {**points[front.pick], "reason": front.pick_reason},
-        "surrogate_front": [point_record(study, *row) for row in surrogate if np.isfinite(row[1]).all()],
-        **asdict(loss),
-        "sentence": loss.sentence,
-        "run": clearance.direct_run(study),
-        "optimism_percent": {
-            study.responses[index]: 100.0 * float(share)
-            for index, share in zip(front.goals.objectives, front.optimism, strict=True)
-        },
-        **{key: getattr(front, key) for key in ("evaluations", "repeats", "generations", "seed")},
-        "failed": len(direct.failures),
-        "seconds": direct.seconds["search"],
-        "comparison_seconds": direct.seconds["comparison"],
-    }
 
 
 def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:

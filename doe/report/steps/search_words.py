@@ -118,16 +118,6 @@ def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
         f"its {counted(points, 'point')} by their fresh runs {with_error(fresh, 1.96 * error)}",
         f"front on the surfaces, by the same emulators, {compared.surfaces:.3f}{share}",
     ]
-    if compared.direct is not None and compared.direct_reached is not None:
-        reached, doubt = compared.direct_reached
-        part = ""
-        if reached > 0.0:
-            off = 196.0 * math.hypot(error, fresh / reached * doubt) / reached
-            part = f", of which the search has {with_error(100.0 * fresh / reached, off)} %"
-        told.append(
-            f"direct front of {compared.direct['evaluations']} evaluations, its {counted(len(compared.direct['front']), 'point')} by their fresh "
-            f"runs {with_error(reached, 1.96 * doubt)}{part}"
-        )
     return f"Hypervolumes on one scale, with the noise of their runs alone: {'; '.join(told)}."
 
 

@@ -4,7 +4,6 @@ import io
 from contextlib import redirect_stdout
 from typing import Any
 
-from doe.clearance import direct_run
 from doe.report.steps.chain import print_chain
 from doe.report.steps.robust import print_robust_front, robust_sentences
 from doe.report.steps.search_words import search_sentences
@@ -48,11 +47,6 @@ def answer_text(outcome: StudyResult) -> str:
 
 def _print_answer(outcome: StudyResult) -> None:
     study = outcome.study
-    if outcome.direct is not None:
-        direct = outcome.direct
-        spent = f"{direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s"
-        print(f"direct front: {spent}. {direct.loss.sentence}")
-        print(f"a run of the direct search: {direct_run(study)}")
     for sentence in search_sentences(outcome):
         print(sentence)
     _print_clearances(outcome)

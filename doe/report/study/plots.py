@@ -129,8 +129,6 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
     if outcome.front.tolerance_aware is not None:
         clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))
-    if outcome.direct is not None:
-        clouds.append(("front on the simulator", outcome.direct.front.values, "tab:green"))
     if outcome.adaptive is not None:
         found = outcome.adaptive.found
         clouds.append(("front foretold by emulators", found.foretold[found.shown], "tab:olive"))

@@ -5,7 +5,7 @@ from typing import Any
 
 from doe import clearance
 from doe.report.steps.adaptive import adaptive_record, compared_record
-from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, judged_limits_record
+from doe.report.steps.confirmation import confirmation_record, gains_record, judged_limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
@@ -15,8 +15,8 @@ from doe.running.failure import grouped
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import statement
 from doe.study.design import evaluation
-from doe.study.direct_pick import DirectPick
 from doe.study.goals import known_tolerances, region_of
+from doe.study.searched_pick import SearchedPick
 from doe.study.whole import StudyResult
 from doe.study_file import Study
 from rbdyn.records.record import finite
@@ -57,16 +57,13 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "seeds": {
             "design": study.file.design.seed,
             "front": study.file.front.seed,
-            "direct": study.file.direct.seed,
             "adaptive": study.file.adaptive.seed,
         },
     }
-    if outcome.direct is not None:
-        record["direct"] = direct_record(study, outcome.direct)
     if outcome.adaptive is not None:
         record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
-    if outcome.direct_pick is not None:
-        record["direct" if outcome.adaptive is None else "adaptive"]["chosen"] = _chosen_record(outcome.direct_pick)
+    if outcome.searched_pick is not None:
+        record["adaptive"]["chosen"] = _chosen_record(outcome.searched_pick)
     if outcome.robust is not None:
         record["robust"] = robust_record(outcome.robust, study.factors)
     if outcome.tolerances is not None:
@@ -83,8 +80,8 @@ def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]
     return adaptive_record(outcome.study, adaptive) | {"compared": beside} | told
 
 
-def _chosen_record(pick: DirectPick) -> dict[str, Any]:
-    """Why the pick is this point of the direct front, and the share of its parts that still dominate the baseline."""
+def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
+    """Why the pick is this point of the searched front, and the share of its parts that still dominate the baseline."""
     aware = pick.aware
     return {
         "row": pick.row,

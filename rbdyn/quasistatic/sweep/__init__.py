@@ -1,1 +1,1 @@
-"""Equilibria over keys of a scene: ``points``, ``march`` (compiled), ``figures``, ``result``; ``run`` joins them."""
+"""Equilibria over keys of a scene: ``points``, ``figures``, ``result``; ``run`` joins them."""

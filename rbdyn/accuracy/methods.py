@@ -1,22 +1,128 @@
-"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is
-at equal error."""
+"""Our method compared with others on one compiled right-hand side: error of the motion against time, at equal error.
+
+A stretch of motion starts where a replicate has settled; its end is what two references agree on. The motion is chaotic: two
+runs part about 500-fold a shaft turn, so a method can be told from another over part of a turn only, and every span has
+its own floor below which the reference itself is not known.
+"""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.judgement import SOUGHT, check_replicates
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
-from rbdyn.accuracy.rollers import method_bias, trajectory
-from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
-from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS, STARTS, Error, Reference
-from rbdyn.dynamics.run import prepare
-from rbdyn.faults import RunError
+from rbdyn.accuracy.integrators import DOP853, METHODS, OURS, Method, NotInstalledError, Stretch, compiled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
+from rbdyn.arrays import Array, Whole
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
+from rbdyn.dynamics.run import Run, prepare
+from rbdyn.faults import InputError, RunError
 from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
+
+DEFAULT_TURNS, LONGEST_TURNS = 0.25, 1.0
+SPANS = (0.25, 0.5, 1.0)  # shaft turns after which the two references are compared
+SETTLE_TURNS = 5.0
+STARTS = 3
+OUR_REFERENCE_RTOL, THEIR_REFERENCE_RTOL = 1e-12, 1e-13
+# An error below this many times what the references differ by says nothing.
+RESOLVED = 10.0
+
+
+class Error(Record):
+    """Largest difference of two states: of any position of roller, cage or ring [m], and of any component over its
+    scale (the approach or speed of a race contact)."""
+
+    position_m: float
+    scaled: float
+
+
+class Reference(Record):
+    """Ends of the stretches by our method, and how far DOP853 is off them after spans of turns."""
+
+    ends: Sequence[Array]
+    agreement: dict[float, Error]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form: the methods, and how far they are apart."""
+        agreement = [{"turns": span, **error.as_dict()} for span, error in self.agreement.items()]
+        return {"methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL}, "agreement": agreement}
+
+    def floor(self, turns: float) -> float:
+        """Position error [m] below which a stretch of ``turns`` resolves nothing: that of the next longer span."""
+        return RESOLVED * next(e.position_m for span, e in self.agreement.items() if span >= turns)
+
+
+def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: int = STARTS) -> list[Stretch]:
+    """Stretches of so many shaft turns, each from where a replicate of its own has settled.
+
+    Raises InputError for turns outside (0, 1], RunError.
+    """
+    if not 0.0 < turns <= LONGEST_TURNS:
+        raise InputError([f"turns = {turns:g}: past a turn no reference holds; give more than 0 and at most 1"])
+    bearing = roller_bearing(scene)
+    scale = absolute_tolerance(scene, bearing, 1.0)
+    # The clock runs exactly in every method; its scale only has to be a number.
+    scale[~np.isfinite(scale)] = 1.0
+    stretches = []
+    for replicate in range(starts):
+        run = Run(scene, bearing, replicate, scene.numerics.rtol, Stop())
+        run.to(SETTLE_TURNS)
+        stretches.append(Stretch(scene, bearing, run.carry.y.copy(), turns, scale))
+    return stretches
+
+
+def positions(scene: Scene) -> Whole:
+    """Indices of the positions of rollers, cage and rings [m] in the state."""
+    return np.flatnonzero([part.unit == "m" for part in layout_of(scene).components])
+
+
+def difference(stretch: Stretch, a: Array, b: Array) -> Error:
+    """How far two states are apart."""
+    apart = np.abs(a - b)
+    return Error(float(apart[positions(stretch.scene)].max()), float((apart / stretch.scale).max()))
+
+
+def worst(errors: Sequence[Error]) -> Error:
+    """The largest of each."""
+    return Error(max(e.position_m for e in errors), max(e.scaled for e in errors))
+
+
+def reference(stretches: Sequence[Stretch], step: Callable[[], None] = lambda: None) -> Reference:
+    """Integrate every stretch by both reference methods. Raises RunError. ``step()`` is called after each."""
+    ends = [end_of(OURS, stretch, OUR_REFERENCE_RTOL) for stretch in stretches]
+    apart: dict[float, list[Error]] = {span: [] for span in SPANS}
+    for stretch in stretches:
+        ours = theirs = stretch.start
+        before = 0.0
+        for span in SPANS:
+            ours, theirs = (
+                end_of(method, replace(stretch, start=y, turns=span - before), rtol)
+                for method, y, rtol in ((OURS, ours, OUR_REFERENCE_RTOL), (DOP853, theirs, THEIR_REFERENCE_RTOL))
+            )
+            apart[span].append(difference(stretch, ours, theirs))
+            before = span
+        step()
+    return Reference(ends, {span: worst(errors) for span, errors in apart.items()})
+
+
+def end_of(method: Method, stretch: Stretch, setting: float) -> Array:
+    """State at the end of a stretch. Raises RunError."""
+    return method.ready(stretch, setting)().y
+
+
+def agreement_table(known: Reference) -> Table:
+    """How far the references are apart after each span."""
+    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in known.agreement.items()]
+    return Table(
+        f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}",
+        ("turns", "positions apart [m]", "worst component over its scale"),
+        cells,
+    )
+
 
 OK = "ok"
 # A run is timed again and again, at most so often and, past the first time, for so long.
@@ -54,44 +160,23 @@ class Attempt(Record):
 
 
 def study(
-    scene: Scene,
-    progress: Reporter = None,
-    turns: float = DEFAULT_TURNS,
-    methods: Sequence[Method] = METHODS,
-    sought: float = SOUGHT,
+    scene: Scene, progress: Reporter = None, turns: float = DEFAULT_TURNS, methods: Sequence[Method] = METHODS
 ) -> Report:
-    """``rbdyn accuracy --methods``: trajectories, and the statistics of the compiled methods, judged to ``sought``.
+    """Error and time of every method at every setting over stretches of so many shaft turns.
 
-    Raises InputError, RunError where the references fail, KeyboardInterrupt.
+    Raises InputError for turns outside (0, 1], RunError where the references fail, KeyboardInterrupt.
     """
-    check_replicates(scene)
-    motion = trajectories(scene, progress, turns, methods)
-    rows = method_bias.bias_rows(scene, progress=progress)
-    chosen = method_bias.conclusion(rows, scene, sought)
-    written = records(rows)
-    return replace(
-        motion,
-        record=motion.record
-        | {"statistics": written, "sought": sought, "conclusion": f"{motion.record['conclusion']} {chosen}"},
-        tables=(*motion.tables, method_bias.table(rows, sought)),
-        sentences=(*motion.sentences, chosen),
-        sheets={**motion.sheets, "statistics": [flat(row, "found") for row in written]},
-    )
-
-
-def trajectories(scene: Scene, progress: Reporter, turns: float, methods: Sequence[Method]) -> Report:
-    """Error and time of every method at every setting. Raises as ``study``."""
-    stretches = trajectory.starts_after_transient(scene, turns)
+    stretches = starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
-    known = trajectory.reference(stretches, counted.step)
+    known = reference(stretches, counted.step)
     attempts = [each for method in methods for each in counted.over(attempts_of(method, stretches, known))]
     ratios = speedups(attempts, known.floor(turns))
     sentences = conclusion(attempts, ratios, known.floor(turns), turns)
     written = records(attempts)
     return reported(
         "methods",
-        (trajectory.agreement_table(known), table(attempts, turns), ratio_table(ratios)),
+        (agreement_table(known), table(attempts, turns), ratio_table(ratios)),
         (*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
         written,
         lambda path: _draw(attempts, known.floor(turns), turns, path),
@@ -137,10 +222,10 @@ def attempt(method: Method, setting: float, stretches: Sequence[Stretch], known:
         status, y, calls, seconds = run(method, stretch, setting)
         if y is None:
             return Attempt(method.name, label, status, None, None, seconds / stretch.turns * 1e3, None)
-        errors.append(trajectory.difference(stretch, y, end))
+        errors.append(difference(stretch, y, end))
         derivatives += calls
         cpu_s += timed(method, stretch, setting)
-    error = trajectory.worst(errors)
+    error = worst(errors)
     return Attempt(method.name, label, OK, error.position_m, error.scaled, cpu_s / turns * 1e3, derivatives / turns)
 
 
@@ -219,9 +304,35 @@ def ratio_table(ratios: dict[str, Speedup]) -> Table:
     return Table(f"times that {OURS.name} is faster at equal error", header, cells)
 
 
+def front(curve: Curve) -> list[tuple[float, float]]:
+    """The points that no other beats in both error and time, smallest error first."""
+    unbeaten: list[tuple[float, float]] = []
+    for error, took in sorted(curve):
+        if not unbeaten or took < unbeaten[-1][1]:
+            unbeaten.append((error, took))
+    return unbeaten
+
+
+def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
+    """Their time over ours, with log time interpolated over log error between the points of each front.
+
+    Nothing is extrapolated: None where the two have no range of errors in common.
+    """
+    fronts = front(ours), front(theirs)
+    if not all(fronts):
+        return None
+    low, high = max(points[0][0] for points in fronts), min(points[-1][0] for points in fronts)
+    if not low < high:
+        return None
+    at = np.linspace(np.log(low), np.log(high), POINTS)
+    our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
+    ratio = np.exp(their_time - our_time)
+    return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())
+
+
 def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:
     """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
-    from rbdyn.accuracy.rollers.pictures import failed_at_the_edge, logarithmic, method_lines
+    from rbdyn.plots.error_against_time import failed_at_the_edge, logarithmic, method_lines
     from rbdyn.plots.style import GREY, label_ends, plt, save
 
     figure, axis = plt.subplots(figsize=(8.6, 6.0))
@@ -247,29 +358,3 @@ def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) ->
     failed_at_the_edge(axis, failures)
     label_ends(axis, ends)
     save(figure, path)
-
-
-def front(curve: Curve) -> list[tuple[float, float]]:
-    """The points that no other beats in both error and time, smallest error first."""
-    unbeaten: list[tuple[float, float]] = []
-    for error, took in sorted(curve):
-        if not unbeaten or took < unbeaten[-1][1]:
-            unbeaten.append((error, took))
-    return unbeaten
-
-
-def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
-    """Their time over ours, with log time interpolated over log error between the points of each front.
-
-    Nothing is extrapolated: None where the two have no range of errors in common.
-    """
-    fronts = front(ours), front(theirs)
-    if not all(fronts):
-        return None
-    low, high = max(points[0][0] for points in fronts), min(points[-1][0] for points in fronts)
-    if not low < high:
-        return None
-    at = np.linspace(np.log(low), np.log(high), POINTS)
-    our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
-    ratio = np.exp(their_time - our_time)
-    return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())

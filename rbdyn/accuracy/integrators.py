@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of, velocity_verlet
-from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
+from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing

@@ -1,4 +1,4 @@
-"""What tolerances leave of the points of a direct front, and its pick.
+"""What tolerances leave of the points of a simulated front, and its pick.
 
 A simulator's front has no surface to tell what parts about a point do. Here the shape about a point is that of given
 surfaces, corrected by what the search's own runs near it say: a local straight line through what the surfaces missed
@@ -48,8 +48,8 @@ class Neighbourhood:
 
 
 @dataclass(frozen=True, eq=False)
-class DirectAware:
-    """Robust costs (n, q) of the points of a direct front, and how much of their parts break each limit (n, c).
+class SimulatedAware:
+    """Robust costs (n, q) of the points of a simulated front, and how much of their parts break each limit (n, c).
 
     ``robust_baseline`` (q,) is what tolerances leave of the nominal ones of the baseline;
     ``survives`` (n,) is the share of the parts made at a point that still dominate the nominal baseline. Both None without a
@@ -63,18 +63,18 @@ class DirectAware:
     survives: Array | None
 
 
-def direct_aware(
+def simulated_aware(
     box: ToleranceBox, here: Neighbourhood, goals: Goals, baseline: Neighbourhood | None, below: Array, above: Array
-) -> DirectAware:
+) -> SimulatedAware:
     """What tolerances leave of points, whose responses may be lower by ``below`` and higher by ``above`` (n, m) when
     limits are judged."""
     offsets = _offsets(box)
     judged = box.judge_parts(here.parts(offsets), goals, below, above)
     if baseline is None:
-        return DirectAware(box, judged.costs, judged.violations, None, None)
+        return SimulatedAware(box, judged.costs, judged.violations, None, None)
     nominal = goals.costs(baseline.values)[0]
     made = box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
-    return DirectAware(
+    return SimulatedAware(
         box=box,
         costs=judged.costs,
         violations=judged.violations,

@@ -3,18 +3,21 @@
 From one pool of replicates at each length: the half-width of the 95 % interval of a mean over n of them, with the
 scatter of the whole pool (expected, not that of one lucky draw of n), and the time they take with the turns that each
 discards. Independent samples narrow it as one over the root of all counted turns; the slopes tell whether they do.
+
+``python examples/benchmarks/replication.py [SCENE.toml]``
 """
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from studies import main
 
-from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
-from rbdyn.accuracy.rollers.tolerances import OUTPUTS
+from rbdyn.accuracy.tolerances import NORMAL, OUTPUTS, SOUGHT, about, percent
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -66,7 +69,7 @@ class Slope(Record):
 def study(
     scene: Scene, progress: Reporter = None, turns: Sequence[float] = TURNS, pool: int = POOL, sought: float = SOUGHT
 ) -> Report:
-    """``rbdyn accuracy --replicates``. Raises RunError, KeyboardInterrupt."""
+    """Half-widths, how they fall, and what a choice of replicates buys. Raises RunError, KeyboardInterrupt."""
     values, cpu_s = pool_of_runs(scene, turns, pool, progress)
     rows = replication_rows(values, cpu_s, [count for count in COUNTS if count <= pool])
     slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
@@ -186,7 +189,7 @@ def _draw(rows: Sequence[Row], path: Any) -> None:
     """Half-width of each output against processor time, a line a length of run; dashed: one over root of time."""
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    from rbdyn.accuracy.rollers.pictures import NAMES, Named, logarithmic
+    from rbdyn.plots.error_against_time import NAMES, Named, logarithmic
     from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, label_ends, plt, save
 
     names = list(rows[0].half_width)
@@ -210,3 +213,7 @@ def _draw(rows: Sequence[Row], path: Any) -> None:
     for axis, own in zip(axes, ends, strict=True):
         label_ends(axis, own)
     save(figure, path)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__))

@@ -10,17 +10,19 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.accuracy.balls.cases import Problem
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
+from rbdyn.arrays import Array
 from rbdyn.faults import InputError, RunError
-from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
+from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
 from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.ring import Row
 from rbdyn.records.record import Record, shown
 from rbdyn.scene.ball import BallScene, SingleRowScene
 
@@ -34,15 +36,22 @@ SEED = 1
 LOAD_DECADES, SPEED_DECADES = 1.0, 0.5
 
 Solver = Callable[..., Solution]
-# Ours first. The limit counts Newton steps, iterations of all searches, or MINPACK's evaluations.
+# Ours first. The limit counts Newton steps, or iterations of all searches.
 LIMITED: dict[str, Solver] = {
     "convex": limited.solve,
     "plain Newton": plain_newton.solve,
-    "MINPACK hybrid": minpack.hybrid,
-    "MINPACK LM": minpack.levenberg_marquardt,
     "finite search": finite_search.solve,
 }
 WHOLE: dict[str, Solver] = {**LIMITED, "convex": equilibrium.solve}
+
+
+class Problem(NamedTuple):
+    """What a solver takes: ``solver(*problem)``."""
+
+    row: Row
+    control: Control
+    load: Array
+    given: Array
 
 
 class Attempt(Record):
@@ -90,7 +99,7 @@ def share(count: int, total: int) -> tuple[float, float]:
 def study(
     scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS, perturbations: int = PERTURBATIONS
 ) -> Report:
-    """``rbdyn accuracy`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
+    """``rbdyn accuracy SCENE methods`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
         raise InputError([f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"])
     counted = Progress(progress, len(LIMITED) * (len(limits) + perturbations))
@@ -239,7 +248,7 @@ def _draw(attempts: Sequence[Attempt], path: Path) -> None:
     """Residual of each solver stopped after more and more iterations, against its time."""
     from matplotlib.ticker import LogLocator
 
-    from rbdyn.accuracy.rollers.pictures import logarithmic, method_lines
+    from rbdyn.plots.error_against_time import logarithmic, method_lines
     from rbdyn.plots.style import label_ends, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))

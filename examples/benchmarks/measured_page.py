@@ -2,8 +2,12 @@
 
 ``measured.toml`` lists the parts and the commands that each is measured by. A part that is not run keeps its former tables
 with their date and says so; one that fails keeps them and says why.
+
+``python examples/benchmarks/measured_page.py examples/measured.md [--part NAME]...``, from the folder of the repository; exit
+codes: 0, 1 where a part failed, 2 for a part that is none.
 """
 
+import argparse
 import re
 import shlex
 import subprocess
@@ -13,13 +17,11 @@ import tomllib
 from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from datetime import date
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from rbdyn.accuracy import study
-from rbdyn.accuracy.choice import chosen_study
 from rbdyn.accuracy.report import Report, Reporter, processor
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import versions, whole_file
@@ -98,10 +100,12 @@ def _run(line: str, progress: Reporter) -> str:
     """
     program, *words = shlex.split(line)
     if (program, words[0]) == ("rbdyn", "accuracy"):
-        sets = [value for option, value in pairwise(words) if option == "--set"]
-        flags = {word[2:]: True for word in words if word.startswith("--") and word != "--set"}
-        scene = Scene.load(words[1], sets)
-        return _markdown(study(chosen_study(flags, {}, scene), scene, progress))
+        options = argparse.ArgumentParser()
+        options.add_argument("scene")
+        options.add_argument("study", nargs="?")
+        options.add_argument("--set", action="append", default=[])
+        asked = options.parse_args(words[1:])
+        return _markdown(study(asked.study, Scene.load(asked.scene, asked.set), progress))
     called = words if program == "python" else ["-m", program, *words]
     ended = subprocess.run([sys.executable, *called], capture_output=True, text=True, check=False)
     if ended.returncode:
@@ -116,3 +120,27 @@ def _markdown(report: Report) -> str:
         lines = (f"| {' | '.join(each.replace('|', BAR) for each in row)} |" for row in rows)
         tables.append("\n".join((f"**{table.title}**\n", *lines)))
     return "\n\n".join((*tables, *report.sentences))
+
+
+def main() -> int:
+    """Write the page; returns the exit code."""
+    from rbdyn.cli.terminal import progress_bar
+
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("page", type=Path, metavar="FILE", help="the page, Markdown")
+    options.add_argument("--part", action="append", default=[], metavar="NAME", help="this part only; repeatable")
+    asked = options.parse_args()
+    try:
+        found = measure(asked.page, asked.part, lambda name: progress_bar(name, False))
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    measured = [name for name, part in found.items() if part["status"] == "ok"]
+    print(f"written to {asked.page}: measured {', '.join(measured) or 'nothing'}")
+    failures = [f"{name} {part['status']}" for name, part in found.items() if part["status"] not in ("ok", "kept")]
+    print(*failures, sep="\n", end="\n" if failures else "", file=sys.stderr)
+    return int(bool(failures))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,26 +1,153 @@
-"""Every solver over the battery of random scenes (``rbdyn.accuracy.balls.cases``): how many it solves, how fast.
+"""Every solver of the equilibrium over seeded random ball bearings: how many it solves, how fast.
 
-The scene gives materials, gyroscopic moment, friction limit and light load share; all else is the battery's. The slow solvers see only the
-first so many scenes. Times are of the second of two calls from Python, those of MINPACK's and the search's of one.
+8 to 32 balls of 3 to 40 mm, contact angles of 0 to 45 deg, D n up to 3e6 mm/min, loads over seven decades, clearance and
+interference, standing and turning rings, every raceway control, tilt free and fixed. A case is kept as the tables of its
+scene file; ``posed`` builds from them what a solver takes, past the validation that a file goes through. The scene of the
+command gives materials, gyroscopic moment, friction limit and light load share. The slow solvers see only the first so many
+cases. Times are of the second of two calls from Python, those of MINPACK's and the search's of one.
+
+``python examples/benchmarks/ball_battery.py [SCENE.toml] [--scenes N]``
 """
 
+import math
+import sys
 import time
 from collections.abc import Callable, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import minpack
 import numpy as np
+from studies import main
 
-from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, SCENES, SEED, Case, Problem, cases, posed
-from rbdyn.accuracy.balls.solvers import WHOLE, Success, causes, fared, success_table
+from rbdyn.accuracy.ball_solvers import WHOLE, Problem, Solver, Success, causes, fared, success_table
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, records, reported
+from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.quasistatic.row.model import row_model
 from rbdyn.quasistatic.row.ring import component_lengths
-from rbdyn.scene.ball import BallScene
+from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, BallScene, Prescribed
 
+CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")
+LOADS = ("radial", "axial", "combined", "moment", "preload_force", "preload_displacement")
+SCENES = 5000
+SEED = 1
+# Ranges; logarithmic where they span decades.
+BALLS = (8, 32)
+BALL_DIAMETER_MM = (3.0, 40.0)
+CROWDING = (1.15, 1.6)  # pitch circle over the balls laid side by side
+LARGEST_ANGLE_DEG = 45.0
+GROOVE_FACTOR = (0.505, 0.54)
+SPEED_FACTOR = (1e3, 3e6)  # pitch diameter [mm] times speed [rpm]
+LOAD_DECADES = (-1.0, 6.0)  # log10 of N for the largest ball; others with the square of the diameter
+CLEARANCE_CHANGE_UM = 40.0
+PRELOAD_UM = (0.5, 50.0)
+TILT_MRAD = 2.0
+# Shares of the scenes.
+DEEP_GROOVE, OUTER_TURNS, STANDING, FITTED, TILT_FIXED = 0.15, 0.3, 0.1, 0.5, 0.3
+
+
+class Case(NamedTuple):
+    """One scene: its number, its kind of load, and its tables as in a file."""
+
+    number: int
+    load: str
+    bearing: dict[str, Any]
+    operation: dict[str, Any]
+    model: dict[str, Any]
+
+    @property
+    def control(self) -> str:
+        """Raceway control."""
+        return str(self.model["raceway_control"])
+
+
+def cases(count: int = SCENES, seed: int = SEED, **model: Any) -> list[Case]:
+    """The first ``count`` scenes of the battery of this seed; ``model``: keys of [model] besides the raceway control."""
+    draw = np.random.default_rng(seed)
+    return [_case(draw, number, model) for number in range(count)]
+
+
+def posed(case: Case, ball: Material | None = None, rings: Material | None = None) -> Problem:
+    """Row, control, load and prescribed displacements of a case; bearing steel unless told."""
+    steel = MATERIALS["bearing_steel"]
+    ball, rings = ball or steel, rings or steel
+    prescribed = Prescribed.model_construct(**case.operation.get("prescribed", {}))
+    operation = BallOperation.model_construct(**{**case.operation, "prescribed": prescribed})
+    drawing, model = BallBearing.model_construct(**case.bearing), BallModel.model_construct(**case.model)
+    built = row_model(drawing, model, ball, rings, rings, *operation.speeds)
+    load, given = np.array([*operation.load, *operation.moment]), np.array(operation.given, float)
+    return Problem(built.row, built.control, load, given)
+
+
+def _case(draw: np.random.Generator, number: int, model: dict[str, Any]) -> Case:
+    bearing = _bearing(draw)
+    diameter, pitch = bearing["ball_diameter_mm"], bearing["pitch_diameter_mm"]
+    force = 10.0 ** draw.uniform(*LOAD_DECADES) * (diameter / BALL_DIAMETER_MM[1]) ** 2
+    kind = LOADS[int(draw.integers(len(LOADS)))]
+    operation = {**_speeds(draw, pitch), **_load(draw, kind, float(force), 1e-3 * pitch), "tilt": "free"}
+    if kind != "moment" and draw.random() < TILT_FIXED:
+        operation["tilt"] = "fixed"
+        if draw.random() < 0.5:
+            tilt_x, tilt_y = (float(tilt) for tilt in draw.uniform(-TILT_MRAD, TILT_MRAD, 2))
+            operation["prescribed"] = {"tilt_x_mrad": tilt_x, "tilt_y_mrad": tilt_y}
+    return Case(number, kind, bearing, operation, {**model, "raceway_control": CONTROLS[number % len(CONTROLS)]})
+
+
+def _bearing(draw: np.random.Generator) -> dict[str, Any]:
+    balls = int(draw.integers(BALLS[0], BALLS[1] + 1))
+    diameter = _log_uniform(draw, BALL_DIAMETER_MM)
+    pitch = max(diameter * balls / math.pi * float(draw.uniform(*CROWDING)), 2.5 * diameter)
+    deep = draw.random() < DEEP_GROOVE
+    inner, outer = (float(factor) for factor in draw.uniform(*GROOVE_FACTOR, 2))
+    bearing = {
+        "kind": "deep_groove_ball" if deep else "angular_contact_ball",
+        "balls": balls,
+        "ball_diameter_mm": diameter,
+        "pitch_diameter_mm": pitch,
+        "contact_angle_deg": 0.0 if deep else float(draw.uniform(0.0, LARGEST_ANGLE_DEG)),
+        "inner_groove_factor": inner,
+        "outer_groove_factor": outer,
+    }
+    if draw.random() < FITTED:
+        bearing["clearance_change_um"] = float(draw.uniform(-CLEARANCE_CHANGE_UM, CLEARANCE_CHANGE_UM))
+    return bearing
+
+
+def _speeds(draw: np.random.Generator, pitch_mm: float) -> dict[str, float]:
+    inner = _log_uniform(draw, SPEED_FACTOR) / pitch_mm
+    outer = float(draw.uniform(-1.0, 1.0)) * inner if draw.random() < OUTER_TURNS else 0.0
+    if draw.random() < STANDING:
+        inner, outer = 0.0, 0.0
+    return {"inner_speed_rpm": inner, "outer_speed_rpm": outer}
+
+
+def _load(draw: np.random.Generator, kind: str, force: float, pitch: float) -> dict[str, Any]:
+    """Tables of a load of so many N on a bearing of this pitch diameter [m]."""
+    way = float(draw.uniform(0.0, 2.0 * math.pi))
+    across = 0.7 * force * math.cos(way), 0.7 * force * math.sin(way)
+    if kind == "radial":
+        return {"radial_load_N": force}
+    if kind == "axial":
+        return {"axial_load_N": force}
+    if kind == "combined":
+        return {"load_N": [*across, float(draw.uniform(0.1, 1.0)) * force]}
+    if kind == "moment":
+        moment = [float(part) for part in force * pitch * draw.uniform(-0.5, 0.5, 2)]
+        return {"load_N": [0.5 * across[0], 0.5 * across[1], force], "moment_Nm": moment}
+    if kind == "preload_force":
+        return {"load_N": [*across, 0.0], "preload_N": float(draw.uniform(0.1, 1.0)) * force}
+    return {"load_N": [*across, 0.0], "preload_um": _log_uniform(draw, PRELOAD_UM)}
+
+
+def _log_uniform(draw: np.random.Generator, limits: tuple[float, float]) -> float:
+    return float(math.exp(draw.uniform(math.log(limits[0]), math.log(limits[1]))))
+
+
+SOLVERS: dict[str, Solver] = {**WHOLE, **minpack.SOLVERS}
 # A tenth of a second and more for a scene they fail on.
 SLOW = {"MINPACK LM": 500, "finite search": 500}
 FAST = ("convex", "plain Newton")
@@ -29,7 +156,7 @@ OURS = "convex"
 MODEL = ("gyroscopic", "light_load_share", "friction_limit")
 # Balls whose loads differ by more than this share of the largest are in another equilibrium.
 SAME = 1e-6
-_control, _load = attrgetter("control"), attrgetter("load")
+_control, _kind_of_load = attrgetter("control"), attrgetter("load")
 
 
 class Run(NamedTuple):
@@ -42,15 +169,15 @@ class Run(NamedTuple):
 
 
 def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> Report:
-    """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
+    """The first ``scenes`` cases by every solver."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")
     problems = [posed(case, ball, rings) for case in drawn]
-    sizes = {name: min(SLOW.get(name, scenes), scenes) for name in WHOLE}
+    sizes = {name: min(SLOW.get(name, scenes), scenes) for name in SOLVERS}
     counted = Progress(progress, sum(sizes.values()))
     runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
     ours = runs[OURS]
-    by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _load)
+    by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _kind_of_load)
     solvers = [_fared(name, series) for name, series in runs.items()]
     others = {name: _elsewhere(series, ours) for name, series in runs.items() if name != OURS}
     refused = _refused_by_rule_a(runs["finite search"], problems)
@@ -63,7 +190,7 @@ def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> 
             success_table("convex solver, by load", by_load, "load"),
             _steps_table(ours),
             success_table(f"solvers on the same scenes{slow}", solvers),
-            _share_table("solved by load", LOADS, runs, _load),
+            _share_table("solved by load", LOADS, runs, _kind_of_load),
             _share_table("solved by raceway control", CONTROLS, runs, _control),
         ),
         (
@@ -88,7 +215,7 @@ def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> 
 
 def run(name: str, drawn: Sequence[Case], problems: Sequence[Problem], counted: Progress) -> list[Run]:
     """One solver over cases; what compiles is compiled before."""
-    solver, runs = WHOLE[name], []
+    solver, runs = SOLVERS[name], []
     for problem in problems[: len(CONTROLS)]:
         solver(*problem)
     for case, problem in zip(drawn, problems, strict=False):
@@ -179,7 +306,7 @@ def _flat(of: Run) -> dict[str, Any]:
 
 def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     """Share of the scenes that each solver has solved within a time [us]."""
-    from rbdyn.accuracy.rollers.pictures import METHOD_COLOURS, Named
+    from rbdyn.plots.error_against_time import METHOD_COLOURS, Named
     from rbdyn.plots.style import label_ends, plain, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
@@ -196,3 +323,7 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     axis.margins(x=0.15)
     label_ends(axis, ends)
     save(figure, path)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__, "angular_contact_ball.toml", scenes=SCENES))

@@ -1,28 +1,109 @@
-"""Bias of the statistics: what each tolerance costs and how far its outputs are from converged ones.
+"""Error against run time of the time integration: bias of the statistics at each tolerance, and error of the motion itself.
 
-Every tolerance runs the same seeded replicates. The reference is the tightest tolerance; what the difference of two
-means and its 95 % half-width allow to be said, ``judgement`` decides. Times are those of single-threaded runs, taken
-after everything was compiled.
+Every tolerance runs the same seeded replicates, one at a time, after everything was compiled; the reference is the tightest.
+What an error allows to be said of a relative difference d, known to its 95 % half-width e, where a is the accuracy sought:
+
+- within, where e <= a and |d| <= a;
+- beyond, where |d| > a and either e <= a, or |d| - e > a: a large difference is plain in spite of a large error;
+- undecided otherwise: the error hides it.
+
+Half-widths fall as one over the root of the counted turns; with replicates Student's factor falls too. From this law
+follow the turns or the replicates that would decide.
 """
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
-from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
+from rbdyn.accuracy import methods
+from rbdyn.accuracy.integrators import COMPILED
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
-from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import RunError
+from rbdyn.faults import InputError, RunError
 from rbdyn.records.record import Record, shown
 from rbdyn.records.words import signed_with_error
 from rbdyn.scene import Scene
+
+Verdict = Literal["within", "beyond", "undecided"]
+
+# A per cent is less than two bearings of one lot differ by.
+SOUGHT = 0.01
+NORMAL = 1.96
+# From so many replicates on Student's factor is that of the normal distribution to two digits.
+MANY = 100
+
+
+class Difference(NamedTuple):
+    """A relative difference with its 95 % half-width; ``where`` names output and row."""
+
+    where: str
+    value: float
+    error: float
+
+
+def judged(value: float, error: float, sought: float = SOUGHT) -> Verdict:
+    """What can be said of a difference that is known to ``error``; all relative. An error of NaN decides nothing."""
+    size = abs(value)
+    if size > sought and (error <= sought or size - error > sought):
+        return "beyond"
+    return "within" if error <= sought and size <= sought else "undecided"
+
+
+def overall(verdicts: Iterable[Verdict]) -> Verdict:
+    """That of several differences at once: one beyond settles it, one undecided leaves it open."""
+    given = set(verdicts)
+    return "beyond" if "beyond" in given else "undecided" if "undecided" in given else "within"
+
+
+def check_replicates(scene: Scene) -> None:
+    """Raises InputError for a single replicate, whose mean has no error here."""
+    if scene.numerics.replicates < 2:
+        what = "numerics.replicates = 1: the study compares means over replicates"
+        raise InputError([f"{what}; give at least 2, better 8"])
+
+
+def turns_needed(error: float, turns: float, sought: float = SOUGHT) -> float:
+    """Counted turns of a replicate at which a half-width of ``error`` after ``turns`` would fall to ``sought``."""
+    return turns * (error / sought) ** 2
+
+
+def replicates_needed(error: float, replicates: int, sought: float = SOUGHT) -> int:
+    """Replicates at which a half-width of ``error`` over ``replicates`` > 1 of them would fall to ``sought``."""
+    scatter = error * math.sqrt(replicates) / student_factor(replicates - 1)
+    needed = max(math.ceil((NORMAL * scatter / sought) ** 2), 2)
+    while needed < MANY and student_factor(needed - 1) * scatter > sought * math.sqrt(needed):
+        needed += 1
+    return needed
+
+
+def about(count: float) -> str:
+    """A count in two digits, rounded up."""
+    unit = 10.0 ** max(math.floor(math.log10(count)) - 1, 0) if count > 1.0 else 1.0
+    return f"{math.ceil(count / unit - 1e-9) * unit:.0f}"
+
+
+def percent(value: float) -> str:
+    """A relative figure in two digits."""
+    return f"{100.0 * value:.2g} %"
+
+
+def undecided(hidden: Iterable[Difference], scene: Scene, sought: float = SOUGHT) -> str:
+    """What hides what, and the turns or replicates that would tell; the least known of ``hidden`` speaks for all."""
+    worst = max(hidden, key=lambda difference: difference.error)
+    numerics = scene.numerics
+    turns = turns_needed(worst.error, numerics.turns, sought)
+    replicates = replicates_needed(worst.error, numerics.replicates, sought)
+    hides = f"errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where})"
+    mend = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
+    return f"undecided: {hides}; to tell {percent(sought)} {mend}"
+
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
 OUTPUTS: dict[str, Callable[[Replicate], float]] = {
@@ -184,3 +265,54 @@ def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Repli
         steps_per_turn=float(np.mean([run.accepted_steps + run.rejected_steps for run in runs])) / turns,
         power_gap=max(run.power_gap for run in runs),
     )
+
+
+# Of the record of the trajectories, what stands in that of the study.
+MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
+
+
+def study(
+    scene: Scene,
+    progress: Reporter = None,
+    turns: float = methods.DEFAULT_TURNS,
+    rtols: Sequence[float] = TOLERANCES,
+    sought: float = SOUGHT,
+) -> Report:
+    """``rbdyn accuracy SCENE tolerances``: bias of the statistics, judged to ``sought``, and the trajectories of the compiled methods.
+
+    Raises InputError, RunError where a reference fails, KeyboardInterrupt.
+    """
+    check_replicates(scene)
+    motion = methods.study(scene, progress, turns, COMPILED)
+    biases = statistics_bias(scene, rtols, progress)
+    chosen = conclusion(biases.rows, scene, sought)
+    numerics, rows = scene.numerics, records(biases.rows)
+    agreement, trajectories, _ = motion.tables
+    failures = {f"{rtol:g}": why for rtol, why in biases.failures.items()}
+    told = record(
+        "rbdyn.accuracy/1",
+        rows=rows,
+        sought=sought,
+        failures=failures,
+        conclusion=chosen,
+        turns=numerics.turns,
+        replicates=numerics.replicates,
+        trajectory={key: motion.record[key] for key in MOTION},
+    )
+    sentences = *motion.sentences, chosen, *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items())
+    return Report(
+        "accuracy",
+        told,
+        (agreement, trajectories, table(biases, sought)),
+        (*sentences, f"{numerics.replicates} replicates of {numerics.turns:g} turns"),
+        {"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
+        {"accuracy": lambda path: _draw(biases.rows, path, sought), "trajectory": motion.pictures["methods"]},
+    )
+
+
+def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
+    """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
+    from rbdyn.plots.error_against_time import biases_at_work
+
+    labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
+    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")

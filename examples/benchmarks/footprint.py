@@ -1,18 +1,19 @@
-"""What a scene makes the program hold: types of laws, state, parameters, compiled code, modules."""
+"""What a scene and each of its options make the program hold: state, parameters, compiled code, modules.
+
+``python examples/benchmarks/footprint.py [SCENE.toml]``
+"""
 
 import json
-import os
-import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from rbdyn.faults import RunError
+from studies import main, printed
 
 if TYPE_CHECKING:
+    from rbdyn.accuracy.report import Report, Reporter
     from rbdyn.dynamics.forces.equations import RollerBearing
     from rbdyn.scene import Scene
 
@@ -75,25 +76,6 @@ def added_modules(plain: "Scene", scenes: "Sequence[Scene]") -> list[tuple[str, 
     return [tuple(modules) for modules in json.loads(printed(print_added_modules, data, fault, NUMBA_DISABLE_JIT="1"))]
 
 
-def printed(function: Callable[[], None], data: Any, fault: str, **environment: str) -> str:
-    """What a function of this package prints in a fresh interpreter that is given ``data`` as JSON on standard input.
-
-    Raises RunError, which begins with ``fault``, where that interpreter fails.
-    """
-    name = function.__name__
-    run = subprocess.run(
-        [sys.executable, "-c", f"from {function.__module__} import {name}; {name}()"],
-        input=json.dumps(data),
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if run.returncode != 0:
-        raise RunError(f"{fault}: {next(reversed(run.stderr.strip().splitlines()), 'no reason given')}")
-    return run.stdout
-
-
 def print_added_modules() -> None:
     """Read scenes from standard input; print, for each after the first, the modules it adds to those of the first."""
     from rbdyn.scene import Scene
@@ -117,3 +99,30 @@ def _build(scene: "Scene") -> None:
 
     simulate.roller_bearing(scene)
     simulate.race_report(scene, 100.0, 100.0)
+
+
+def study(
+    scene: "Scene", progress: "Reporter" = None, options: "Mapping[str, Sequence[str]] | None" = None
+) -> "Report":
+    """A row an option that the scene allows, the plain scene first. Raises RunError, KeyboardInterrupt."""
+    from rbdyn.accuracy.options import OPTIONS, lawful
+    from rbdyn.accuracy.report import Progress, Table, reported
+    from rbdyn.dynamics.parameters.model import roller_bearing
+    from rbdyn.dynamics.run import prepare
+
+    variants = {"as given": scene, **lawful(scene, OPTIONS if options is None else options)}
+    modules = added_modules(scene, list(variants.values()))
+    rows = []
+    for (name, variant), added in Progress(progress, len(variants)).over(zip(variants.items(), modules, strict=True)):
+        bearing = roller_bearing(variant)
+        prepare(variant, bearing)
+        rows.append({"option": name, **asdict(footprint(variant, bearing)), "modules": " ".join(added)})
+    header = "option", "state", "parameters [B]", "instructions", "modules that only it loads"
+    table = Table(
+        "what each option makes the program hold", header, [[str(cell) for cell in row.values()] for row in rows]
+    )
+    return reported("footprint", (table,), (), rows, options=rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__))

@@ -2,17 +2,30 @@
 
 The load law is exact in itself: its error is measured at equal approach against a very fine slicing, over all loads
 up to twice the largest on the shaft. Statistics are compared with those of the finest slicing run.
+
+``python examples/benchmarks/slicing.py [SCENE.toml]``, of a roller with a profile or between tilted races.
 """
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from studies import main
 
-from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
+from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
-from rbdyn.accuracy.rollers.option_cost import with_options
-from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of, first_within
+from rbdyn.accuracy.tolerances import (
+    NEGLIGIBLE,
+    SOUGHT,
+    Bias,
+    bias_columns,
+    bias_of,
+    check_replicates,
+    first_within,
+    percent,
+    undecided,
+)
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
@@ -39,7 +52,7 @@ class Row(Bias):
 
 
 def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT) -> Report:
-    """``rbdyn accuracy --slices``.
+    """A row a number of slices, and the fewest that keep load and statistics.
 
     Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
     """
@@ -148,7 +161,11 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
 
 def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
     """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
-    from rbdyn.accuracy.rollers.pictures import biases_at_work
+    from rbdyn.plots.error_against_time import biases_at_work
 
     labels = "relative error", "processor time of a right-hand side [ns]"
     biases_at_work(rows, path, sought, labels, "rhs_ns", ("load at equal approach", "load_error"), "slices")
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__, "all_options.toml"))

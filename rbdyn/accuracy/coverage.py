@@ -47,9 +47,9 @@ COLUMNS: Columns = {
 }
 
 
-def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Report:
-    """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
-    scene = one_bearing(scene)
+def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -> Report:
+    """``rbdyn accuracy SCENE coverage``, ``REPEATS`` repeats unless given. Raises RunError, KeyboardInterrupt."""
+    scene, repeats = one_bearing(scene), repeats or REPEATS
     counted = Progress(progress, repeats + 1)
     truth = simulate(truth_of(scene))
     counted.step()

@@ -1,19 +1,13 @@
-"""The pick of the simulator's own front: what tolerances leave of it, and that the study follows it."""
+"""The pick of the simulator's own front: what tolerances leave of it, and its limits."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from instant_runs import instantly
-from short_studies import SHORT, short_study, silent
 
-from doe import clearance
 from doe.pareto import Goals
-from doe.pareto.direct_tolerance import Neighbourhood, direct_aware, pick_among
 from doe.pareto.manufacture import Quadratic, ToleranceBox
-from doe.report.study.files import write
-from doe.study.whole import run_study
-from doe.study_file import Study
+from doe.pareto.simulated_tolerance import Neighbourhood, pick_among, simulated_aware
 
 GOALS = Goals.of(["min", "min"])
 FLAT = [Quadratic(1.0, np.zeros(2), np.zeros((2, 2))), Quadratic(2.0, np.zeros(2), np.zeros((2, 2)))]
@@ -41,10 +35,10 @@ def test_worst_case_of_a_slope_is_its_corner_and_limits_count_it():
     here = Neighbourhood(FLAT, np.zeros((1, 2)), np.array([[11.0, 5.0]]), slopes)
     base = Neighbourhood(FLAT, np.zeros((1, 2)), np.array([[20.0, 6.0]]), slopes)
     none = np.zeros((1, 2))
-    found = direct_aware(ToleranceBox(np.array([1.0, 0.5]), "worst_case"), here, goals, base, none, none)
+    found = simulated_aware(ToleranceBox(np.array([1.0, 0.5]), "worst_case"), here, goals, base, none, none)
     assert found.costs[0] == pytest.approx([13.5, 5.0]) and found.violations[0] == pytest.approx([0.0])
     assert found.survives[0] == 1.0 and found.robust_baseline == pytest.approx([22.5, 6.0])
-    doubted = direct_aware(found.box, here, goals, base, none, none + 1.0)
+    doubted = simulated_aware(found.box, here, goals, base, none, none + 1.0)
     assert doubted.violations[0] == pytest.approx([1.0])
 
 
@@ -55,25 +49,3 @@ def test_only_what_keeps_its_limits_is_picked():
     assert row == 2 and "keep their limits" in reason
     row, reason = pick_among(costs, broken + 1.0, GOALS, [], "knee")
     assert row == 0 and "none of which keeps all limits" in reason
-
-
-def test_the_study_follows_the_direct_front(tmp_path, monkeypatch):
-    instantly(monkeypatch.setattr)
-    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
-    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
-    path = short_study(tmp_path, SHORT, ("evaluations = 2000\npopulation = 50", "evaluations = 200\npopulation = 16"))
-    text = path.read_text(encoding="utf-8").replace('name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "min"',
-        'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "max"')  # fmt: skip
-    path.write_text(text.replace("population = 100", "population = 24"), encoding="utf-8")
-    outcome = run_study(Study.load(path), tmp_path, 1, lambda title: silent, direct=True)
-    chosen, front = outcome.direct_pick, outcome.direct.front
-    assert outcome.pick.point == pytest.approx(front.points[chosen.row], abs=6e-4)
-    assert "direct front" in outcome.pick.reason and "tolerances leave" in outcome.pick.reason
-    assert "pick_of_surfaces" in outcome.confirmed
-    record = write(outcome, tmp_path)
-    assert record["pick"] == dict(zip(outcome.study.factors, outcome.pick.point.tolist(), strict=True))
-    assert record["direct"]["chosen"]["row"] == chosen.row
-    assert "replicates of 3 counted shaft turns" in record["direct"]["run"]
-    assert record["edge"]["direct_front_share"] is not None
-    for edge in record["edge"]["factors"].values():
-        assert edge["source"] in ("simulation", "the surfaces")

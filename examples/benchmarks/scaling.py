@@ -2,7 +2,10 @@
 
 More rollers stand on a pitch circle larger in proportion; load, cage and inner ring grow with them, so that each roller
 bears the same, and the speed falls so that surface speeds stay; a turn then takes longer, in proportion. More slices
-cut the same roller finer. Times are the least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
+cut the same roller finer. Times are the least of several of a single-threaded run, taken in turns over the sizes,
+after everything was compiled.
+
+``python examples/benchmarks/scaling.py [SCENE.toml]``
 """
 
 import json
@@ -13,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from studies import main, printed
 
+from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
-from rbdyn.accuracy.rollers.footprint import printed
-from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
@@ -203,7 +206,7 @@ def _largest_memory() -> float:
 
 
 def study(scene: Scene, progress: Reporter = None) -> Report:
-    """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
+    """Times, memory, fits and their picture. Raises InputError, RunError, KeyboardInterrupt."""
     return report(scaling(scene, progress=progress))
 
 
@@ -251,3 +254,7 @@ def _draw(measured: Scaling, path: Path) -> None:
     axes[-1].margins(x=0.3, y=0.12)
     plain(axes[-1])
     save(figure, path)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__))

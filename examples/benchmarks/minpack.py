@@ -56,5 +56,7 @@ def solve(control: Control, system: System, start: None, limit: int = EVALUATION
     return Stop(u, status, calls, worst)
 
 
-hybrid = functools.partial(solve, method="hybr")
-levenberg_marquardt = functools.partial(solve, method="lm")
+SOLVERS = {
+    "MINPACK hybrid": functools.partial(solve, method="hybr"),
+    "MINPACK LM": functools.partial(solve, method="lm"),
+}

@@ -2,16 +2,28 @@
 
 The methods of fixed step run the same seeded replicates as ours does, discard and count the same turns and keep the
 same tally; the reference is ours at a tight tolerance.
+
+``python examples/benchmarks/method_bias.py [SCENE.toml]``
 """
 
+import sys
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from studies import main
 
-from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
-from rbdyn.accuracy.rollers.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
-from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
+from rbdyn.accuracy.integrators import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.tolerances import (
+    NEGLIGIBLE,
+    SOUGHT,
+    Bias,
+    bias_columns,
+    bias_of,
+    check_replicates,
+    percent,
+    undecided,
+)
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
@@ -118,3 +130,15 @@ def _row(scene: Scene, method: str, setting: str, runs: Sequence[Replicate], ref
         power_gap=max(run.power_gap for run in runs),
         found=bias_of(runs, reference),
     )
+
+
+def study(scene: Scene, progress: Reporter = None, sought: float = SOUGHT) -> Report:
+    """Bias of every method at every setting, judged to ``sought``. Raises as ``bias_rows``."""
+    rows = bias_rows(scene, progress=progress)
+    sentence, written = conclusion(rows, scene, sought), records(rows)
+    sheet = [flat(row, "found") for row in written]
+    return reported("method_bias", (table(rows, sought),), (sentence,), sheet, rows=written, conclusion=sentence)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, __doc__))

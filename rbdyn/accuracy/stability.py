@@ -10,8 +10,8 @@ from dataclasses import replace
 from string import Template
 from typing import Any
 
+from rbdyn.accuracy.options import VARIANTS, with_options
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
-from rbdyn.accuracy.rollers.option_cost import VARIANTS, with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -130,7 +130,7 @@ def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[
 
 
 def study(scene: Scene, progress: Reporter = None) -> Report:
-    """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
+    """``rbdyn accuracy SCENE stability``. Raises KeyboardInterrupt."""
     return report(battery(scene, progress=progress))
 
 

@@ -9,78 +9,23 @@ Sources: Deb et al. (2002) for NSGA-II; Hughes (2001) and Teich (2001) for domin
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
 
-from doe.arrays import Array, Mask, Rows
+from doe.arrays import Array, Rows
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
-from doe.pareto.search import check_search, dominance, error_aware_dominance, order, ranks, spread
+from doe.pareto.search import check_search, dominance, error_aware_dominance, non_dominated, order, ranks, spread
+from doe.pareto.simulated import DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from rbdyn.faults import MethodError
+from rbdyn.records.words import signed_with_error
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
 FAILED = 1e30  # cost of a point whose run failed: behind every other
 SELECTING = 4  # fresh runs a candidate
 REPORTING = 4  # fresh runs a finalist at least
-
-
-class Samples(NamedTuple):
-    """Points (n, k) run, their responses (n, m) and standard errors (n, m); rows of NaN where a run failed."""
-
-    points: Array
-    values: Array
-    errors: Array
-
-    @property
-    def failed(self) -> Mask:
-        """Whether each point's run failed, (n,)."""
-        return np.asarray(np.isnan(self.values).any(axis=1))
-
-    def rows(self, which: Any) -> "Samples":
-        """Some of them."""
-        return Samples(*(part[which] for part in self))
-
-
-@dataclass(frozen=True, eq=False)
-class DirectFront:
-    """Front of a noisy simulator, in ascending order of the first cost as it was selected.
-
-    ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, which had no part in
-    the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``optimism`` (q,) is how much too small the
-    search believed these to be on average, in shares of their range. ``searched`` are all runs of the search. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
-    ``freedom`` (f, m): degrees of freedom of the standard errors, infinitely many unless given.
-    """
-
-    points: Array
-    values: Array
-    standard_errors: Array
-    costs: Array
-    cost_errors: Array
-    optimism: Array
-    pick: int
-    pick_reason: str
-    baseline_values: Array | None
-    repeats: int
-    failures: Array
-    evaluations: int
-    generations: int
-    seed: int
-    goals: Goals
-    searched: Samples
-    freedom: Array | None = None
-
-    def quantile(self, probability: float) -> Array:
-        """Student's quantile (f, m) of a probability, at the degrees of freedom of the standard errors."""
-        freedom = np.full_like(self.values, np.inf) if self.freedom is None else self.freedom
-        return np.asarray(special.stdtrit(freedom, probability))
-
-    @property
-    def half_widths(self) -> Array:
-        """95 % half-widths (f, m) of the values."""
-        return self.standard_errors * self.quantile(0.975)
 
 
 def direct_front(
@@ -96,7 +41,7 @@ def direct_front(
     confidence: float = 0.95,
     resample: float = 0.3,
     pick: Rule = "knee",
-) -> DirectFront:
+) -> SimulatedFront:
     """Find the front of a noisy simulator; the same seed and the same runs give the same bits.
 
     evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
@@ -132,7 +77,7 @@ def direct_front(
     picks, among = pick_all(goals.costs(fresh.values[chosen][sound]), goals, base_costs)
     costs = goals.costs(ours.values)
     span = np.ptp(costs, axis=0)
-    return DirectFront(
+    return SimulatedFront(
         *ours,
         costs=costs,
         cost_errors=ours.errors[:, goals.objectives],
@@ -264,3 +209,71 @@ def _finalists(fresh: Samples, goals: Goals, count: int) -> Rows:
     front = np.flatnonzero(~dominance(costs).any(axis=0))
     front = front[spread(costs[front], count)][:count]
     return rows[front[np.argsort(costs[front, 0], kind="stable")]]
+
+
+@dataclass(frozen=True)
+class SurrogateLoss:
+    """Hypervolumes on a common scale with their 95 % half widths; the loss in percent of the direct one with its own.
+
+    The loss is None where the direct front reaches nothing of the common scale.
+    """
+
+    hypervolume: float
+    hypervolume_error: float
+    surrogate_hypervolume: float
+    surrogate_hypervolume_error: float
+    loss_percent: float | None
+    loss_error_percent: float | None
+
+    @property
+    def sentence(self) -> str:
+        """Whether the surfaces lose anything that can be told from noise."""
+        if self.loss_percent is None or self.loss_error_percent is None:
+            return "The direct front lies wholly behind that of the surfaces; give the direct search more runs."
+        figure = f"{signed_with_error(self.loss_percent, self.loss_error_percent)} % of the direct front's hypervolume"
+        if abs(self.loss_percent) <= self.loss_error_percent:
+            return f"Loss of the surfaces: {figure}, not significant."
+        if self.loss_percent > 0.0:
+            return f"Loss of the surfaces: {figure}."
+        return f"Loss of the surfaces: {figure}; they find more than the direct search does in its budget."
+
+
+def relative_hypervolumes(
+    one: tuple[Array, Array], other: tuple[Array, Array], seed: int
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Hypervolumes with their standard errors of two fronts of costs (n, q) with standard errors (n, q), on the scale of ideal
+    and nadir of the two together."""
+    both = np.vstack([one[0], other[0]])
+    both = both[non_dominated(both)]
+    scale = both.min(axis=0), both.max(axis=0)
+    return noisy_hypervolume(*one, *scale, DRAWS, seed), noisy_hypervolume(*other, *scale, DRAWS, seed + 1)
+
+
+def compare_with_surrogate(
+    direct: SimulatedFront, surrogate_values: Array, surrogate_errors: Array, *, seed: int = 1
+) -> SurrogateLoss:
+    """Compare a direct front with a surrogate's, whose points were run on the simulator afresh.
+
+    ``surrogate_values`` and ``surrogate_errors`` (s, m) are the means and standard errors of those runs; rows of NaN
+    (failed runs) are left out. Both fronts are normalised to the ideal and nadir of the two together. A front of more
+    points can cover more: compare equally many.
+
+    Raises MethodError when no surrogate point is left.
+    """
+    goals = direct.goals
+    good = np.isfinite(surrogate_values).all(axis=1)
+    if not good.any():
+        raise MethodError("every run at the surrogate's points failed; nothing can be compared")
+    costs, errors = goals.costs(surrogate_values[good]), surrogate_errors[good][:, goals.objectives]
+    fronts = relative_hypervolumes((direct.costs, direct.cost_errors), (costs, errors), seed)
+    (ours, our_error), (theirs, their_error) = fronts
+    ratio = theirs / ours if ours > 0.0 else None
+    error = None if ratio is None else 196.0 * float(np.hypot(ratio * our_error, their_error)) / ours
+    return SurrogateLoss(
+        hypervolume=ours,
+        hypervolume_error=1.96 * our_error,
+        surrogate_hypervolume=theirs,
+        surrogate_hypervolume_error=1.96 * their_error,
+        loss_percent=None if ratio is None else 100.0 * (1.0 - ratio),
+        loss_error_percent=error,
+    )

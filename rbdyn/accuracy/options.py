@@ -1,0 +1,86 @@
+"""What each option of a scene costs: nanoseconds a right-hand side with it and without it, and the time to compile it.
+
+An option is a few assignments to the scene (``variants.toml``). Each is run in turn with the scene as it is, so that both
+see the same machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own
+work included.
+"""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
+from rbdyn.faults import InputError, read_toml, set_key
+from rbdyn.records.record import Record, shown
+from rbdyn.scene import Scene
+
+TURNS, DISCARDED = 10, 2
+REPEATS = 3
+VARIANTS = Path(__file__).with_name("variants.toml")
+OPTIONS: dict[str, list[str]] = read_toml(VARIANTS)["options"]
+
+
+class OptionCost(Record):
+    """Median processor time per right-hand side [ns] with the option, of the scene without it and their difference, the
+    largest relative power gap, and the seconds it took to compile (or to load from disk)."""
+
+    option: str = shown("option")
+    with_ns: float = shown("with", ".0f")
+    without_ns: float = shown("without", ".0f")
+    difference_ns: float = shown("difference", "+.0f")
+    power_gap: float = shown("power gap", ".2g %")
+    compile_s: float = shown("s to compile or load", ".1f")
+
+
+def option_costs(
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter = None
+) -> list[OptionCost]:
+    """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
+    plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
+    plain_bearing = roller_bearing(plain)
+    prepare(plain, plain_bearing)
+    variants = lawful(plain, options)
+    rows, counted = [], Progress(progress, len(variants))
+    for name, option in counted.over(variants.items()):
+        bearing = roller_bearing(option)
+        compile_s = prepare(option, bearing)
+        times: tuple[list[float], list[float]] = ([], [])
+        gap = 0.0
+        for replicate in range(REPEATS):
+            for which, (one, parameters) in enumerate(((option, bearing), (plain, plain_bearing))):
+                run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
+                times[which].append(run.cpu_s / run.derivatives * 1e9)
+                gap = run.power_gap if which == 0 else gap
+        with_ns, without_ns = (float(np.median(series)) for series in times)
+        rows.append(OptionCost(name, with_ns, without_ns, with_ns - without_ns, gap, compile_s))
+    return rows
+
+
+def lawful(scene: Scene, options: Mapping[str, Sequence[str]]) -> dict[str, Scene]:
+    """The scene with each option, but for options that contradict something it has."""
+    allowed = {}
+    for name, assignments in options.items():
+        with suppress(InputError):
+            allowed[name] = with_options(scene, assignments)
+    return allowed
+
+
+def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
+    """The scene with ``key.path=value`` assignments. Raises InputError where they contradict it."""
+    data = scene.model_dump(mode="json", exclude_none=True)
+    for assignment in assignments:
+        set_key(data, assignment)
+    return Scene.from_dict(data, " ".join(assignments))
+
+
+def study(scene: Scene, progress: Reporter = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
+    """``rbdyn accuracy SCENE options``. Raises RunError, KeyboardInterrupt."""
+    costs = option_costs(scene, options, progress)
+    table, rows = tabled("nanoseconds a right-hand side", costs, columns_of(OptionCost)), records(costs)
+    return reported("options", (table,), (), rows, options=rows)
