@@ -536,7 +536,7 @@ class _Trade(_Simulations):
         return _Result((level * (1.0 - gain) * (1.0 + self.error * random.standard_normal(3))).tolist(), self.error)
 
 
-@pytest.mark.parametrize("kind", ["quantile", "mean"])
+@pytest.mark.parametrize("kind", ["quantile", pytest.param("mean", marks=pytest.mark.slow)])
 def test_robust_front_keeps_what_it_promises(tmp_path: Path, kind: str) -> None:
     """Closed form: the gain in whirl is pocket - 0.05 guide imbalance, whose 10 % quantile is that at 45 um, its mean at 25."""
     study = _study(tmp_path, IMBALANCE, front=kind)

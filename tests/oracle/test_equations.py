@@ -245,12 +245,11 @@ def test_oracle_twin_for_any_number_of_rollers(rollers, make_scene, evaluate, ra
     assert refused(scene, outcomes, random_state, {}) == {}
 
 
-def test_oracle_twin_interpreted(make_scene, random_state):
+def test_oracle_twin_interpreted(interpreted, make_scene, random_state):
     """Oracle: the same for further meetings of laws, which are worth no compilation."""
-    found = iter(interpreted([*MEETINGS.values(), *TABLES.values()]))
     for name, assignments in (MEETINGS | TABLES).items():
         scene = make_scene(*assignments)
-        outcomes = [next(found) for _ in range(6)]
+        outcomes = interpreted[tuple(assignments)]
         tolerances = TABLE if name in TABLES else FILM if scene.model.pocket_film else {}
         assert refused(scene, outcomes, random_state, tolerances) == {}, name
 
@@ -263,55 +262,6 @@ def test_oracle_states_cover_every_contact(fixture, request, evaluate, random_st
     closed = np.array([evaluate(bearing, random_state(scene, seed)).loads > 0.0 for seed in SEEDS])
     assert closed.any(axis=0).all()
     assert (~closed[:, [3]]).any(), "the land is dry in every state"
-
-
-INTERPRETED = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-from conftest import make, right_hand_side, state_near_contact
-from rbdyn.dynamics.parameters.model import roller_bearing
-out = []
-for assignments in json.loads(sys.argv[2]):
-    scene = make(*assignments)
-    bearing = roller_bearing(scene)
-    for seed in range(6):
-        found = right_hand_side(bearing, state_near_contact(scene, seed))
-        out.append([list(part) for part in found])
-print(json.dumps(out))
-"""
-
-
-def interpreted(variants):
-    """The same right-hand side run by the Python interpreter, in a process where nothing is compiled."""
-    from conftest import Outcome
-
-    arguments = [str(ROOT / "tests"), json.dumps([list(v) for v in variants])]
-    found = subprocess.run(
-        [sys.executable, "-c", INTERPRETED, *arguments],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [Outcome(*map(np.array, parts)) for parts in json.loads(found.stdout)]
-
-
-def test_unit_compiled_equals_interpreted(make_scene, evaluate, random_state):
-    """Unit: machine code and interpreter agree; contraction and the fast elementary functions cost a few ulps.
-
-    Differences are those of position round-off (3e-18 m) over approaches (1e-8 m and more), relative to each block.
-    """
-    found = iter(interpreted(VARIANTS.values()))
-    for assignments in VARIANTS.values():
-        scene = make_scene(*assignments)
-        bearing, blocks = roller_bearing(scene), Blocks(scene.bearing.rollers, scene.support is not None)
-        for seed in range(6):
-            expected, outcome = next(found), evaluate(bearing, random_state(scene, seed))
-            for name in ("roller acceleration", "roller spin rate", "cage acceleration", "ring acceleration"):
-                mine, theirs = outcome.dy[blocks[name]], expected.dy[blocks[name]]
-                assert np.abs(mine - theirs).max() < 1e-8 * np.abs(theirs).max() + 1e-9, name
-            assert outcome.power == pytest.approx(expected.power, rel=1e-9, abs=1e-9)
-            assert outcome.loads == pytest.approx(expected.loads, rel=1e-9)
 
 
 # What each switch must silence.
@@ -333,6 +283,63 @@ SWITCHES = {
 }
 
 
+def switched(assignments):
+    """A switch off, in a scene where every power is there."""
+    return ("model.pocket_film=true", *SUPPORT, *assignments)
+
+
+INTERPRETED = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from conftest import make, right_hand_side, state_near_contact
+from rbdyn.dynamics.parameters.model import roller_bearing
+out = []
+for assignments in json.loads(sys.argv[2]):
+    scene = make(*assignments)
+    bearing = roller_bearing(scene)
+    for seed in range(6):
+        found = right_hand_side(bearing, state_near_contact(scene, seed))
+        out.append([list(part) for part in found])
+print(json.dumps(out))
+"""
+
+
+@pytest.fixture(scope="module")
+def interpreted():
+    """The same right-hand side run by the Python interpreter, in one process where nothing is compiled: outcomes in six states
+    of every scene, by its assignments."""
+    from conftest import Outcome
+
+    scenes = [*map(tuple, (*VARIANTS.values(), *MEETINGS.values(), *TABLES.values())), *map(switched, SWITCHES)]
+    arguments = [str(ROOT / "tests"), json.dumps(scenes)]
+    found = subprocess.run(
+        [sys.executable, "-c", INTERPRETED, *arguments],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    outcomes = [Outcome(*map(np.array, parts)) for parts in json.loads(found.stdout)]
+    return {scene: outcomes[6 * place : 6 * place + 6] for place, scene in enumerate(scenes)}
+
+
+def test_unit_compiled_equals_interpreted(interpreted, make_scene, evaluate, random_state):
+    """Unit: machine code and interpreter agree; contraction and the fast elementary functions cost a few ulps.
+
+    Differences are those of position round-off (3e-18 m) over approaches (1e-8 m and more), relative to each block.
+    """
+    for assignments in VARIANTS.values():
+        scene = make_scene(*assignments)
+        bearing, blocks = roller_bearing(scene), Blocks(scene.bearing.rollers, scene.support is not None)
+        for seed, expected in enumerate(interpreted[tuple(assignments)]):
+            outcome = evaluate(bearing, random_state(scene, seed))
+            for name in ("roller acceleration", "roller spin rate", "cage acceleration", "ring acceleration"):
+                mine, theirs = outcome.dy[blocks[name]], expected.dy[blocks[name]]
+                assert np.abs(mine - theirs).max() < 1e-8 * np.abs(theirs).max() + 1e-9, name
+            assert outcome.power == pytest.approx(expected.power, rel=1e-9, abs=1e-9)
+            assert outcome.loads == pytest.approx(expected.loads, rel=1e-9)
+
+
 @pytest.mark.parametrize("fixture", ["outer", "everything"])
 def test_invariant_pocket_loads_alone_are_those_of_all_forces(fixture, request, evaluate, random_state):
     """Invariant: the same bits, and no other load is touched."""
@@ -348,10 +355,8 @@ def test_invariant_pocket_loads_alone_are_those_of_all_forces(fixture, request, 
     assert largest > 0.0
 
 
-def test_unit_each_switch_silences_its_own_power():
+def test_unit_each_switch_silences_its_own_power(interpreted):
     """Unit: a law that is off loses exactly nothing, and every other power is there in some state."""
-    on = ("model.pocket_film=true", *SUPPORT)
-    found = iter(interpreted([(*on, *assignments) for assignments in SWITCHES]))
     for assignments, silent in SWITCHES.items():
-        power = np.abs([next(found).power for _ in range(6)]).max(axis=0)[:SHAFT]
+        power = np.abs([outcome.power for outcome in interpreted[switched(assignments)]]).max(axis=0)[:SHAFT]
         assert {name for name, value in zip(LOSSES, power, strict=True) if value == 0.0} == silent, assignments

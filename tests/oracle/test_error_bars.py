@@ -223,19 +223,20 @@ def test_unit_total_error_and_target_option():
             target_of(text)
 
 
+@pytest.mark.slow
 def test_run_to_a_target(outer):
-    """A run to 20 % meets it by its own error bars, says how, and is the same again."""
+    """A run to 10 % meets it by its own error bars, says how, and is the same again."""
     scene = outer.model_copy(
         update={"numerics": outer.numerics.model_copy(update={"impact_window_turns": 10.0, "discard_turns": 20.0})}
     )
-    result = simulate(scene, target=0.2)
+    result = simulate(scene, target=0.1)
     told = result.target
-    assert told["met"] and told["asked"] == 0.2
+    assert told["met"] and told["asked"] == 0.1
     for figure in (result.impact_force, result.whirl_deviation_ratio, result.power_loss):
-        assert figure.error <= 0.2 * figure.value
+        assert figure.error <= 0.1 * figure.value
     assert told["chosen"]["replicates"] == result.replicates
     assert 0 < told["cost"]["pilot_rhs_evaluations"] < told["cost"]["rhs_evaluations"]
-    assert simulate(scene, workers=1, target=0.2).target == told
+    assert simulate(scene, workers=1, target=0.1).target == told
 
 
 def test_command_line_target(command):
