@@ -20,7 +20,7 @@ from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative, derivative_once
 from rbdyn.dynamics.forces.state import Layout
-from rbdyn.dynamics.integrators.booking import book_whirl
+from rbdyn.dynamics.integrators.advance import book_whirl
 
 
 def velocity_of(layout: Layout) -> Whole:
