@@ -18,7 +18,7 @@ from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.relaxation import Relaxation, slowest
-from rbdyn.dynamics.statistics.drift import start_of_counting, worth_lengthening
+from rbdyn.dynamics.statistics.error_bars import start_of_counting, worth_lengthening
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene

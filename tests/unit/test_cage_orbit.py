@@ -17,8 +17,7 @@ from rbdyn.dynamics.integrators.records import WHIRL
 from rbdyn.dynamics.motion.history import history
 from rbdyn.dynamics.recording import PLACE_SUMS, SPEED_SUMS
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.metrics import Replicate, orbit_radius_share, whirl_notes
 from rbdyn.result import JITTER, Quantity
 
 # Radial guide clearance 150 um.
