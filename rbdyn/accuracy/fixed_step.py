@@ -24,7 +24,7 @@ from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing, derivative, derivative_once
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import Layout
-from rbdyn.dynamics.integrators.booking import book_whirl
+from rbdyn.dynamics.integrators.advance import book_whirl
 
 
 class BudgetSpent(Exception):  # noqa: N818

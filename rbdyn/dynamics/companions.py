@@ -1,6 +1,6 @@
 """How companions are integrated, the runs by which the numerical error of others is known.
 
-Companions at another tolerance show the bias that the tolerance leaves (``rbdyn.dynamics.statistics.bias``). They do not
+Companions at another tolerance show the bias that the tolerance leaves (``rbdyn.dynamics.statistics.metrics``). They do not
 show that of a step which stability holds, for it is the same at every looser tolerance. Such a step hurts in slow bearings:
 rollers outside the load zone lie on the outer race by their centrifugal force alone, and jump on it. A method damps
 this vibration of frequency omega by (h omega)^5/C a radian. C follows from its stability function, for which |R(i x)| is
@@ -19,8 +19,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from rbdyn.dynamics.parameters.scales import LightContact, light_contact
-from rbdyn.dynamics.statistics.bias import FACTOR, bias_scale, companion_tolerance
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.metrics import FACTOR, Replicate, bias_scale, companion_tolerance
 from rbdyn.scene import Scene
 
 # C of each method.

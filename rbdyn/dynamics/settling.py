@@ -1,7 +1,7 @@
 """Replicates that run until their figures no longer drift.
 
 A run first counts at least three times the time in which its slowest motion relaxes (``relaxation``). Where a figure then
-drifts over the counted turns (``drift``) by more than its error and a hundredth of it, every replicate goes on until it is
+drifts over the counted turns (``error_bars``) by more than its error and a hundredth of it, every replicate goes on until it is
 twice as long, and again, at most ``numerics.extend_limit`` times the turns asked for; each time the last half counts.
 Companions run just as far. Nothing depends on the clock or on the number of threads.
 """
@@ -18,7 +18,7 @@ from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.relaxation import Relaxation, slowest
-from rbdyn.dynamics.statistics.drift import start_of_counting, worth_lengthening
+from rbdyn.dynamics.statistics.error_bars import start_of_counting, worth_lengthening
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene

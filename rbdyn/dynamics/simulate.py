@@ -19,9 +19,8 @@ from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
-from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import work_done
+from rbdyn.dynamics.statistics.metrics import orbit_radius_share, whirl_notes, work_done
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.records.forecast import Notice
 from rbdyn.result import SimulationResult, versions

@@ -23,9 +23,8 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
-from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
-from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
+from rbdyn.dynamics.statistics.metrics import Replicate, bias_scale, companion_tolerance, mean_gap, work_done
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.records.forecast import Notice
 from rbdyn.result import Quantity, SimulationResult
@@ -273,7 +272,7 @@ def _noise_factor(scene: Scene, rtol: float) -> float:
 
 
 def _companion_noise(scene: Scene, rtol: float) -> float:
-    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.statistics.bias``)."""
+    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.statistics.metrics``)."""
     return bias_scale(rtol) * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
 
 

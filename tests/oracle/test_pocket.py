@@ -18,7 +18,7 @@ from rbdyn.contact.hertz_line import LineContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy
-from rbdyn.dynamics.integrators.booking import book_peaks, book_point
+from rbdyn.dynamics.integrators.advance import book_peaks, book_point
 from rbdyn.dynamics.integrators.records import empty_tally
 
 VISCOSITY, RADIUS, LENGTH, FLOOR = 2.87e-3, 4.5e-3, 5e-3, 0.8e-6

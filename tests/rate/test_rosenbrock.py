@@ -16,10 +16,9 @@ from rbdyn.dynamics.forces.state import PARTS, layout
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators import rosenbrock as ros
 from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix, factor, shifted, solve
 from rbdyn.dynamics.integrators.implicit import differences, rodas
-from rbdyn.dynamics.integrators.jacobian import jacobian
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
+from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, factor, jacobian, shifted, solve
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate

@@ -12,13 +12,12 @@ from short_studies import short_study
 from doe.study.confirmation import Choice, confirmed_from, whirl_sentence
 from doe.study_file import Study
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
-from rbdyn.dynamics.integrators.booking import book_whirl
+from rbdyn.dynamics.integrators.advance import book_whirl
 from rbdyn.dynamics.integrators.records import WHIRL
 from rbdyn.dynamics.motion.history import history
 from rbdyn.dynamics.recording import PLACE_SUMS, SPEED_SUMS
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.metrics import Replicate, orbit_radius_share, whirl_notes
 from rbdyn.result import JITTER, Quantity
 
 # Radial guide clearance 150 um.

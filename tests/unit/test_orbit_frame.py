@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.integrators import orbit_frame
 from rbdyn.dynamics.integrators import runge_kutta as rk
 from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.records import ACCEPTED, FINISHED
@@ -24,22 +23,22 @@ def state():
 def test_unit_turn_is_a_rotation_at_its_own_speed(rate):
     """Unit: cosine and sine lie on the circle; the speed is the rate of the angle, and at first the given rate."""
     for time in (0.0, 1e-5, 1e-3):
-        turn = orbit_frame.turn_of(rate, time)
+        turn = rk.turn_of(rate, time)
         assert turn.cosine**2 + turn.sine**2 == pytest.approx(1.0, abs=1e-15)
-        early, late = (orbit_frame.turn_of(rate, time + dt) for dt in (-1e-7, 1e-7))
+        early, late = (rk.turn_of(rate, time + dt) for dt in (-1e-7, 1e-7))
         angle = np.arctan2(late.sine, late.cosine) - np.arctan2(early.sine, early.cosine)
         assert angle / 2e-7 == pytest.approx(turn.speed, rel=1e-7, abs=1e-9)
-    assert orbit_frame.turn_of(rate, 0.0) == (1.0, 0.0, rate)
+    assert rk.turn_of(rate, 0.0) == (1.0, 0.0, rate)
 
 
 def test_unit_rates_go_to_the_frame_and_back(state):
     """Unit: the two changes of rates undo each other; spins, cage and rings are left alone."""
     y, dy = state
-    before, turn = dy.copy(), orbit_frame.turn_of(900.0, 3e-4)
-    orbit_frame.rates_to_frame(turn, 10, y, 1, dy)
+    before, turn = dy.copy(), rk.turn_of(900.0, 3e-4)
+    rk.rates_to_frame(turn, 10, y, 1, dy)
     assert (dy[0] == before[0]).all() and (dy[1, 40:] == before[1, 40:]).all()
     assert np.abs(dy[1, :40] - before[1, :40]).min() > 0.0
-    orbit_frame.rates_to_fixed_axes(turn, 10, y, 1, dy)
+    rk.rates_to_fixed_axes(turn, 10, y, 1, dy)
     assert dy[1] == pytest.approx(before[1], abs=1e-12 * 900.0)
 
 
@@ -54,14 +53,14 @@ def test_unit_rollers_that_orbit_stand_still_in_the_frame():
             rate * radius * np.cos(angles),
         )
     )
-    assert orbit_frame.mean_orbit_rate(z, y) == pytest.approx(rate, rel=1e-14)
+    assert rk.mean_orbit_rate(z, y) == pytest.approx(rate, rel=1e-14)
     dy = np.concatenate((y[2 * z :], -(rate**2) * y[: 2 * z]))[None, :]
-    orbit_frame.rates_to_frame(orbit_frame.turn_of(rate, 0.0), z, y, 0, dy)
+    rk.rates_to_frame(rk.turn_of(rate, 0.0), z, y, 0, dy)
     assert np.abs(dy[0, : 2 * z]).max() < 1e-13 * rate * radius
     assert np.abs(dy[0, 2 * z :]).max() < 1e-13 * rate**2 * radius
-    turn = orbit_frame.turn_of(rate, 1e-4)
+    turn = rk.turn_of(rate, 1e-4)
     moved = y.copy()
-    orbit_frame.to_fixed_axes(turn, z, moved)
+    rk.to_fixed_axes(turn, z, moved)
     ahead = angles + np.arctan2(turn.sine, turn.cosine)
     assert moved[:z] == pytest.approx(radius * np.cos(ahead), abs=1e-16)
     assert moved[z : 2 * z] == pytest.approx(radius * np.sin(ahead), abs=1e-16)
@@ -73,8 +72,8 @@ def test_invariant_frame_changes_no_solution(outer, monkeypatch):
     for factor in (1.0, 0.0, -0.5):
 
         def begin_step(z, y, k, factor=factor):
-            rate = factor * orbit_frame.mean_orbit_rate(z, y)
-            orbit_frame.rates_to_frame(orbit_frame.turn_of(rate, 0.0), z, y, 0, k)
+            rate = factor * rk.mean_orbit_rate(z, y)
+            rk.rates_to_frame(rk.turn_of(rate, 0.0), z, y, 0, k)
             return rate
 
         monkeypatch.setattr(rk, "begin_step", begin_step)

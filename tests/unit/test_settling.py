@@ -21,7 +21,7 @@ from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.drift import (
+from rbdyn.dynamics.statistics.error_bars import (
     FALSE_ALARMS,
     TESTED,
     drift_of,

@@ -1,16 +1,105 @@
-"""The loop over steps, one for all methods: step control, booking and the search for peaks."""
+"""The loop over steps, one for all methods: how long the next step is, what is kept of a step, and the search for peaks.
+
+How long the next step is: a PI controller on the error of a step over its tolerance (Hairer, Norsett and Wanner, Solving
+ODEs I, II.4), which with ``beta`` = 0 is the plain one.
+
+The error of a step is the Euclidean norm of all components, each over its own absolute tolerance, and not averaged
+over them: it is never smaller than that of the worst component, however many rollers there are.
+"""
 
 import math
 
 import numpy as np
 
+from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
 from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
 from rbdyn.dynamics.integrators import method_laws as laws
 from rbdyn.dynamics.integrators import records as at
-from rbdyn.dynamics.integrators.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
-from rbdyn.dynamics.integrators.step_control import after_accepted, shortened, worst_component
+from rbdyn.dynamics.integrators.records import ERROR, PLACE_SQUARES, PLACES_X, PLACES_Y, SAMPLES, SPEEDS, SQUARES, STEP
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+
+
+@kernel
+def after_accepted(method, clock, h, cut, error, refused, largest_step):
+    """Set the step after one of ``h`` [s] that was accepted. ``cut``: it ended early, which says nothing against the step it
+    was cut from; ``refused``: the one before was refused, so that this is no time to grow.
+    """
+    error = max(error, 1e-4)
+    factor = SAFETY * rough_power(error, -method.exponent) * rough_power(clock[ERROR], method.beta)
+    proposal = min(h * min(max(factor, SHRINK), 1.0 if refused else GROW), largest_step)
+    clock[STEP] = max(proposal, clock[STEP]) if cut else proposal
+    clock[ERROR] = error
+
+
+@kernel
+def shortened(method, h, error):
+    """Step [s] in place of one of ``h`` that was refused."""
+    return h * (max(SAFETY * rough_power(error, -method.rejected), SHRINK) if math.isfinite(error) else SHRINK)
+
+
+@routine
+def worst_component(method, k, h, inverse_tolerance):
+    """Component that limits the step: the first that is not finite, else the one of the largest error."""
+    worst, largest = 0, -1.0
+    for i in range(inverse_tolerance.size):
+        e = abs(laws.step_error(method, k, h, i)) * inverse_tolerance[i]
+        if not math.isfinite(e):
+            return i
+        if e > largest:
+            worst, largest = i, e
+    return worst
+
+
+PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
+
+
+@kernel
+def book_whirl(whirl, x, y, vx, vy):
+    """Take a sample of place [m] and velocity [m/s] of the cage's centre."""
+    square = vx * vx + vy * vy
+    whirl[SAMPLES] += 1.0
+    whirl[SPEEDS] += math.sqrt(square)
+    whirl[SQUARES] += square
+    whirl[PLACES_X] += x
+    whirl[PLACES_Y] += y
+    whirl[PLACE_SQUARES] += x * x + y * y
+
+
+@kernel
+def book_point(values, point, loads, row):
+    """Take the pocket loads in row ``row`` as those at a point of a step."""
+    values[0, point] = loads[row, POCKET_LOAD]
+    values[1, point] = loads[row, POCKET_CONTACT_LOAD]
+
+
+@routine
+def book_peaks(values, start, h, tally):
+    """Keep the peaks of both pocket loads, given at even points of a step of ``h`` [s] from ``start`` on: of each the
+    largest, or the vertex of the parabola through it and its neighbours, where it is larger than any before.
+    """
+    last = values.shape[1] - 1
+    # Of a length that the compiler does not know: unrolled, this would be compiled twice.
+    for row in range(values.shape[0]):
+        force = POCKET_CONTACT_LOAD if row else POCKET_LOAD
+        best, place, spacing = 0.0, 0, 1.0 / last
+        for p in range(last + 1):
+            if values[row, p] > best:
+                best, place = values[row, p], p
+        theta = place * spacing
+        if 0 < place < last:
+            left, right = values[row, place - 1], values[row, place + 1]
+            bend = left - 2.0 * best + right
+            if bend < 0.0:
+                shift = 0.5 * (left - right) / bend
+                best -= 0.25 * (left - right) * shift
+                theta += shift * spacing
+        if best > tally.largest[force]:
+            tally.largest[force] = best
+            tally.largest_time[force] = start + theta * h
+
 
 LOOK_EVERY = 8  # Stiffness is looked at in every eighth step.
 

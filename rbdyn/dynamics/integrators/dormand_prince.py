@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.compiled.elementary import fma
-from rbdyn.dynamics.integrators.embedded_pair import (
+from rbdyn.dynamics.integrators.method_laws import (
     early_stage_state,
     mean_rate,
     quartic_rate,

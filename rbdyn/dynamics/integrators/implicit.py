@@ -10,9 +10,7 @@ from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS
-from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix
-from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
-from rbdyn.dynamics.integrators.rosenbrock import STAGES, Rodas
+from rbdyn.dynamics.integrators.rosenbrock import STAGES, Differences, OneRoller, Rodas, arrow_matrix
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
 from rbdyn.scene import Scene
 
