@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import subprocess
 import sys
 from pathlib import Path
 
@@ -131,6 +132,32 @@ def test_literature_friction_at_the_makers_level():
     powers = [float(cell) for cell in row[3 : header.index("power loss W")]]
     assert sum(powers) == pytest.approx(result.power_loss.value, abs=0.5)
     assert result.friction_check is not None and 1.0 < result.friction_check["ratio"] < 1.8
+
+
+def test_unit_extremes_of_several_scenes(outer, monkeypatch):
+    """Unit: a line a scene; the scene itself and one without load close their power balance."""
+    from rbdyn.accuracy import stability
+
+    module, every = script("benchmarks/extremes"), stability.cases
+    names = ("as given", "no load")
+    monkeypatch.setattr(stability, "cases", lambda scene: {name: every(scene)[name] for name in names})
+    report = module.study(outer, others=("cylindrical_roller.toml",))
+    assert [row[:3] for row in report.tables[0].cells] == [["scene", "2", "0"], ["cylindrical_roller.toml", "2", "0"]]
+    assert [row["of"] for row in report.record["cases"]] == ["scene"] * 2 + ["cylindrical_roller.toml"] * 2
+    assert not report.failed and max(row["power_gap"] for row in report.record["cases"]) < stability.LARGEST_GAP
+
+
+def test_unit_a_script_of_studies_writes_and_refuses(tmp_path):
+    """Unit: tables on standard output and files in the folder; a scene with nothing to study is one sentence, exit code 2."""
+    folder = EXAMPLES / "benchmarks"
+    battery = [sys.executable, folder / "ball_battery.py", "--scenes", "3", "--out", tmp_path]
+    ran = subprocess.run(battery, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert "convex solves 100.00 % (43.9 to 100.0) of 3 random scenes" in ran.stdout
+    assert {path.name for path in tmp_path.iterdir()} == {"battery.json", "battery.csv", "battery.png"}
+    plain = [sys.executable, folder / "slicing.py", EXAMPLES / "cylindrical_roller.toml"]
+    refused = subprocess.run(plain, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2 and refused.stderr.startswith("bearing.roller_profile = 'cylinder'")
 
 
 def test_unit_static_loads_bear_the_shaft():

@@ -11,7 +11,9 @@ from types import SimpleNamespace
 import direct_front
 import numpy as np
 import pytest
+from conftest import ROOT
 from direct_search import SurrogateLoss
+from doe_command import doe
 from instant_runs import instantly
 from short_studies import SHORT, rows, short_study, silent, stored
 
@@ -154,3 +156,12 @@ def test_direct_front_killed_in_its_search_resumes_with_the_same_bits(tmp_path):
     assert one.pop("seconds") != two.pop("seconds")
     del one["comparison_seconds"], two["comparison_seconds"]
     assert one == two
+
+
+@pytest.mark.parametrize("command", ["study", "front"])
+def test_former_option_is_refused_by_the_name_of_the_script(command, tmp_path):
+    ended = doe(command, str(tmp_path / "study.toml"), "--direct", "--json")
+    (fault,) = json.loads(ended.stdout)["faults"]
+    assert ended.returncode == 2 and fault == ended.stderr.strip()
+    script = fault.partition("run python ")[2].split()[0]
+    assert fault.startswith("--direct: is no option any more") and (ROOT / script).samefile(direct_front.__file__)
