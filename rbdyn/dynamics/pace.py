@@ -84,6 +84,9 @@ class Pace:
         """What is left, and the least time of all runs [s], those that have ended included."""
         counts, each = self.runs + self.companions, self._under_way.values()
         done = sum(turns for _, turns in each)
+        # What a run was lengthened by is nothing that the others have made.
+        asked = sum(min(turns, self.turns) for _, turns in each)
+        gone_s = elapsed_s * asked / done
         ended = sum(turns >= self.turns * (1.0 - 1e-9) for _, turns in each)
         left, measured = max(counts - ended, 0), Measured(len(each), done, self._spent_s)
         first, rest = (math.ceil(number / self.threads) for number in (self.runs, self.companions))
@@ -91,9 +94,9 @@ class Pace:
             factor * (measured.pace or 0.0) * self.turns * (first + companion * rest)
             for factor, companion in zip(measured.factors(left, self.scatter), COMPANION, strict=True)
         )
-        seconds = max(low - elapsed_s, 0.0), max(high - elapsed_s, 0.0)
+        seconds = max(low - gone_s, 0.0), max(high - gone_s, 0.0)
         longest_s = self.growth * high - elapsed_s if self.growth > 1.0 else 0.0
-        turns = max(counts * self.turns - done, 0.0)
+        turns = max(counts * self.turns - asked, 0.0)
         return Forecast((left, left), (turns, turns), seconds, self.threads, longest_s, remedy=self._remedy), low
 
     def _budget_sentence(self, budget_s: float) -> str:

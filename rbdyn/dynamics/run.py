@@ -99,7 +99,7 @@ class Run:
             status = list(Status)[advance(self.bearing, short, self.carry, self.tally, end, self.sample_step)]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
-                turned = self.carry.clock[at.NOW] / self.scene.turn_s
+                turned = float(self.carry.clock[at.NOW]) / self.scene.turn_s
                 self.pace.look(self.ticket, self.spent_s, turned, self.steps, budget)
             if status is Status.FINISHED:
                 return

@@ -56,6 +56,15 @@ def test_unit_runs_that_have_ended_are_not_left(make_scene):
     assert stated[0].startswith("6 runs of 720 shaft turns in all are left")
 
 
+def test_unit_a_run_that_was_lengthened_leaves_the_others_their_turns(make_scene):
+    """Unit: of two runs of 10 turns one was lengthened to 40 at a second a turn; one companion of 10 turns is left after the other."""
+    looks = [(0, 40.0, 40.0, 10_000, 10**7)]
+    one, stated = watched(make_scene(), looks, 2, 10.0, threads=1, growth=8.0, companions=1)
+    assert stated[0].startswith("2 runs of 20 shaft turns in all are left: 1 at once, they take ")
+    # Ten turns of a run, and ten of a companion of 0.6 to 1.5 times the time, after the 40 s.
+    assert one.predicted[0] < 40.0 + 16.0 < 40.0 + 25.0 < one.predicted[1]
+
+
 def test_unit_a_budget_states_the_time_that_it_stands_for(make_scene):
     """Unit: where steps run out before the turns do, a sentence says when, with the key."""
     _, stated = watched(make_scene(), [(0, 12.0, 0.001, 10_000, 1_000_000)])
