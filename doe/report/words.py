@@ -7,6 +7,9 @@ from typing import Any
 from doe.pareto.share import Interval, percent
 from rbdyn.records.words import improvement
 
+# Limits by their sense in a record.
+SENSES = {"<=": "≤", ">=": "≥"}
+
 
 def probability(value: float | None) -> str:
     """A p-value, four decimals at most."""
@@ -36,10 +39,14 @@ def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
 
 
 def half_width(record: Mapping[str, Any]) -> float | None:
-    """95 % half-width of a quantity: its error, or its statistical and numerical error together."""
-    parts = [record.get(key) for key in ("error", "statistical_error", "numerical_error")]
-    known = [part for part in parts if part is not None]
-    return math.hypot(*known) if known else None
+    """95 % half-width of a quantity: its error, or its statistical and numerical error together.
+
+    None where the statistical error is unknown, as for ``Quantity.stated_error``.
+    """
+    if record.get("error") is not None:
+        return float(record["error"])
+    statistical = record.get("statistical_error")
+    return None if statistical is None else math.hypot(statistical, record.get("numerical_error") or 0.0)
 
 
 def change(gain: Mapping[str, Any]) -> str:

@@ -98,9 +98,10 @@ def test_no_word_of_a_heading_is_broken(monkeypatch, tmp_path, name):
 
 def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
     from doe.commands.study import study
+    from doe.report.study.summary import summary
 
     def write(outcome, folder: Path) -> dict:
-        record = {"inputs": outcome.inputs, "files": [], "status": "ok", "limits_sentence": ""}
+        record = summary(outcome) | {"files": []}
         (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
         return record
 

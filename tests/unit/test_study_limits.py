@@ -126,7 +126,7 @@ def test_a_broken_limit_is_said_first_and_fails_the_study_also_when_asked_again(
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact_force_N <= 35")
+        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact force <= 35")
         assert "2 points were tried" in shown.stdout
     assert "finished before" in again.stdout
     record = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from doe.report.sections.blocks import Block, Figures, Heading, Table
 from doe.report.sections.plot import Plot, legend, span
 from doe.report.sections.record import Record, factors, part
+from rbdyn.base.blocks import Block, Figures, Heading, Table
 from rbdyn.records.words import label, shown, with_error
 
 # Shape of the runs made for each reason; the style sheet has their colours.

@@ -34,7 +34,12 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
     bold : whether headings and captions are.
     """
     page = Page(width, bold)
-    return "".join(_render(block, page) for block in blocks if block.detail <= detail and says(block))
+    written = ""
+    for block in blocks:
+        if block.detail <= detail and says(block):
+            titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
+            written += ("\n" if titled and written and not written.endswith("\n\n") else "") + _render(block, page)
+    return written
 
 
 class Page(NamedTuple):
@@ -62,7 +67,7 @@ def _render(block: Block, page: Page) -> str:
         case Note(text):
             return page.lines(f"note: {text}")
         case Heading(text):
-            return f"\n{page.title(text)}"
+            return page.title(text)
         case Bullets(items):
             return "".join(map(page.lines, items))
         case Tiles():
