@@ -22,9 +22,9 @@ from doe.running.failure import Failure
 from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
+from rbdyn.base.words import counted
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key
-from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import plain_values

@@ -22,13 +22,13 @@ import typer
 from published.common import Table, canvas, save
 from published.homogenisation import homogenisation
 
+from rbdyn.base.words import with_error
 from rbdyn.quasistatic.runout.classes import running_accuracy
 from rbdyn.quasistatic.runout.lots import Lot, draw_parts, linear_response, readings
 from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts
 from rbdyn.quasistatic.runout.turn import Followed, follow
-from rbdyn.records.words import with_error
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"

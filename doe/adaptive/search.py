@@ -29,8 +29,8 @@ from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.threads import one_thread
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
 TESTED = 4  # last batches that tell how right the emulators' deviations are

@@ -6,8 +6,8 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 MOST_RUNS = 10_000
 # More runs of a Latin hypercube are even enough by themselves, and exchanges among them take seconds.

@@ -7,8 +7,8 @@ import numpy as np
 from doe.arrays import Array
 from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.direct import DirectFront
+from rbdyn.base.words import signed_with_error
 from rbdyn.faults import MethodError
-from rbdyn.records.words import signed_with_error
 
 DRAWS = 200  # of the noise of a front
 

@@ -1,11 +1,11 @@
-"""How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.records.words``."""
+"""How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.base.words``."""
 
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from doe.pareto.share import Interval, percent
-from rbdyn.records.words import improvement
+from rbdyn.base.words import improvement
 
 # Limits by their sense in a record.
 SENSES = {"<=": "≤", ">=": "≥"}

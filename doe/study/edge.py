@@ -16,9 +16,9 @@ from doe.study.confirmation import Choice, Confirmed, confirmed_from, error_of_d
 from doe.study.drawn import jacobian
 from doe.study.goals import beyond_runs, goals_of, region_of
 from doe.study_file import Study
+from rbdyn.base.words import improvement, quantity, shown
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, finite, keyed, outside_json
-from rbdyn.records.words import improvement, quantity, shown
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design

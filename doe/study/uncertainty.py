@@ -11,8 +11,8 @@ from doe.study.input_sets import NORMAL, Case, Sets, declared, outside, overridi
 from doe.threads import one_thread
 from doe.unknown.sensitivity import Indices, explained, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Share, Spread, emulated, residual_variance, spread_of
+from rbdyn.base.words import are, counted
 from rbdyn.faults import RunError
-from rbdyn.records.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 

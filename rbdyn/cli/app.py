@@ -8,6 +8,7 @@ import typer
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
 from rbdyn.base.render.terminal import show as show_blocks
+from rbdyn.base.words import counted
 from rbdyn.cli import options as given
 from rbdyn.cli import terminal
 from rbdyn.cli.ball import ball
@@ -15,7 +16,6 @@ from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
 from rbdyn.records.cells import save_table
-from rbdyn.records.words import counted
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -176,7 +176,7 @@ def slip_map(
     with terminal.guarded(as_json):
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         folder = terminal.output_folder(out, "rbdyn map", scene) if out else None
-        from rbdyn.cli.ranges import axis_values
+        from rbdyn.base.ranges import axis_values
         from rbdyn.dynamics import slip_map as study
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")

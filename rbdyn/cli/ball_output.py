@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.words import counted
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
 from rbdyn.records.cells import save_table
-from rbdyn.records.words import counted
 from rbdyn.scene import BallScene
 
 if TYPE_CHECKING:

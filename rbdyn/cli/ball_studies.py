@@ -8,9 +8,10 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.ranges import axis_values
 from rbdyn.base.render.terminal import show
+from rbdyn.base.words import with_error
 from rbdyn.cli.ball_sweep import points_table
-from rbdyn.cli.ranges import axis_values
 from rbdyn.cli.terminal import hand_over, output_folder
 from rbdyn.faults import InputError, MethodError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
@@ -24,7 +25,6 @@ from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped
-from rbdyn.records.words import with_error
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene

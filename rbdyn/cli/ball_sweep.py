@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.render.terminal import show
+from rbdyn.base.words import counted, label
 from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, progress_bar
-from rbdyn.records.words import counted, label
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.base.blocks import Block, Detail, Table, notes
+from rbdyn.base.words import counted, quantity, with_error
 from rbdyn.faults import refuse
 from rbdyn.records.cells import save_table
-from rbdyn.records.words import counted, quantity, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 

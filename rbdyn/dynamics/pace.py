@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from rbdyn.records.words import counted
+from rbdyn.base.words import counted
 from rbdyn.scene import Scene
 
 # What is done with a sentence on the time that runs take; None where nobody asks.

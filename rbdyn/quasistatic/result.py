@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
@@ -17,7 +18,6 @@ from rbdyn.quasistatic.fatigue import solution_life
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
-from rbdyn.records.words import Brief, Figure, counted
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallScene
 

@@ -1,2 +1,2 @@
-"""What is written down: records as JSON and in words, finished parts of a long command, files that carry their digest, and
+"""What is written down: records as JSON, finished parts of a long command, files that carry their digest, and
 where caches lie."""

@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
+from rbdyn.base.words import counted
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
 from rbdyn.properties.catalogue import envelope
 from rbdyn.properties.designation import ROLLERS, read_designation
-from rbdyn.records.words import counted
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}

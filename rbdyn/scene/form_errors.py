@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from rbdyn.base.words import counted
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI
-from rbdyn.records.words import counted
 from rbdyn.scene.bearing import Harmonic
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from doe.study.front import find_front
 from doe.study.goals import known_tolerances
 from doe.study.widest import widest_of
 from doe.study_file.front_section import Tolerances
+from rbdyn.base.words import with_error
 from rbdyn.faults import InputError
-from rbdyn.records.words import with_error
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
 POWER = 'name = "power_loss_W"\nmodel = "quadratic"\ngoal = "min"'

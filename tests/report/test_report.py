@@ -28,8 +28,8 @@ from doe.study.edge import Outward
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from rbdyn.base.words import label, quantity, shown, with_error
 from rbdyn.plots.motion import cage_orbit
-from rbdyn.records.words import label, quantity, shown, with_error
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 VOID = {"meta", "input"}

@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from doe.report.words import half_width
-from rbdyn.records.words import error_alone, signed_with_error, value_alone, with_error
+from rbdyn.base.words import error_alone, signed_with_error, value_alone, with_error
 from rbdyn.result import Quantity
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from doe.report.sections.contents import title
 from doe.report.sections.record import Record, known
 from rbdyn.base.blocks import Widget
 from rbdyn.base.render import html
-from rbdyn.records.words import filled_page
+from rbdyn.base.words import filled_page
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {

@@ -7,7 +7,7 @@ from doe.report.sections.parts import chain_blocks
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses
 from doe.report.words import SENSES, change, half_width, of_hundred, rounded_down, share_with_interval
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Section, Table, Tile, Tiles
-from rbdyn.records.words import chance, label, quantity, shown, with_error
+from rbdyn.base.words import chance, label, quantity, shown, with_error
 
 # What a clearance of the scene is, by its key.
 CLEARANCES = {

@@ -10,7 +10,7 @@ from doe.report.sections import answer, bearing, experiments, fits, fronts, part
 from doe.report.sections.experiments import failure_table
 from doe.report.sections.record import Record, factors, part, record_table, responses
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Section, Table, says
-from rbdyn.records.words import label, quantity, shown
+from rbdyn.base.words import label, quantity, shown
 
 
 def reference(summary: Record, motion: Mapping[str, Any]) -> Section:

@@ -7,7 +7,7 @@ from typing import Any
 from doe.report.sections.plots_of_fits import evaluation_plots
 from doe.report.sections.record import Record, factors, part, record_table, responses
 from rbdyn.base.blocks import Block, Figures, Paragraph, Section, Table
-from rbdyn.records.words import label, shown, with_error
+from rbdyn.base.words import label, shown, with_error
 
 # Longer tables are opened on demand.
 LONG = 40

@@ -9,7 +9,7 @@ from doe.report.sections.plots_of_fits import diagnostic_plots
 from doe.report.sections.record import Record, factors, fits, part, record_table
 from doe.report.words import probability
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
-from rbdyn.records.words import counted, label, quantity, shown, with_error
+from rbdyn.base.words import counted, label, quantity, shown, with_error
 
 STATISTICS = (
     ("r2", "R²"), ("adjusted_r2", "adjusted R²"), ("predicted_r2", "predicted R²"), ("press", "PRESS"),

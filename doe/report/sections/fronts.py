@@ -11,7 +11,7 @@ from doe.report.sections.record import Record, factors, nearest, part, responses
 from doe.report.sections.searches import in_few_runs
 from doe.report.words import SENSES, change, share_with_interval
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Section, Table, Widget
-from rbdyn.records.words import chance, counted, error_alone, label, quantity, shown, with_error
+from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400

@@ -8,7 +8,7 @@ from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, allocation, part, record_table
 from doe.report.words import dimension, moved
 from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
-from rbdyn.records.words import counted, label, with_error
+from rbdyn.base.words import counted, label, with_error
 
 # Keys of a chain that have a place of their own.
 SHOWN_KEYS = {

@@ -8,7 +8,7 @@ from typing import Any
 
 from doe.report.words import probability
 from rbdyn.base.blocks import Table
-from rbdyn.records.words import label, quantity, shown
+from rbdyn.base.words import label, quantity, shown
 
 Record = Mapping[str, Any]
 # Characters above which a value is a sentence, to be broken.

@@ -15,8 +15,8 @@ from doe.study_file.cells import text_of
 from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.words import counted, quantity, shown
 from rbdyn.records.kept import digest_of, intact, sign
-from rbdyn.records.words import counted, quantity, shown
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 

@@ -6,8 +6,8 @@ from doe.designs import Design
 from doe.study.design import actual_of
 from doe.study_file import Study
 from rbdyn.base.blocks import Block, Detail, Table
+from rbdyn.base.words import counted, label
 from rbdyn.records.cells import quoted_cell
-from rbdyn.records.words import counted, label
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:

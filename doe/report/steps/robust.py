@@ -8,7 +8,7 @@ from doe.report.words import of_hundred
 from doe.study.robust import Decider, Robust
 from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
-from rbdyn.records.words import counted, quantity, shown
+from rbdyn.base.words import counted, quantity, shown
 from rbdyn.scene.unknown import is_number
 
 # Share that is nearly all cases; gain in the chance of the right choice that is not worth a line.

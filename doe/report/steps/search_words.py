@@ -10,7 +10,7 @@ from doe.study.compared import Compared
 from doe.study.held import Pull, near_limits, pulls
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import counted, improvement, quantity, with_error
+from rbdyn.base.words import counted, improvement, quantity, with_error
 
 SURE = 1.5  # root mean square miss in standard deviations up to which emulators knew how little they know
 HELD = {

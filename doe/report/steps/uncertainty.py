@@ -10,7 +10,7 @@ from doe.study_file.cells import text_of
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
-from rbdyn.records.words import counted, quantity, shown, with_error
+from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"

@@ -13,6 +13,7 @@ import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
 from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
+from rbdyn.base.words import signed_with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -21,7 +22,6 @@ from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, shown
-from rbdyn.records.words import signed_with_error
 from rbdyn.scene import Scene
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 # Places round the face where the axial indicator may stand.
 PLACES = 72
