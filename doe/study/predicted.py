@@ -108,7 +108,7 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
 
 
 # What a verdict amounts to.
-AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not told from noise"}
+AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not significant"}
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:

@@ -334,7 +334,7 @@ def test_error_bars_end_at_the_frame():
 def test_beyond_the_edge_each_response_has_direction_and_unit():
     gains = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
     told = Outward("guide_clearance_mm", "upper", 0.25, "µm", "simulation", gains, {"cage_speed_rpm": "max"}).sentence
-    assert "bound of the region, 0.25 mm; to be expected per µm" in told
+    assert "is at its upper bound, 0.25 mm. Extrapolated change per µm beyond it by simulation" in told
     assert (
         "impact_force_N 0.20 ± 0.40 N less, power_loss_W 0.50 ± 0.10 W more, cage_speed_rpm 3.0 ± 1.0 rpm more" in told
     )

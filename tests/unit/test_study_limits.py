@@ -172,7 +172,10 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     # Two a coded unit of 50 µm.
     gain, error = outward.gains["impact_force_N"]
     assert gain == pytest.approx(0.04, rel=1e-4) and error < 1e-6
-    assert "THE PICK LIES AT THE EDGE" in edge.sentence and "50 % of the front" in edge.sentence
+    assert (
+        "The pick is at the edge of the design region: guide_clearance_mm is at its upper bound" in edge.sentence
+        and "50 % of the front" in edge.sentence
+    )
     inside = SimpleNamespace(point=study.centre)
     assert not edge_of(study, surfaces, inside, study.centre[None], None, None).outward
 
