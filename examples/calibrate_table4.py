@@ -28,13 +28,14 @@ from scipy.stats import spearmanr
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.steps.calibrate import files_of, print_calibration, record_of, write
+from doe.report.steps.calibrate import blocks, files_of, record_of, write
 from doe.running.failure import Failure
 from doe.running.store import Store
 from doe.study.calibration import Calibration, find_calibration
 from doe.study.calibration_question import Question, question_of, read_question
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
+from rbdyn.base.render.terminal import show
 from rbdyn.scene.unknown import put
 
 HERE = Path(__file__).parent
@@ -160,7 +161,7 @@ def main(arguments: list[str] | None = None) -> None:
         found = find_calibration(asked, simulations)
         record = record_of(found, question_of(asked))
         write(found, record, given.out)
-        print_calibration(record)
+        show(blocks(record))
         frame = agreement(simulated_sets(found))
         frame.to_csv(given.out / "agreement.csv", index=False)
         print("\nof all input sets that were simulated at the 15 designs:")

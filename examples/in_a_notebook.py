@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rbdyn
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 drawn = rbdyn.Scene.load(Path(__file__).with_name("cylindrical_roller.toml"))
 scene = drawn.changed({"cage.mass_g": 50, "numerics.turns": 20, "numerics.discard_turns": 5, "numerics.replicates": 2})

@@ -22,12 +22,12 @@ import typer
 from published.common import Table, canvas, save
 from published.homogenisation import homogenisation
 
+from rbdyn.base.words import with_error
 from rbdyn.quasistatic.runout.lots import Bench, Lot, RaceLimits, design, draw_parts, linear_response, readings, runouts
 from rbdyn.quasistatic.runout.measures import running_accuracy
 from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.turn import Followed, follow
-from rbdyn.records.words import with_error
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"

@@ -11,9 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
+from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 from rbdyn.faults import InputError, bounded, path_of, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
-from rbdyn.records.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,9 +51,17 @@ class Quantity(Record):
         return " ".join((self.shown, *errors))
 
     @property
+    def stated_error(self) -> float | None:
+        """The error that people read next to the value; None where the statistical one is unknown.
+
+        An error of the time steps alone bears no digits of a figure that scatters.
+        """
+        return None if self.statistical_error is None else self.error
+
+    @property
     def shown(self) -> str:
-        """The value to the digits that its error bears; to five where the statistical error is unknown."""
-        return value_alone(self.value, None if self.statistical_error is None else self.error)
+        """The value to the digits that its stated error bears; to five without one."""
+        return value_alone(self.value, self.stated_error)
 
 
 class SavedRecord(Record):
@@ -140,7 +148,7 @@ class SimulationResult(Brief, SavedRecord):
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""
         figures = [
-            Figure(words, each.value, each.error, unit)
+            Figure(words, each.value, each.stated_error, unit)
             for key, each in self.quantities.items()
             for words, unit in (quantity(key),)
         ]

@@ -27,8 +27,8 @@ from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
 from doe.pareto.simulated import Samples, SimulatedFront
 from doe.threads import one_thread
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
 TESTED = 4  # last batches that tell how right the emulators' deviations are

@@ -7,6 +7,8 @@ import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 
@@ -32,7 +34,7 @@ def calibrate(
     """Find what is not known of a scene from measurements on a rig, and tell whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
-        from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
+        from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
         from doe.running.agenda import ANSWER
         from doe.study.calibration import find_calibration
         from doe.study.calibration_question import question_of, read_question
@@ -55,5 +57,5 @@ def calibrate(
                 agenda.finish(files_of(record))
                 noted = agenda
         known = record
-        hand_over(lambda: known, as_json, lambda: print_calibration(known), folder, files_of(known))
+        hand_over(lambda: known, as_json, lambda: show(blocks(known), Detail.of(quiet)), folder, files_of(known))
         print_predicted(noted, as_json)

@@ -8,6 +8,8 @@ import typer
 
 from doe.commands.options import Save
 from doe.commands.steps import save
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import BAD_INPUT, guarded, hand_over
 from rbdyn.faults import InputError, refuse
@@ -25,7 +27,8 @@ def chain(
     """Solve dimension chains: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):
         from doe.dimension_chain import is_several, read_chains, solve
-        from doe.report.steps.chain import chains_record, print_chain
+        from doe.report.sections.parts import chain_blocks
+        from doe.report.steps.chain import chains_record
 
         several = is_several(path)
         results, faults = {}, []
@@ -38,11 +41,11 @@ def chain(
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         save(out, path, "chain.json", record)
 
-        def show() -> None:
+        def answer() -> None:
             for name, result in results.items():
-                print_chain(name, result, quiet, verbose)
+                show(chain_blocks(name, result.as_dict()), Detail.of(quiet, verbose))
 
-        hand_over(lambda: record, as_json, show)
+        hand_over(lambda: record, as_json, answer)
         refused = {name: result.status for name, result in results.items() if result.refused}
         for name, status in refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)

@@ -4,6 +4,8 @@ from typing import Annotated
 
 from doe.commands.options import Save, StudyPath
 from doe.commands.steps import save
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import guarded, hand_over
 
@@ -18,7 +20,7 @@ def design(
 ) -> None:
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
-        from doe.report.steps.design import design_record, print_csv, print_design
+        from doe.report.steps.design import blocks, design_record, print_csv
         from doe.study.checked import check_study
         from doe.study.design import design_of, evaluation
         from doe.study_file import Study
@@ -30,6 +32,5 @@ def design(
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
         save(out, path, "design.json", record)
-        hand_over(
-            lambda: record, as_json, lambda: print_csv(record) if as_csv else print_design(record, quiet, verbose)
-        )
+        detail = Detail.of(quiet, verbose)
+        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(blocks(record), detail))

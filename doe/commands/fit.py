@@ -9,6 +9,8 @@ import typer
 
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler
 from doe.commands.steps import Effort, fitted, keeping_runs, save
+from rbdyn.base.blocks import Block, Detail, Note, Paragraph
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
@@ -48,7 +50,7 @@ def fit(
     with guarded(as_json), ExitStack() as kept:
         loaded, notes = _study(path, data, {"factor": factor, "response": response, "model": model})
         kept.enter_context(keeping_runs(out, loaded.path))
-        from doe.report.steps.fit import fit_record, fit_tables, print_fit
+        from doe.report.steps.fit import fit_record, fit_tables
         from doe.study.surfaces import unrivalled, with_rivals
 
         surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
@@ -61,12 +63,24 @@ def fit(
 
             for name, rows in fit_tables(surfaces).items():
                 save_table(rows, out / name)
-        if path is None and not as_json:
-            named = f"factors {', '.join(loaded.factors)}; responses {', '.join(loaded.responses)}"
-            print(f"{data}: {named}; coded -1 and +1 are the ends of a factor's range")
-        for remark in [] if as_json else remarks:
-            print(f"note: {remark}")
-        hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))
+        hand_over(lambda: record, as_json, lambda: show(_answer(record, loaded, data, path), Detail.of(quiet, verbose)))
+
+
+def _answer(record: dict[str, Any], study: "Study", data: Path | None, path: Path | None) -> list[Block]:
+    """What a table was taken for without a study, notes, and the fits."""
+    from doe.report.sections.contents import readable
+    from doe.report.sections.fits import fit_blocks
+    from doe.report.sections.record import known
+
+    names = f"factors {', '.join(study.factors)}; responses {', '.join(study.responses)}"
+    taken = f"{data}: {names}; coded -1 and +1 are the ends of a factor's range" if path is None else ""
+    remarks = [Note(remark, Detail.LEAST) for remark in record.get("notes", ())]
+    fits = [
+        block
+        for name, fitted in known(record["responses"]).items()
+        for block in fit_blocks(name, fitted, study.factors)
+    ]
+    return [Paragraph(taken), *remarks, *readable(fits, {})]
 
 
 def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "tuple[Study, tuple[str, ...]]":

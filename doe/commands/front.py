@@ -1,9 +1,11 @@
 """``doe front``."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath
 from doe.commands.steps import Effort, fitted, keeping_runs, save
+from rbdyn.base.blocks import Block, Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
@@ -35,7 +37,7 @@ def front(
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out, path):
-        from doe.report.steps.front import front_record, given_point_record, print_front
+        from doe.report.steps.front import asked_record, front_record, given_point_record
         from doe.study.front import find_front, with_survival
         from doe.study.goals import check_goals
         from doe.study_file import Study
@@ -52,7 +54,19 @@ def front(
 
             record["point"] = given_point_record(loaded, surfaces, found, np.array(values))
         save(out, path, "front.json", record)
-        hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
+        summary = {key: value for key, value in record.items() if key == "direct"}
+        summary |= {"asked": asked_record(loaded), "front": record}
+        hand_over(lambda: record, as_json, lambda: show(_answer(summary), Detail.of(quiet, verbose)))
+
+
+def _answer(summary: dict[str, Any]) -> list[Block]:
+    """The front's section of a report, of its factors and responses as ``asked`` and its record as ``front``."""
+    from doe.report.sections.contents import readable
+    from doe.report.sections.fronts import front_blocks
+    from doe.report.sections.record import known
+
+    clean = known(summary)
+    return readable(front_blocks(clean), clean)
 
 
 def _point(study: "Study", text: str) -> list[float]:

@@ -8,6 +8,8 @@ import typer
 
 from doe.commands.options import Adaptive, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, stages
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
 
@@ -40,8 +42,7 @@ def study(
                 print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
             _leave_by(record, as_json)
             return
-        from doe.report.steps.fit import print_fit
-        from doe.report.study.answer import print_outcome, print_verdict
+        from doe.report.study.answer import blocks
         from doe.report.study.files import write
         from doe.study.whole import run_study
 
@@ -53,10 +54,7 @@ def study(
             record = write(outcome, folder)
             agenda.finish(record["files"])
         if not as_json:
-            print_verdict(outcome)
-            if verbose:
-                print_fit(outcome.surfaces, factors=loaded.factors)
-            print_outcome(outcome, quiet)
+            show(blocks(record), Detail.of(quiet, verbose))
             print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
             print_predicted(agenda, as_json)
             print(f"written to {folder}: {', '.join(record['files'])}")

@@ -7,6 +7,8 @@ import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 from rbdyn.faults import refuse
@@ -32,7 +34,7 @@ def uncertainty(
     """Tell what is not known of a scene, what that does to every output, and which input decides."""
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
-        from doe.report.steps.uncertainty import print_uncertainty, record_of, write
+        from doe.report.steps.uncertainty import blocks, record_of, write
         from doe.running.agenda import ANSWER
         from doe.study.stages_unknown import uncertainty_stages
         from doe.study.status import content_digest, runs_digest
@@ -50,5 +52,5 @@ def uncertainty(
             agenda.enter(ANSWER)
             files = write(found, folder)
             agenda.finish(files)
-        hand_over(lambda: record_of(found), as_json, lambda: print_uncertainty(found), folder, files)
+        hand_over(lambda: record_of(found), as_json, lambda: show(blocks(found), Detail.of(quiet)), folder, files)
         print_predicted(agenda, as_json)

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows, Whole
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 Region = Literal["ball", "box"]
 SAME_POINT = 1e-9  # coded units within which two runs are replicates

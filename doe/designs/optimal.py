@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
 from doe.designs.model import Terms, model_matrix, model_terms
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 Criterion = Literal["d", "i"]
 FEWEST, MOST = 4, 40  # random designs that exchanges start from; the best is kept

@@ -1,11 +1,14 @@
-"""How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.records.words``."""
+"""How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.base.words``."""
 
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from doe.pareto.manufacture import Interval, percent
-from rbdyn.records.words import improvement
+from rbdyn.base.words import improvement
+
+# Limits by their sense in a record.
+SENSES = {"<=": "≤", ">=": "≥"}
 
 
 def probability(value: float | None) -> str:
@@ -36,10 +39,14 @@ def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
 
 
 def half_width(record: Mapping[str, Any]) -> float | None:
-    """95 % half-width of a quantity: its error, or its statistical and numerical error together."""
-    parts = [record.get(key) for key in ("error", "statistical_error", "numerical_error")]
-    known = [part for part in parts if part is not None]
-    return math.hypot(*known) if known else None
+    """95 % half-width of a quantity: its error, or its statistical and numerical error together.
+
+    None where the statistical error is unknown, as for ``Quantity.stated_error``.
+    """
+    if record.get("error") is not None:
+        return float(record["error"])
+    statistical = record.get("statistical_error")
+    return None if statistical is None else math.hypot(statistical, record.get("numerical_error") or 0.0)
 
 
 def change(gain: Mapping[str, Any]) -> str:

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
 from doe.arrays import Array
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)

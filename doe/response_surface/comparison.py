@@ -16,8 +16,8 @@ from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.response_surface.surface import Surface
 from doe.threads import one_thread
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20

@@ -10,8 +10,8 @@ from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
+from rbdyn.base.words import are, counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import are, counted
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,8 @@ from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
 from doe.unknown.likelihood import Measured
 from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
 from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
+from rbdyn.base.words import quantity
 from rbdyn.faults import RunError
-from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Law

@@ -111,7 +111,7 @@ def _candidates(
         yield name, front.points[front.pick], front.pick_reason
     else:
         point = study.actual(aware.points[aware.pick])
-        yield name, point, f"{aware.pick_reason}, by what its tolerances leave of it"
+        yield name, point, f"{aware.pick_reason}, judged at the ends of its tolerances"
         yield "without_tolerances", front.points[front.pick], front.pick_reason
     for rule, row in front.picks.items():
         yield rule, front.points[row], f"the pick by {rule}"

@@ -15,9 +15,9 @@ from doe.study.intervals import LEVEL, joint_freedom, standard_errors, times_wid
 from doe.study.predicted import verdict
 from doe.study_file import Study
 from doe.threads import one_thread
+from rbdyn.base.words import improvement
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, derived, keyed, outside_json
-from rbdyn.records.words import improvement
 from rbdyn.result import SimulationResult
 
 WHIRL = "whirl_deviation_ratio"

@@ -17,8 +17,8 @@ from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from doe.study_file.table import Table, read_table
+from rbdyn.base.words import are, counted
 from rbdyn.faults import InputError, MethodError, refuse
-from rbdyn.records.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
 MAKERS: dict[str, Callable[..., Design]] = {

@@ -16,9 +16,9 @@ from doe.study.confirmation import Choice, Confirmed, confirmed_from, error_of_d
 from doe.study.drawn import jacobian
 from doe.study.goals import beyond_runs, goals_of, region_of
 from doe.study_file import Study
+from rbdyn.base.words import improvement, quantity, shown
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, finite, keyed, outside_json
-from rbdyn.records.words import improvement, quantity, shown
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -75,7 +75,7 @@ class Outward(Record):
         )
         at = f"{self.bound:.4g} {quantity(self.factor)[1]}".rstrip()
         return (
-            f"{self.factor} lies at the {self.side} bound of the region, {at}; to be expected per {self.unit} beyond it by "
+            f"{self.factor} is at its {self.side} bound, {at}. Extrapolated change per {self.unit} beyond it by "
             f"{self.source}: {listed}"
         )
 
@@ -101,9 +101,9 @@ class Edge(Record):
         if not self.outward:
             where = f"between the bounds of the region, but {BEYOND}" if self.beyond_runs else "inside the region"
             return f"The pick lies {where}; {shares}."
-        where = "; ".join(each.sentence for each in self.outward)
+        where = ". ".join(each.sentence for each in self.outward)
         where += f". It lies {BEYOND}" if self.beyond_runs else ""
-        return f"THE PICK LIES AT THE EDGE of the region: {where}. {shares}; a wider design may find more."
+        return f"The pick is at the edge of the design region: {where}. {shares}; a wider design may find more."
 
 
 def share_at_edge(study: Study, points: Array) -> float:

@@ -19,9 +19,9 @@ from doe.study.scene_columns import key_values, unknown_keys
 from doe.study_file.cells import read_sheet
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
+from rbdyn.base.words import shown
 from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, one_line, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
-from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain

@@ -10,7 +10,7 @@ from doe.study.goals import goals_of
 from doe.study.intervals import chance_above, one_sided
 from doe.study_file import Study
 from doe.unknown.propagation import Share
-from rbdyn.records.words import chance, with_error
+from rbdyn.base.words import chance, with_error
 
 Verdict = Literal["kept", "undecided", "broken"]
 

@@ -13,8 +13,8 @@ from doe.response_surface.model_error import correlation
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
+from rbdyn.base.words import error_alone, improvement
 from rbdyn.records.record import Record, derived, keyed, outside_json
-from rbdyn.records.words import error_alone, improvement
 
 
 def verdict(percent: float, error: float) -> str:
@@ -108,7 +108,7 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
 
 
 # What a verdict amounts to.
-AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not told from noise"}
+AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not significant"}
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:

@@ -10,8 +10,8 @@ from doe.arrays import Array
 from doe.study.rig_signals import KINDS, cage_speed, whirl
 from doe.study.scene_columns import key_values, unknown_keys
 from doe.study_file.cells import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
+from rbdyn.base.words import counted
 from rbdyn.faults import InputError, refuse
-from rbdyn.records.words import counted
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")

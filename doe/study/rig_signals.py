@@ -12,8 +12,8 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.study_file.cells import Limits, read_sheet
+from rbdyn.base.words import counted
 from rbdyn.faults import InputError, refuse
-from rbdyn.records.words import counted
 
 # What a signal holds: its columns, of which some may have another unit.
 KINDS = {

@@ -17,8 +17,8 @@ from doe.running.store import Store
 from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from doe.study_file.table import read_table
+from rbdyn.base.words import are, counted
 from rbdyn.faults import RunError
-from rbdyn.records.words import are, counted
 from rbdyn.scene import Scene
 
 # Name of the store in the folder of a study.

@@ -22,8 +22,8 @@ from doe.unknown.propagation import (
     sobol,
     spread_of,
 )
+from rbdyn.base.words import are, counted
 from rbdyn.faults import RunError
-from rbdyn.records.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 

@@ -41,7 +41,7 @@ from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
 from doe.threads import one_thread
-from rbdyn.records.words import html_table, improvement, label, quantity, shown, with_error
+from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
 
 
 @dataclass(frozen=True, repr=False)

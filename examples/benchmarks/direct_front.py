@@ -34,9 +34,9 @@ from doe.study.goals import goals_of, region_of
 from doe.study.runs import STORE, run_design
 from doe.study.surfaces import fit_surfaces, standard_errors
 from doe.study_file import Study
+from rbdyn.base.words import counted, with_error
 from rbdyn.cli.terminal import progress_bar
 from rbdyn.faults import InputError, MethodError, RunError
-from rbdyn.records.words import counted, with_error
 from rbdyn.result import read_json, write_json
 from rbdyn.scene import Scene
 

@@ -14,8 +14,8 @@ import sys
 import tomllib
 
 from rbdyn import Scene, SimulationResult, simulate
+from rbdyn.base.words import with_error
 from rbdyn.properties.catalogue import envelope, read_designation
-from rbdyn.records.words import with_error
 
 SIZES = ("204", "208", "210", "215", "220", "308", "314", "320", "1020", "2210")
 # Suffixes of the cage, and what they stand for.

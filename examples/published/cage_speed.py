@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from published.common import CHEN, Check, Effort, Finding, Table, canvas, error, findings_table, save, simulated, tally
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 SPEEDS_RPM = tuple(range(20000, 32001, 2000))
 LOAD_N = 1200

@@ -20,10 +20,10 @@ import pandas as pd
 
 from published.common import Check, Effort, Finding, Table, canvas, error, findings_table, save, tally
 from rbdyn import Scene, simulate
+from rbdyn.base.words import with_error
 from rbdyn.life.maker_friction import SERIES
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.catalogue import envelope, read_designation
-from rbdyn.records.words import with_error
 
 BEARINGS = ("NU 210", "NU 220", "NU 308", "NU 320", "NU 2210", "NU 1020")
 SPEED_SHARE = 0.7  # of the reference speed

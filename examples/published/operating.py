@@ -30,9 +30,9 @@ from published.common import (
     trend,
 )
 from rbdyn import Scene
+from rbdyn.base.words import with_error
 from rbdyn.life import maker_friction
 from rbdyn.properties.lubricants import oil_at
-from rbdyn.records.words import with_error
 
 # Table 8: as designed, and the paper's optimum.
 DESIGNS = {"design": (0.020, 0.150, 0.300), "optimum": (0.017, 0.187, 0.285)}

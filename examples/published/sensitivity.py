@@ -14,7 +14,7 @@ import pandas as pd
 
 from published.common import PLAIN, RESPONSES, Check, Effort, Table, canvas, save
 from published.table4 import Theirs, level_ratio, ours, theirs
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 # What is changed, to what, and where the range comes from.
 INPUTS: tuple[tuple[str, tuple[str, ...], str], ...] = (

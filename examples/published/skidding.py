@@ -30,7 +30,7 @@ from published.common import (
     verdict_of,
 )
 from rbdyn import Scene
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 NU215 = Path(__file__).parent / "nu215.toml"
 SPEEDS_RPM = (2400, 3600, 5000)

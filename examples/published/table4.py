@@ -30,7 +30,7 @@ from published.common import (
     simulated,
     tally,
 )
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 FACTORS = {
     "radial_clearance_mm": ("bearing.radial_clearance_mm", 0.020, 0.005),

@@ -24,7 +24,7 @@ from published.common import (
     tally,
 )
 from rbdyn import History, Scene, history
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 FILLS = (1.0, 0.3, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 PAPER = (0.72, 0.96)

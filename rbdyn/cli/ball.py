@@ -1,10 +1,13 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
 from rbdyn.cli.terminal import FAILED, guarded, hand_over, output_folder
 from rbdyn.faults import InputError
@@ -65,13 +68,15 @@ def ball(
             draw = 1 if seed is None else seed
             raise typer.Exit(run_study(loaded, name, value, share, draw, out, scene, as_json, quiet))
         folder = output_folder(out, "rbdyn ball", scene) if out else None
-        from rbdyn.cli.ball_output import print_result, with_runout, write
+        from rbdyn.cli.ball_output import blocks, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium
 
         result, path = with_runout(loaded, equilibrium(loaded))
         files = write(result, folder, path) if folder else []
-        hand_over(result.as_dict, as_json, lambda: print_result(result, quiet, verbose), folder, files)
+        hand_over(result.as_dict, as_json, lambda: show(blocks(result), Detail.of(quiet, verbose)), folder, files)
     if not result.found:
+        if not as_json:
+            print(f"no equilibrium: {result.status}", file=sys.stderr)
         raise typer.Exit(FAILED)
 
 
@@ -89,5 +94,7 @@ def _requested(sweeps: list[str] | None, wanted: float | None, studies: dict[str
 def _seeded(scene: "BallScene", seed: int) -> "BallScene":
     """The scene with other draws of its form errors. Raises InputError where there are none."""
     if scene.errors is None:
-        raise InputError([f"--seed {seed}: nothing is drawn here; it is for the table errors and --race-limits"])
+        raise InputError(
+            [f"--seed {seed}: no random numbers are used here; it is for the table errors and --race-limits"]
+        )
     return scene.changed({"errors.seed": seed})

@@ -1,4 +1,4 @@
-"""Studies of a ball bearing beside its equilibrium: runout over a turn, preload, clearance, limits of race errors."""
+"""Studies of a ball bearing next to its equilibrium: runout over a turn, preload, clearance, limits of race errors."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -7,9 +7,12 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from rbdyn.cli.ball_sweep import print_points
-from rbdyn.cli.ranges import axis_values
-from rbdyn.cli.terminal import hand_over, output_folder, print_notes, print_table
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.ranges import axis_values
+from rbdyn.base.render.terminal import show
+from rbdyn.base.words import with_error
+from rbdyn.cli.ball_sweep import points_table
+from rbdyn.cli.terminal import hand_over, output_folder
 from rbdyn.faults import InputError, MethodError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import remarks, tipping
@@ -21,7 +24,6 @@ from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped
-from rbdyn.records.words import with_error
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
@@ -153,26 +155,28 @@ def run(
 
             table.save(folder / f"{name}.csv")
             files += [f"{name}.csv", *sweep_pictures(table, folder)]
-    hand_over(lambda: record, as_json, lambda: _print(record, table, quiet), folder, files)
+    hand_over(lambda: record, as_json, lambda: show(blocks(record, table), Detail.of(quiet)), folder, files)
     return 0
 
 
-def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> None:
+def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
+    """The limits of race errors; or the points of a study, where they are best, and notes."""
     if table is None:
-        _print_limits(record)
-        return
-    print_points(table)
-    for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
-        at = record[best]
-        print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-    print_notes(record["notes"], quiet)
+        return _limits(record)
+    best = [
+        Paragraph(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
+        for title, at in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
+    ]
+    return [points_table(table), *best, *notes(record["notes"])]
 
 
-def _print_limits(record: dict[str, Any]) -> None:
+def _limits(record: dict[str, Any]) -> list[Block]:
     of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
     rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
-    title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
-    print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
+    title = f"class {record['class']}: {record['radial_limit_um']:g} µm radial, {record['axial_limit_um']:g} µm axial runout"
     good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
     solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
-    print(f"yield {good} of {record['bearings']} bearings, {solved}")
+    return [
+        Table(title, ("race", "roundness up to [µm]", "side-sway up to [µm]"), rows),
+        Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
+    ]

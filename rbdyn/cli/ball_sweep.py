@@ -1,12 +1,14 @@
-"""What ``rbdyn ball --sweep`` runs, prints and writes."""
+"""What ``rbdyn ball --sweep`` runs, says and writes."""
 
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, print_notes, print_table, progress_bar
-from rbdyn.records.words import counted
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.render.terminal import show
+from rbdyn.base.words import counted, label
+from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, progress_bar
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -17,13 +19,13 @@ if TYPE_CHECKING:
 SHOWN = 8
 # Header and columns of the table: the larger of two columns; of a double-decker, those of both rows.
 HEADER = {
-    "x [um]": ("x_mm",),
-    "axial, z [um]": ("z_mm",),
+    "x [µm]": ("x_mm",),
+    "axial, z [µm]": ("z_mm",),
     "inner angle": ("inner_angle_max_deg",),
     "outer angle": ("outer_angle_max_deg",),
     "largest load [N]": ("inner_load_max_N", "outer_load_max_N"),
     "pressure [MPa]": ("inner_pressure_MPa", "outer_pressure_MPa"),
-    "stiffness x [N/um]": ("stiffness_x_N_per_um",),
+    "stiffness x [N/µm]": ("stiffness_x_N_per_um",),
     "axial, z": ("stiffness_z_N_per_um",),
     "L10 [Mrev]": ("L10_Mrev",),
 }
@@ -41,30 +43,29 @@ def run(scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path
     with keeping(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
     files = write(result, folder) if folder else []
-    hand_over(result.as_dict, as_json, lambda: show(result, quiet), folder, files)
+    hand_over(result.as_dict, as_json, lambda: show(blocks(result), Detail.of(quiet)), folder, files)
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
     return FAILED if result.failures else 0
 
 
-def show(result: "SweepResult", quiet: bool) -> None:
-    """Print the points, what they cost and the notes."""
-    print_points(result)
-    print(
-        f"{counted(len(result.statuses), 'point')} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
-    )
-    print_notes((f"{result.where(note['points'])}: {note['note']}" for note in result.notes), quiet)
+def blocks(result: "SweepResult") -> list[Block]:
+    """The points, what they cost and the notes."""
+    points = counted(len(result.statuses), "point")
+    spent = f"{points} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
+    remarks = (f"{result.where(note['points'])}: {note['note']}" for note in result.notes)
+    return [points_table(result), Paragraph(spent), *notes(remarks)]
 
 
-def print_points(result: "SweepResult") -> None:
-    """Print the points, of a long sweep the first and the last ones."""
+def points_table(result: "SweepResult") -> Table:
+    """The points, of a long sweep the first and the last ones."""
     count = len(result.statuses)
     ends = (*range(SHOWN), *range(count - SHOWN, count)) if count > 2 * SHOWN else range(count)
     rows = [_row(result, place) for place in ends]
     if len(ends) < count:
         rows.insert(SHOWN, ["..."] * len(rows[0]))
-    units = [key.rpartition(".")[2] for key in result.keys]
-    print_table("", [*units, *HEADER], rows)
+    units = [label(key.rpartition(".")[2]) for key in result.keys]
+    return Table("", [*units, *HEADER], rows)
 
 
 def write(result: "SweepResult", folder: Path) -> list[str]:

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rbdyn.cli.terminal import print_notes, print_table
+from rbdyn.base.blocks import Block, Detail, Table, notes
+from rbdyn.base.words import counted, quantity, with_error
 from rbdyn.faults import refuse
 from rbdyn.records.cells import save_table
-from rbdyn.records.words import counted, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 
@@ -197,8 +197,13 @@ def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
     return [{"frequency_Hz": f, "amplitude": unit * amplitude} for f, amplitude in spectrum.peaks(PEAKS)]
 
 
-def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
-    """The figures a person looks for first; verbosely, the peaks of the spectra too."""
+def blocks(record: dict[str, Any]) -> list[Block]:
+    """The figures that a person looks for first; the peaks of the spectra for who asks for all; notes."""
+    title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
+    return [Table(title, ("figure", "value"), _figures(record)), *_spectra(record["spectra"]), *notes(record["notes"])]
+
+
+def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:
     quantiles, away = record["whirl_ratio_quantiles"], record["eccentricity_um"]
     stiff = record["pocket_bar_stiffness_N_m"]
     of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
@@ -225,11 +230,16 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
         error = " error not estimated" if width is None else " (95 %)"
         words = f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns"
         rows.append((words, f"{with_error(chaos['per_turn'], width)}{error}"))
-    title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
-    print_table(title, ("figure", "value"), rows)
-    if verbose:
-        for name, peaks in record["spectra"].items():
-            words, _, unit = name.rpartition("_")
-            cells = [(f"{peak['frequency_Hz']:.0f}", f"{peak['amplitude']:.3g}") for peak in peaks]
-            print_table("", (f"{words.replace('_', ' ')}: peaks [Hz]", f"amplitude [{unit}]"), cells)
-    print_notes(record["notes"], quiet)
+    return rows
+
+
+def _spectra(spectra: dict[str, list[dict[str, float]]]) -> list[Block]:
+    return [
+        Table(
+            f"Peaks of the spectrum of {quantity(name)[0]}",
+            ("frequency [Hz]", f"amplitude [{quantity(name)[1]}]"),
+            [(f"{peak['frequency_Hz']:.0f}", f"{peak['amplitude']:.3g}") for peak in peaks],
+            detail=Detail.ALL,
+        )
+        for name, peaks in spectra.items()
+    ]

@@ -4,14 +4,15 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
 
-from rbdyn.cli.columns import blocks
+from rbdyn.base.blocks import Table
+from rbdyn.base.render.terminal import show
 from rbdyn.cli.loading import INTERRUPTED
 from rbdyn.cli.remaining import Remaining, clock_words
 from rbdyn.cli.streams import FAILED
@@ -60,15 +61,15 @@ def print_json(record: dict[str, Any]) -> None:
 def hand_over(
     record: Callable[[], dict[str, Any]],
     as_json: bool,
-    show: Callable[[], None],
+    answer: Callable[[], None],
     folder: Path | None = None,
     files: Sequence[str] = (),
 ) -> None:
-    """The ``record`` as JSON; else what ``show`` prints, and the names of the files written, where there is a folder."""
+    """The ``record`` as JSON; else what ``answer`` prints, and the names of the files written, where there is a folder."""
     if as_json:
         print_json(record())
         return
-    show()
+    answer()
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
 
@@ -144,29 +145,6 @@ def notice(quiet: bool) -> Callable[[str], None] | None:
     return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
 
 
-def print_notes(notes: Iterable[str], quiet: bool) -> None:
-    """A line a note, unless ``quiet``."""
-    for note in () if quiet else notes:
-        print(f"note: {note}")
-
-
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A plain table; the first column to the left, the others to the right. One that is wider than the terminal goes on below,
-    its first column repeated, for no word is broken."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    # Wide enough for the table when the output is a file or a pipe, which has no width of its own.
-    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)
-    # A title of the table's own would be broken at the table's width.
-    if title:
-        console.print(title, style="bold")
-    for block in blocks([*zip(header, *rows, strict=True)], console.width):
-        table = Table(box=box.SIMPLE_HEAD)
-        for place, width in block:
-            justify = "left" if place == 0 else "right"
-            table.add_column(header[place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
-        for row in rows:
-            table.add_row(*(row[place] for place, _ in block))
-        console.print(table)
+    """Print one table."""
+    show([Table(title, header, rows)])

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rbdyn.cli.ranges import MOST_VALUES
+from rbdyn.base.ranges import MOST_VALUES
+from rbdyn.base.words import counted
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -26,7 +27,6 @@ from rbdyn.faults import InputError
 from rbdyn.records.forecast import Notice
 from rbdyn.records.kept import Kept, code_version, run_key
 from rbdyn.records.record import Record, derived, keyed, spread
-from rbdyn.records.words import counted
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 

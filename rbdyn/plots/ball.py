@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import quantity
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
-from rbdyn.records.words import quantity
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import BallResult

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import counted
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
@@ -37,7 +38,6 @@ from rbdyn.quasistatic.row.ball import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
-from rbdyn.records.words import counted
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene

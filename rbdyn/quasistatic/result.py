@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from rbdyn.arrays import Array, Mask
+from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
@@ -21,7 +22,6 @@ from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
 from rbdyn.records.record import Record, outside_json, spread
-from rbdyn.records.words import Brief, Figure, counted
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallRow, BallScene
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from rbdyn.records.words import are, counted
+from rbdyn.base.words import are, counted
 
 # What is done with a sentence on the time that runs take; None where nobody asks.
 Notice = Callable[[str], object] | None

@@ -12,7 +12,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from types import UnionType
 from typing import Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
-from rbdyn.records.words import Brief
+from rbdyn.base.words import Brief
 
 # What fields are declared to be, of a class.
 _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
+from rbdyn.base.words import counted
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, Positive
 from rbdyn.properties.materials import Material
-from rbdyn.records.words import counted
 from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.mounting import Mounting

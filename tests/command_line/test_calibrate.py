@@ -12,11 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
+from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
 from doe.study.calibration import find_calibration
 from doe.study.calibration_question import read_question
 from doe.study.rig_file import read_rig
 from doe.study.rig_signals import cage_speed
+from rbdyn.base.render.terminal import text
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -269,7 +270,7 @@ def _own_rig(folder: Path, more: str = "", reads: float = 1.0) -> list[str]:
     return _files(folder, UNCERTAIN + more, header, rows)
 
 
-def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     scene, _, rig, *_ = _own_rig(tmp_path, "[calibrate.discrepancy]\nimpact_force_N = 0.03\npower_loss_W = 0.03\n")
     question = read_question(Path(scene), Path(rig), (), ())
     simulations = _Simulations()
@@ -290,9 +291,8 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: py
     assert record["held_out"]["width"]["values"] == 10 and record["held_out"]["width"]["chance"] > 0.05
     assert all(each["explained"] and each["allowed"] == 0.03 for each in record["outputs"].values())
     assert set(record["discrepancy"]) == {"impact_force_N", "power_loss_W"}
-    print_calibration(record)
-    told = capsys.readouterr().out
-    assert told.startswith("calibrated") and "known together: lubricant.oil_fraction^1" in told
+    shown = text(blocks(record))
+    assert shown.startswith("calibrated") and "identified combination lubricant.oil_fraction^1" in shown
 
     write(found, record, tmp_path)
     assert all((tmp_path / name).stat().st_size > 0 for name in files_of(record))
@@ -307,7 +307,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: py
     assert json.loads((tmp_path / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
 
 
-def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path) -> None:
     scene, _, rig, *_ = _own_rig(tmp_path, reads=1.2)
     found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
     record = record_of(found, "made of this")
@@ -318,8 +318,7 @@ def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path, capsys
     # A tenth of what the unknown inputs do to each output is allowed by default.
     assert 0.005 < loss["allowed"] < 0.05 < 0.2 < loss["discrepancy"][2]
     assert any(reason.startswith("power loss is not explained") for reason in record["reasons"])
-    print_calibration(record)
-    assert "power loss: not explained" in capsys.readouterr().out
+    assert "power loss: not explained" in text(blocks(record))
 
 
 def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) -> None:

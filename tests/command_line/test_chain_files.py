@@ -8,8 +8,10 @@ from chains import by_name
 from doe_command import doe
 
 from doe.dimension_chain import read_chains, solve
-from doe.report.steps.chain import print_chain
+from doe.report.sections.parts import chain_blocks
 from doe.study_file.chain_section import StudyChain, chain_table
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render import terminal
 from rbdyn.faults import InputError, read_toml
 from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
@@ -84,13 +86,11 @@ def test_several_chains_print_one_json_object():
     assert {"closing_link", "yield", "contributions", "allocation", "status"} <= set(record["chains"]["guide"])
 
 
-def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved, capsys):
-    for name, result in solved.items():
-        print_chain(name, result, verbose=True)
-    text = capsys.readouterr().out
+def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved):
+    text = "".join(terminal.text(chain_blocks(name, result.as_dict()), Detail.ALL) for name, result in solved.items())
     for words in (
-        "48.1300 +0.0250/0", "in worst case", "by root sum square", "ppm below", "contributions", "█",
-        "matched in 4 classes", "a linear chain would miss", "quantiles of the closing link",
+        "48.1300 +0.0250/0", "in worst case", "by root sum square", "ppm below", "Contributions",
+        "Matched in 4 classes", "A linear chain would miss", "Quantiles of the closing link",
     ):  # fmt: skip
         assert words in text, words
 

@@ -102,9 +102,9 @@ def test_right_chain_is_accepted():
     ("arguments", "name", "quiet", "verbose"),
     [
         (["design", STUDY], "design.json", "run", "seed"),
-        (["fit", STUDY, "--data", TABLE], "fit.json", "significant at", "sum of squares"),
+        (["fit", STUDY, "--data", TABLE], "fit.json", "Significant at", "sum of squares"),
         (["front", "brief", "--data", TABLE], "front.json", "baseline", "hypervolume"),
-        (["chain", str(EXAMPLES / "pocket_chain.toml")], "chain.json", "pocket_width", "contributions"),
+        (["chain", str(EXAMPLES / "pocket_chain.toml")], "chain.json", "pocket width", "Contributions"),
     ],
 )
 def test_quiet_says_less_and_out_keeps_the_record(arguments, name, quiet, verbose, tmp_path):

@@ -13,12 +13,15 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from doe.cli import app
-from doe.report.steps.fit import print_fit
+from doe.report.sections.fits import fit_blocks
+from doe.report.steps.fit import fit_record
 from doe.running.failure import StoppedError
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from doe.study_file.table import read_table
+from rbdyn.base.blocks import Detail
+from rbdyn.base.render.terminal import text
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
@@ -90,27 +93,28 @@ def test_tables_are_written_beside_the_record(finished):
     assert list(anova["source"]) == [row["source"] for row in record["anova"]]
     assert {"block", "replicate_variance"} <= set(anova["source"])
     assert record["rival"]["recommended"] in ("polynomial", "gaussian_process")
-    assert set(record["sentences"]) <= set(printed.splitlines())
+    said = [sentence.partition(": ")[2] for sentence in record["sentences"]]
+    assert {sentence[:1].upper() + sentence[1:] for sentence in said} <= set(printed.splitlines())
 
 
 def test_a_statistician_recognises_the_tables(finished):
     printed, _ = finished
     for words in ("sum of squares", "mean square", "standard error", "95 % from", "VIF", "cook", "***"):
         assert words in printed
-    assert "A = radial_clearance_mm, B = guide_clearance_mm" in printed
+    assert "A = radial clearance [mm], B = guide clearance [mm]" in printed
 
 
-def test_equations_are_in_coded_and_in_actual_units(tmp_path, capsys):
+def test_equations_are_in_coded_and_in_actual_units(tmp_path):
     TABLE.to_csv(tmp_path / "table.csv", index=False)
     loaded = Study.load(study(tmp_path))
     surfaces = fit_surfaces(loaded, read_runs(loaded, tmp_path / "table.csv"))
-    print_fit(surfaces[:1])
-    printed = capsys.readouterr().out
-    assert "impact_force_N = +203.7 +22.979 A +17.186 B +32.248 C (coded)" in printed
-    assert "impact_force_N = -133.26 +4595.7 A +343.72 B +644.96 C (actual units)" in printed
-    print_fit(surfaces, quiet=True)
-    quiet = capsys.readouterr().out.splitlines()
-    assert all(line.partition(":")[0] in RESPONSES for line in quiet if line)
+    name, fitted = next(iter(fit_record(surfaces)["responses"].items()))
+    printed = text(fit_blocks(name, fitted, loaded.factors))
+    assert "impact force = +203.7 +22.979 A +17.186 B +32.248 C (coded)" in printed
+    assert "impact force = -133.26 +4595.7 A +343.72 B +644.96 C (actual units)" in printed
+    quiet = text(fit_blocks(name, fitted, loaded.factors), Detail.LEAST).splitlines()
+    said = [sentence.partition(": ")[2] for sentence in fitted["sentences"]]
+    assert quiet == ["impact force [N]", *(sentence[:1].upper() + sentence[1:] for sentence in said)]
 
 
 MODEL = 'model = "linear"\ngoal'

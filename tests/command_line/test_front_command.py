@@ -8,11 +8,12 @@ from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.steps.front import front_record, limit_sentence
+from doe.report.steps.front import front_record
 from doe.study.front import find_front
 from doe.study.goals import known_tolerances
 from doe.study.widest import widest_of
 from doe.study_file.front_section import Tolerances
+from rbdyn.base.words import with_error
 from rbdyn.faults import InputError
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
@@ -106,9 +107,12 @@ def test_goals_limits_and_rule_of_the_file_are_kept(tmp_path):
         # The odds follow from value and error, whatever was demanded.
         room = 400.0 - limit["value"] if limit["sense"] == "<=" else limit["value"] - 380.0
         assert (limit["probability"] > 0.5) == (room > 0.0)
-        assert limit_sentence(limit).replace("\n", "") in shown.output.replace("\n", "")
-    assert "limit: power_loss_W <= 400: " in shown.output and "0.95 demanded" in shown.output
-    assert "of the evaluated points keep all limits" in shown.output
+        sense = {"<=": "≤", ">=": "≥"}[limit["sense"]]
+        row = (line for line in shown.output.splitlines() if f"power loss [W] {sense}" in line)
+        cells = next(row).partition(sense)[2].split("  ")
+        assert with_error(limit["value"], limit["error"]) in [cell.strip() for cell in cells]
+    assert "power loss [W] ≤ 400" in shown.output and "demanded" in shown.output
+    assert "feasible share 0." in shown.output
 
 
 def test_larger_is_better_where_the_goal_says_so(tmp_path):
@@ -165,7 +169,7 @@ def test_tolerance_aware_front_stands_beside_the_plain_one(tmp_path, kind):
     assert 0.0 <= found["nominal_loss_percent"] < 20.0 < 100.0 * found["survival"]["pick"]
     if kind == "worst_case":
         shown = command(study)
-        assert "parts that still dominate the baseline" in shown.output
+        assert "Parts that still dominate the baseline" in shown.output
         # Corners of the pick's own box are no worse than its worst case.
         corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
         offsets = corners * list(found["half_widths"].values())

@@ -13,10 +13,10 @@ from doe.cli import app as doe_app
 from doe.commands.keys import kinds as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
+from rbdyn.base.words import label, quantity
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.cli.keys import _models, descriptions, keys, schema
 from rbdyn.plots.ball import label as axis_label
-from rbdyn.records.words import label, quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 

@@ -57,7 +57,7 @@ def test_defaults_stand_in_the_help_as_printed(monkeypatch):
 
 @pytest.mark.parametrize(
     ("options", "code", "words"),
-    [((), 2, "--seed 3: nothing is drawn here"), (("--race-limits", "P4"), 0, '"seed": 3')],
+    [((), 2, "--seed 3: no random numbers are used here"), (("--race-limits", "P4"), 0, '"seed": 3')],
 )
 def test_balls_are_drawn_by_a_seed_of_the_command(monkeypatch, options, code, words):
     monkeypatch.setattr(ball_studies, "SOLVED", 5)  # bearings in place of 100

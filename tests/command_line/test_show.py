@@ -125,7 +125,12 @@ def test_show_prints_a_table_beside_the_result(command, saved):
     """Show: by default it writes into a folder beside the result, whose file may be named; other turns and replicates."""
     done = command("show", saved / "result.json", "--turns", "1", "--replicate", "2", "-v")
     assert done.returncode == 0, done.stderr
-    for words in ("1 shaft turns of replicate 2, seed 1", "whirl speed over cage speed", "never touched", "peaks [Hz]"):
+    for words in (
+        "1 shaft turns of replicate 2, seed 1",
+        "whirl speed over cage speed",
+        "never touched",
+        "Peaks of the spectrum of eccentricity",
+    ):
         assert words in done.stdout
     assert {path.name for path in (saved / "show").iterdir()} == PICTURES | {
         "orbit.json",

@@ -14,9 +14,10 @@ from instant_runs import instant_result, instantly
 from short_studies import short_study
 
 from doe.cli import app as doe_app
-from rbdyn.cli import terminal
+from rbdyn.base.blocks import Table
+from rbdyn.base.render import terminal
+from rbdyn.base.render.terminal import FRAME, PADDING, parts
 from rbdyn.cli.app import app as rbdyn_app
-from rbdyn.cli.columns import FRAME, PADDING, blocks
 
 EXAMPLES = ROOT / "examples"
 BALL = str(EXAMPLES / "angular_contact_ball.toml")
@@ -55,7 +56,7 @@ def printed(monkeypatch, width: int, table: tuple) -> list[str]:
         patch.setattr(sys, "stdout", screen)
         patch.setenv("COLUMNS", str(width))
         patch.setenv("TERM", "dumb")
-        terminal.print_table(*table)
+        terminal.show([Table(*table)])
     return screen.getvalue().splitlines()
 
 
@@ -66,10 +67,10 @@ def tables_of(monkeypatch, run) -> list[tuple]:
     def keep(texts, room):
         header, *rows = zip(*texts, strict=True)
         tables.append(("", header, rows))
-        return blocks(texts, room)
+        return parts(texts, room)
 
     with monkeypatch.context() as patch:
-        patch.setattr(terminal, "blocks", keep)
+        patch.setattr(terminal, "parts", keep)
         run()
     return tables
 
@@ -97,9 +98,10 @@ def test_no_word_of_a_heading_is_broken(monkeypatch, tmp_path, name):
 
 def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
     from doe.commands.study import study
+    from doe.report.study.summary import summary
 
     def write(outcome, folder: Path) -> dict:
-        record = {"inputs": outcome.inputs, "files": [], "status": "ok", "limits_sentence": ""}
+        record = summary(outcome) | {"files": []}
         (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
         return record
 
@@ -115,10 +117,10 @@ def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
 def test_columns_fill_the_room_and_only_what_has_none_is_broken(room):
     header = ["run", *(f"a_long_name_of_factor_{number}" for number in range(9)), "a verdict in words", "87.09 ± 0.35"]
     rows = [["1", *["0.125"] * 9, "far more than its error, and in all of the replicates", "1.2 ± 0.4"]]
-    parts = blocks([*zip(header, *rows, strict=True)], room)
-    assert sorted({place for part in parts for place, _ in part}) == list(range(len(header)))
-    for part in parts:
+    broken = parts([*zip(header, *rows, strict=True)], room)
+    assert sorted({place for part in broken for place, _ in part}) == list(range(len(header)))
+    for part in broken:
         assert part[0][0] == 0 and FRAME + sum(width + PADDING for _, width in part) <= room
         assert all(width >= max(map(len, header[place].split())) for place, width in part)
-    assert blocks([("x" * 300, "1"), ("y" * 300, "2")], room)[0][1][1] < room
-    assert blocks([("only",)], room) == [[(0, 4)]]
+    assert parts([("x" * 300, "1"), ("y" * 300, "2")], room)[0][1][1] < room
+    assert parts([("only",)], room) == [[(0, 4)]]

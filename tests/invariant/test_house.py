@@ -30,7 +30,6 @@ EDGES = {
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
     "doe/study": "asks for chains",
-    "doe/report/": "shows chains",
 }
 
 

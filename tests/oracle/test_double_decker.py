@@ -343,7 +343,7 @@ def test_unit_command_prints_both_rows(tmp_path):
 
     printed = CliRunner().invoke(app, ["ball", str(FILE), "--out", str(tmp_path)])
     assert printed.exit_code == 0
-    for words in ("inner row", "outer row", "middle ring: 575.8 rpm", "both rows: x 2.997 um"):
+    for words in ("inner row", "outer row", "middle ring: 575.8 rpm", "both rows: x 2.997 µm"):
         assert words in printed.stdout
     assert len((tmp_path / "balls.csv").read_text().splitlines()) == 1 + 17 + 21
     as_json = CliRunner().invoke(app, ["ball", str(FILE), "--json", "--set", "operation.tilt=free"])

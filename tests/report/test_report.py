@@ -28,8 +28,8 @@ from doe.study.edge import Outward
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from rbdyn.base.words import label, quantity, shown, with_error
 from rbdyn.plots.roller import cage_orbit
-from rbdyn.records.words import label, quantity, shown, with_error
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 VOID = {"meta", "input"}
@@ -104,7 +104,7 @@ def test_answer_comes_first(page):
         "9.2400 0/-0.0050",
         "11.16 ± 0.65 % less",
         "▲ better",
-        "pocket 0.999976",
+        "yield 0.9999760 ± 0.0000098",
     ):
         assert text in answer
     assert "impact force [N]" in answer and "impact_force_N" not in answer
@@ -119,7 +119,7 @@ def test_every_section_is_in_the_contents(page):
 def test_missing_parts_leave_their_section_out(section):
     record = summary() | dict.fromkeys(OPTIONAL[section])
     if section == "answer":
-        record["front"] = None
+        record["front"] = record["direct"] = None
     outline = Outline(html_report(record))
     assert section not in outline.ids and section not in outline.links
     assert set(outline.links) <= set(outline.ids)
@@ -329,7 +329,7 @@ def test_error_bars_end_at_the_frame():
 def test_beyond_the_edge_each_response_has_direction_and_unit():
     gains = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
     told = Outward("guide_clearance_mm", "upper", 0.25, "µm", "simulation", gains, {"cage_speed_rpm": "max"}).sentence
-    assert "bound of the region, 0.25 mm; to be expected per µm" in told
+    assert "is at its upper bound, 0.25 mm. Extrapolated change per µm beyond it by simulation" in told
     assert (
         "impact_force_N 0.20 ± 0.40 N less, power_loss_W 0.50 ± 0.10 W more, cage_speed_rpm 3.0 ± 1.0 rpm more" in told
     )
@@ -380,6 +380,6 @@ def test_the_verdict_over_what_is_not_known_comes_first():
     page = html_report(record, motion())
     words, section = " ".join(Outline(page).words), page[page.index('id="answer"') :]
     assert section[: section.index("</p>")].endswith(sentence)
-    assert words.index(sentence) < words.index("Over what is not known")
+    assert words.index(sentence) < words.index("Over the unknown inputs")
     assert "3.1 %, 80 (70 to 90)" in words and "57 (51 to 63)" in words
     assert sentence in markdown_report(record, [])

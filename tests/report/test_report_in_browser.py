@@ -12,7 +12,7 @@ from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
 
 from doe.report.html import html_report
-from rbdyn.records.words import with_error
+from rbdyn.base.words import with_error
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from conftest import lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy.options import OPTIONS, option_costs, study, with_options
+from rbdyn.base.ranges import axis_values
 from rbdyn.cli.app import _write_map as write
-from rbdyn.cli.ranges import axis_values
 from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene

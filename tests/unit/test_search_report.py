@@ -17,7 +17,6 @@ from doe import clearance
 from doe.adaptive.candidates import Region
 from doe.adaptive.runs import Face
 from doe.pareto.search import REFERENCE
-from doe.report.sections.blocks import Figures
 from doe.report.sections.searches import in_few_runs
 from doe.report.steps.search_words import SURE, held_sentence
 from doe.report.study.files import write
@@ -26,6 +25,7 @@ from doe.study.held import pulls
 from doe.study.limits import Limit
 from doe.study.whole import run_study
 from doe.study_file import Study
+from rbdyn.base.blocks import Figures
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
 
@@ -111,15 +111,15 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     for name, gain in record["gains"].items():
         assert f"{name} {abs(gain['percent']):.2f} %" in answer
     assert f"because {record['adaptive']['stopped']}: {record['adaptive']['runs']} runs" in spent
-    assert held == record["adaptive"]["held"] and held.startswith("What holds the pick: ")
+    assert held == record["adaptive"]["held"] and held.startswith("What limits the pick: ")
     fresh = outcome.adaptive.found
     claimed = np.hypot(fresh.bias, fresh.spread)
     assert all(f"{times:.1f}" in trust for times in claimed)
-    assert ("no more than they knew" in trust) == bool((claimed <= SURE).all())
+    assert ("as their stated uncertainty allows" in trust) == bool((claimed <= SURE).all())
     compared = record["adaptive"]["compared"]
     assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.index("The pick has") < page.index('class="tiles"') < page.index("The search ended because")
+    assert page.index("The pick has") < page.index("The search ended because") < page.index('class="tiles"')
 
 
 def foretelling(predict, faces=()):
@@ -159,11 +159,11 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
     told = held_sentence(outcome)
     assert "where impact_force_N turns" in told
     assert "whirl_deviation_ratio would gain with more and impact_force_N would gain with less" in told
-    assert "(the front goes on beyond with a probability of 0.97), beyond which no bearing that keeps" in told
+    assert "(the front goes on beyond with a probability of 0.97), beyond it the bearing would lose" in told
     assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
     assert "dimension chain pocket cannot" in told and "guide cannot" not in told
     outcome.pick.point = centre - half
-    assert "where the region of the design ends and no allowed" in held_sentence(outcome), "its own pick lay elsewhere"
+    assert "at the edge of the design region; set allowed" in held_sentence(outcome), "its own pick lay elsewhere"
     factors = [each.model_copy(update={"allowed": (0.01, 0.5)}) for each in study.file.factor]
     outcome.study = replace(study, file=study.file.model_copy(update={"factor": factors}))
     assert "where the region searched ends" in held_sentence(outcome), "it might have grown"

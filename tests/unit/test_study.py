@@ -73,7 +73,7 @@ def test_a_finished_study_is_not_done_again(finished):
     command = [sys.executable, "-m", "doe", "study", str(outcome.study.path), "--out", str(folder)]
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "finished before, nothing has changed since" in shown
-    assert f"pick: {outcome.pick.reason}" in shown
+    assert f"Why this point: {outcome.pick.reason}." in shown
     asked = inputs_digest(outcome.study)
     assert is_finished(folder, asked)["pick"] == dict(
         zip(outcome.study.factors, outcome.pick.point.tolist(), strict=True)

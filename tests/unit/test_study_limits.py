@@ -126,7 +126,7 @@ def test_a_broken_limit_is_said_first_and_fails_the_study_also_when_asked_again(
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact_force_N <= 35")
+        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact force <= 35")
         assert "2 points were tried" in shown.stdout
     assert "finished before" in again.stdout
     record = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
@@ -172,7 +172,10 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     # Two a coded unit of 50 µm.
     gain, error = outward.gains["impact_force_N"]
     assert gain == pytest.approx(0.04, rel=1e-4) and error < 1e-6
-    assert "THE PICK LIES AT THE EDGE" in edge.sentence and "50 % of the front" in edge.sentence
+    assert (
+        "The pick is at the edge of the design region: guide_clearance_mm is at its upper bound" in edge.sentence
+        and "50 % of the front" in edge.sentence
+    )
     inside = SimpleNamespace(point=study.centre)
     assert not edge_of(study, surfaces, inside, study.centre[None], None, None).outward
 

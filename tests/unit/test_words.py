@@ -8,7 +8,7 @@ import pytest
 from conftest import EXAMPLE
 from instant_runs import instant_result
 
-from rbdyn.records.words import are, counted
+from rbdyn.base.words import are, counted
 from rbdyn.scene import Scene
 
 

@@ -7,7 +7,7 @@ from doe.report.sections.answer import tolerance_of
 from doe.report.sections.fronts import bounds, complete, fronts, picks
 from doe.report.sections.record import Factor, Record, factors, fits, part, responses
 from doe.report.words import rounded_down
-from rbdyn.records.words import quantity
+from rbdyn.base.words import quantity
 
 
 def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,6 @@
-"""What a report says, as blocks that HTML and Markdown both render.
+"""What a report says, as blocks that terminal, Markdown and HTML render.
 
-- ``blocks``: words, tables, figures, places for interactive pictures
-- ``record``: reading summary.json, any part of which may be missing
+- ``record``: reading of summary.json, any part of which may be missing
 - ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``contents``: the sections, in this order
 - ``plot``: static pictures as SVG; ``plots_of_fits``, ``plots_of_fronts`` draw most of them
 """

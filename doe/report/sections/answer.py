@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
-from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down, share_with_interval
-from rbdyn.records.words import chance, label, quantity, shown, with_error
+from doe.report.sections.parts import chain_blocks
+from doe.report.sections.record import Factor, Record, factors, nearest, part, responses
+from doe.report.words import SENSES, change, half_width, of_hundred, rounded_down, share_with_interval
+from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Section, Table, Tile, Tiles
+from rbdyn.base.words import chance, label, quantity, shown, with_error
 
-# Characters above which a value is a sentence, to be broken.
-LONG = 40
 # What a clearance of the scene is, by its key.
 CLEARANCES = {
     "bearing.radial_clearance_mm": "in the bearing diametral",
@@ -18,42 +17,82 @@ CLEARANCES = {
     "cage.pocket_radial_clearance_mm": "at the pocket's lips radial",
 }
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
+LIMITS_NOTE = "A limit is kept or broken where it is by more than the error, else undecided. The probability is that of keeping it by that error."
 LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Clearances, gains, whether they are real, and the parts to make."""
-    robust = part(summary, "robust") or {"sentences": []}
-    blocks: list[Block] = [Words(each, "statement") for each in robust["sentences"]]
-    blocks.append(Words(part(summary, "limits_sentence") or "", "statement"))
+    """The verdict over the unknown inputs and the limits, then what an engineer acts on."""
+    return Section("answer", "The answer", [*verdict(summary), *advice(summary)])
+
+
+def verdict(summary: Record) -> list[Block]:
+    """Whether the pick is better over the unknown inputs, and what became of the limits: the first that is to be read."""
+    sentences = [*(part(summary, "robust", "sentences") or []), part(summary, "limits_sentence") or ""]
+    return [Paragraph(sentence, "statement") for sentence in sentences]
+
+
+def advice(summary: Record) -> list[Block]:
+    """Clearances, gains, whether they are real, limits, why this point, what lies beyond, and the parts to make."""
     searched = part(summary, "adaptive", "sentences") or [""]
-    blocks.append(Words(searched[0], "statement"))
-    if pick := part(summary, "pick"):
-        blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
-        if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
-            drawn = (
-                " Those in operation are what fits, heat and rotation leave."
-                if part(summary, "operating_clearances_mm")
-                else ""
-            )
-            blocks.append(Words(f"Clearances: {', '.join(plays)}.{drawn}", "note"))
-        blocks.append(Words(part(summary, "clearance_class") or "", "note"))
-    blocks += [Words(statement(summary), "statement"), Words(part(summary, "whirl_sentence") or "", "statement")]
-    blocks += [_gains(summary), limits(summary, ("baseline", "pick"))]
-    blocks.append(_held(summary))
-    blocks += [Words(part(summary, "edge", "sentence") or ""), Bullets(searched[1:]), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
-    if reason:
-        blocks.append(Words(f"Why this point: {reason}.", "note"))
-    return Section("answer", "The answer", blocks)
+    why = f"Why this point: {reason}." if reason else ""
+    return [
+        *_direct(summary),
+        Paragraph(searched[0], "statement"),
+        Bullets(searched[1:]),
+        *_clearances(summary),
+        _gains(summary),
+        Paragraph(statement(summary), "statement"),
+        Paragraph(part(summary, "whirl_sentence") or "", "statement"),
+        _robust_points(summary),
+        _limits_judged(summary),
+        Paragraph(why),
+        Paragraph(part(summary, "edge", "sentence") or ""),
+        *_parts_to_make(summary),
+    ]
 
 
-def _held(summary: Record) -> Table:
-    """Pick and points of the robust front over what is not known: the gain that they keep, and in how many cases it is one."""
+def _parts_to_make(summary: Record) -> list[Block]:
+    """Every dimension chain; what only a careful reader asks for stands in a section of its own."""
+    chains = part(summary, "chains") or {}
+    whole = [block for name, chain in chains.items() for block in chain_blocks(name, chain)]
+    return [block for block in whole if block.detail < Detail.ALL]
+
+
+def _direct(summary: Record) -> list[Block]:
+    """What a direct front cost, and what the surfaces lose against it."""
+    direct = part(summary, "direct") or {}
+    spent = ""
+    if direct.get("evaluations") is not None and direct.get("seconds") is not None:
+        spent = f"Direct front: {direct['evaluations']} simulations in {direct['seconds']:.0f} s. "
+    run = f"A run of the direct search: {direct['run']}" if direct.get("run") else ""
+    return [Paragraph(f"{spent}{direct.get('sentence') or ''}"), Paragraph(run)]
+
+
+def _clearances(summary: Record) -> list[Block]:
+    """The pick with its tolerances next to the baseline, what its clearances are, and the bearing's class."""
+    pick = part(summary, "pick") or {}
+    tiles = [_tile(summary, each, pick) for each in factors(summary) if each.name in pick]
+    plays = [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]
+    means = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
+    if means and part(summary, "operating_clearances_mm"):
+        means += " Those in operation are what fits, heat and rotation leave."
+    tolerated = part(summary, "tolerances_sentence")
+    return [
+        Tiles("Chosen clearances", "pick", tiles),
+        Paragraph(means, "small"),
+        Paragraph(part(summary, "clearance_class") or "", "small"),
+        Paragraph(f"Tolerances: {tolerated}" if tolerated else ""),
+    ]
+
+
+def _robust_points(summary: Record) -> Table:
+    """Pick and points of the robust front over the unknown inputs: the gain that they keep, and in how many cases it is one."""
     names = [each["name"] for each in responses(summary)]
     rows = [
         [
-            point["name"],
+            point["name"].removeprefix("robust "),
             *(each.text(part(point, "factors", each.name), 1) for each in factors(summary)),
             *(_kept(part(point, "gains", name), part(point, "better", name)) for name in names),
             _kept(None, point["all"]),
@@ -61,8 +100,8 @@ def _held(summary: Record) -> Table:
         for point in part(summary, "robust", "front", "confirmed") or []
     ]
     header = ("", *(label(each.name) for each in factors(summary)), *(quantity(name)[0] for name in names), "all")
-    note = "Gain over the baseline that is kept over what is not known, and in how many of 100 cases it is one."
-    return Table("Over what is not known", header, rows, note)
+    note = "Gain over the baseline that is kept over the unknown inputs, and in how many of 100 cases it is one."
+    return Table("Over the unknown inputs", header, rows, note)
 
 
 def _kept(gain: float | None, share: Sequence[float] | None) -> str:
@@ -71,15 +110,18 @@ def _kept(gain: float | None, share: Sequence[float] | None) -> str:
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
-    beneath = []
-    if running := part(summary, "operating_clearances_mm", factor.name):
-        beneath.append(f"in operation {factor.text(running.get('pick'))} {factor.unit}".strip())
-    if tolerance := tolerance_of(summary, factor):
-        beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
-    baseline = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors")
-    if baseline and factor.name in baseline:
-        beneath.append(f"baseline {factor.text(baseline[factor.name])} {factor.unit}".strip())
-    return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, beneath)
+    running = part(summary, "operating_clearances_mm", factor.name) or {}
+    before = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors") or {}
+    tolerance = tolerance_of(summary, factor)
+    further = {
+        "baseline": factor.text(before.get(factor.name)),
+        "in operation": factor.text(running.get("pick")),
+        "baseline in operation": factor.text(running.get("baseline")),
+        "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
+    }
+    return Tile(
+        factor.words, factor.text(pick[factor.name]), factor.unit, [each for each in further.items() if each[1]]
+    )
 
 
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
@@ -102,69 +144,65 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
     rows = [
-        (label(name), *(_value(column.get(name)) for column in columns), change(gain), verdict(gain))
+        (label(name), *(_value(column.get(name)) for column in columns), change(gain), sign_of(gain))
         for name, gain in gains.items()
     ]
     header = ("response", "baseline", "pick", "change", "verdict")
     return Table("Changes confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
 
 
-def limits(summary: Record, names: Sequence[str] = ()) -> Table:
-    """Limits judged by simulation at the points of these names, at every confirmed point without any."""
-    points = part(summary, "confirmation") or {}
+def limits(summary: Record) -> Table:
+    """Limits judged by simulation at every confirmed point."""
     rows = [
-        (
-            name.replace("_", " "),
-            f"{label(response)} {limit.get('sense') or ''} {shown(limit.get('bound'))}",
-            with_error(limit.get("value"), limit.get("error")),
-            LIMITS.get(str(limit.get("verdict")), ""),
-            "" if limit.get("probability") is None else chance(limit["probability"]),
-            of_hundred(odds) if name == "pick" and (odds := part(summary, "limits", response, "odds")) else "",
-        )
-        for name in names or points
-        for response, limit in (part(points, name, "limits") or {}).items()
+        (name.replace("_", " "), _bound(limit), with_error(limit.get("value"), limit.get("error")), *_judged(limit))
+        for name, point in (part(summary, "confirmation") or {}).items()
+        for limit in _limits_of(point)
     ]
-    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it "
-    note += "by that error; over the unknown inputs, in how many of 100 cases the pick keeps it."
-    header = ("point", "limit", "simulated", "verdict", "probability", "over unknown inputs")
-    return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
+    header = ("point", "limit", "simulated", "verdict", "probability")
+    return Table("Limits judged by simulation, every point", header, rows, LIMITS_NOTE, text_columns=(1, 3))
 
 
-def verdict(gain: Record) -> str:
+def _limits_judged(summary: Record) -> Table:
+    """Every limit at the baseline and at the pick, and the odds that the pick keeps all those of a response."""
+    before, after = (_limits_of(part(summary, "confirmation", name) or {}) for name in ("baseline", "pick"))
+    rows = []
+    for place, limit in enumerate(after):
+        base = before[place] if place < len(before) else {}
+        odds = part(summary, "limits", str(limit["response"]), "odds")
+        rows.append(
+            (
+                _bound(limit),
+                with_error(base.get("value"), base.get("error")),
+                _judged(base)[0],
+                with_error(limit.get("value"), limit.get("error")),
+                *_judged(limit),
+                of_hundred(odds) if odds else "",
+            )
+        )
+    shares = "kept in 100 cases of the unknown inputs"
+    header = ("limit", "baseline", "verdict", "pick", "verdict", "probability", shares)
+    return Table("Limits judged by simulation", header, rows, LIMITS_NOTE, text_columns=(2, 4))
+
+
+def _limits_of(point: Record) -> list[Record]:
+    """Limits at a confirmed point, a lower and an upper one of a response each by itself where the record tells both."""
+    every: list[Record] | None = point.get("every_limit")
+    return every or [{"response": name, **limit} for name, limit in (point.get("limits") or {}).items()]
+
+
+def _bound(limit: Record) -> str:
+    return f"{label(str(limit['response']))} {SENSES.get(str(limit.get('sense')), '')} {shown(limit.get('bound'))}"
+
+
+def _judged(limit: Record) -> tuple[str, str]:
+    """The verdict with its sign, and the probability of keeping the limit."""
+    probability = limit.get("probability")
+    return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
+
+
+def sign_of(gain: Record) -> str:
     """With a sign that is told without colour."""
     return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
-
-
-def part_dimensions(summary: Record) -> Table:
-    """Parts of every chain."""
-    rows = []
-    chains = part(summary, "chains") or {}
-    for name, chain in chains.items():
-        for each, dimensions in allocation(chain).items():
-            told = (dimension(dimensions), dimensions.get("grade") or "", moved(dimensions))
-            rows.append((label(each), *told, label(name)))
-    header = ("part", "dimension [mm]", "grade", "nominal moved [mm]", "chain")
-    return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 4))
-
-
-def allocation(chain: Record) -> dict[str, Any]:
-    """Parts of a chain whose dimensions are known."""
-    wanted = {"nominal_mm", "upper_mm", "lower_mm"}
-    return {name: each for name, each in (chain.get("allocation") or {}).items() if wanted <= set(each)}
-
-
-def _yields(chains: Record) -> str:
-    """Yield of each chain that is not refused, and which are."""
-    refused = [name for name, chain in chains.items() if str(chain.get("status")).startswith("refused")]
-    known = [
-        f"{label(name)} {share:.6f}"
-        for name, chain in chains.items()
-        if name not in refused and (share := part(chain, "yield", "as_given")) is not None
-    ]
-    said = [f"Yield: {', '.join(known)}."] if known else []
-    if refused:
-        said.append(f"Refused: {', '.join(map(label, refused))}; the parts shown are the nearest that fit.")
-    return " ".join(said)
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -186,7 +224,7 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     files = [f"study {record['study_file']}"] if record.get("study_file") else []
     files += [f"scene {record['scene_file']}"] if record.get("scene_file") else []
     if text := "; ".join([", ".join(files), ", ".join(effort)]).strip("; "):
-        blocks.append(Words(text[0].upper() + text[1:] + "."))
+        blocks.append(Paragraph(text[0].upper() + text[1:] + "."))
     rows = [
         (
             f"{each.letter}: {label(each.name)}",
@@ -255,27 +293,40 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
         found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(each), change(gain), change(found.get(each) or {}), verdict(found.get(each) or {})]
+            [label(each), change(gain), change(found.get(each) or {}), sign_of(found.get(each) or {})]
             for each, gain in predicted.items()
         ]
         columns = ("response", "on the surfaces", "simulated", "verdict")
         caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
-    gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
-    if gained:
-        rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
-        caption = "Changes from the baseline at every confirmed point"
-        note = "▲ better, ▼ worse, ● within its 95 % error."
-        blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
+    blocks.append(changes(summary))
     blocks.append(limits(summary))
     reasons = [(name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")]
     blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
     return Section("confirmation", "Confirmation", blocks)
 
 
+def changes(summary: Record) -> Table:
+    """Gains over the baseline at every confirmed point that has any."""
+    names = [each["name"] for each in responses(summary)]
+    rows = [
+        [
+            name.replace("_", " "),
+            *(each.text(part(point, "factors", each.name)) for each in factors(summary)),
+            *(_signed(point["gains"].get(each)) for each in names),
+        ]
+        for name, point in (part(summary, "confirmation") or {}).items()
+        if point.get("gains")
+    ]
+    caption = "Changes from the baseline at every confirmed point"
+    note = "▲ better, ▼ worse, ● within its 95 % error."
+    header = ("point", *(label(each.name) for each in factors(summary)), *(quantity(each)[0] for each in names))
+    return Table(caption, header, rows, note, detail=Detail.USUAL)
+
+
 def _signed(gain: Record | None) -> str:
     """A gain with the sign of its verdict."""
-    return f"{verdict(gain)[:1]} {change(gain)}" if gain else ""
+    return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
 
 
 def _value(found: Record | None) -> str:
@@ -298,10 +349,3 @@ def tolerances(summary: Record) -> Table:
     ]
     header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
-
-
-def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
-    """Everything in nested tables, a row each."""
-    rows = list(scalars(record or {}))
-    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
-    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)

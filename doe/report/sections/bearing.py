@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from doe.report.sections.blocks import Block, Figures, Section, Table, Widget
 from doe.report.sections.plot import Plot, span, ticks, wide_svg
 from doe.report.sections.record import Record, part
+from rbdyn.base.blocks import Block, Figures, Section, Table, Widget
 
 
 def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:

@@ -1,36 +1,46 @@
 """All sections of a report in the order in which they are read; what the summary does not hold is left out. The last ones
-stand here: a published table beside, settings, versions, cost, notes, failures."""
+stand here: a published table, settings, versions, cost, notes, failures."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import PurePath
 from typing import Any
 
 from doe.report.sections import answer, bearing, experiments, fits, fronts, parts
-from doe.report.sections.answer import record_table
-from doe.report.sections.blocks import Block, Bullets, Section, Table, Words
 from doe.report.sections.experiments import failure_table
-from doe.report.sections.record import Record, factors, part, responses
-from rbdyn.records.words import label, quantity, shown
+from doe.report.sections.record import Record, factors, part, record_table, responses
+from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Section, Table, says
+from rbdyn.base.words import label, quantity, shown
 
 
-def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Levels, effects and ranks beside a published table, with the reasons for what differs."""
+def reference(summary: Record, motion: Mapping[str, Any]) -> Section:
+    """Levels, effects and ranks next to a published table, with the reasons for what differs."""
     levels, effects, words = [], [], []
     for name, each in (part(summary, "beside_reference") or {}).items():
         for whose in ("ours", "theirs"):
             known = each.get(f"{whose}_min_mean_max") or ("",) * 3
-            levels.append((f"{label(name)}, {whose}", *map(shown, known)))
+            ranks = shown(each.get("rank_correlation"), 2) if whose == "ours" else ""
+            levels.append((f"{label(name)}, {whose}", *map(shown, known), ranks))
         for factor, effect in (each.get("linear_effects") or {}).items():
             sign = "same" if effect.get("same_sign") else "opposite"
-            sizes = (shown(effect.get(whose), 3) for whose in ("ours", "theirs"))
+            sizes = (_effect(effect, whose) for whose in ("ours", "theirs"))
             effects.append((label(name), label(factor), *sizes, sign))
         words.append(" ".join(filter(None, (each.get("verdict"), each.get("why")))))
-    blocks: list[Block] = [Bullets([text for text in words if text])]
-    blocks.append(Table("Levels", ("response", "least", "mean", "largest"), levels))
+    levels_header = ("response", "least", "mean", "largest", "rank correlation")
     header = ("response", "factor", "ours", "theirs", "sign")
-    blocks.append(Table("Linear effects a coded unit", header, effects, text_columns=(1, 4)))
-    return Section("reference", "Beside the published table", blocks)
+    caption = "Linear effects a coded unit (* significant at 5 %)"
+    blocks: list[Block] = [
+        Bullets([text for text in words if text], detail=Detail.USUAL),
+        Table("Levels", levels_header, levels, detail=Detail.USUAL),
+        Table(caption, header, effects, text_columns=(1, 4), detail=Detail.USUAL),
+    ]
+    return Section("reference", "Compared with the published table", blocks)
+
+
+def _effect(effect: Record, whose: str) -> str:
+    """An effect, starred where it is significant."""
+    size = effect.get(whose)
+    return "" if size is None else f"{size:+.3g}{'*' if effect.get(f'{whose}_significant') else ''}"
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -40,10 +50,12 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     return Section("settings", "Settings, versions, cost", tables)
 
 
-def notes(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Limits of the model that the runs met, and what failed."""
-    said = Bullets([str(note) for note in part(summary, "notes") or []])
-    return Section("notes", "Notes and failures", [said, failure_table(part(summary, "failures") or [])])
+def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
+    """What failed, and limits of the model that the runs met."""
+    failures = failure_table(part(summary, "failures") or [])
+    return Section(
+        "notes", "Notes and failures", [failures, *(Note(str(note)) for note in part(summary, "notes") or [])]
+    )
 
 
 CHAPTERS = (
@@ -64,35 +76,31 @@ CHAPTERS = (
 
 
 def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
-    """Sections with something to say."""
+    """Sections with something to say, of a record without what is undefined (``known``)."""
     found = [chapter(summary, motion or {}) for chapter in CHAPTERS]
+    whole = [replace(each, blocks=readable(each.blocks, summary)) for each in found if each]
+    return [section for section in whole if section.blocks]
+
+
+def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
+    """Blocks with something to say: quantities by their words in sentences, tables without empty columns."""
     names = [*(each.name for each in factors(summary)), *(each["name"] for each in responses(summary))]
-    words = {name: quantity(name)[0] for name in names}
-    whole = [(each, [_readable(block, words) for block in each.blocks if _says(block)]) for each in found if each]
-    return [replace(section, blocks=blocks) for section, blocks in whole if blocks]
+    # The longest first, for a name may begin with another.
+    words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
+    return [_spelt(block, words) for block in blocks if says(block)]
 
 
-def _says(block: Block) -> bool:
-    """Whether there is anything in a block: a table has rows, a list items, a paragraph words."""
-    match block:
-        case Table(rows=content) | Bullets(items=content) | Words(text=content):
-            return bool(content)
-    return True
-
-
-def _readable(block: Block, words: Mapping[str, str]) -> Block:
-    """Sentences with quantities by their words; tables without empty columns."""
-
+def _spelt(block: Block, words: Mapping[str, str]) -> Block:
     def spelt(text: str) -> str:
         for name, spoken in words.items():
             text = text.replace(name, spoken)
         return text
 
     match block:
-        case Words(text):
+        case Paragraph(text) | Note(text):
             return replace(block, text=spelt(text))
         case Bullets(items):
-            return Bullets([spelt(item) for item in items])
+            return replace(block, items=[spelt(item) for item in items])
         case Table():
             return block.without_empty_columns()
     return block

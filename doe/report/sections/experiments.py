@@ -4,11 +4,10 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.report.sections.answer import record_table
-from doe.report.sections.blocks import Block, Figures, Section, Table, Words
 from doe.report.sections.plots_of_fits import evaluation_plots
-from doe.report.sections.record import Record, factors, part, responses
-from rbdyn.records.words import label, shown, with_error
+from doe.report.sections.record import Record, factors, part, record_table, responses
+from rbdyn.base.blocks import Block, Figures, Paragraph, Section, Table
+from rbdyn.base.words import label, shown, with_error
 
 # Longer tables are opened on demand.
 LONG = 40
@@ -20,7 +19,7 @@ def design(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if not record:
         return None
     kind = str(record.get("kind") or "design").replace("_", " ")
-    blocks: list[Block] = [Words(f"{kind[0].upper()}{kind[1:]}, {shown(record.get('runs'))} runs.")]
+    blocks: list[Block] = [Paragraph(f"{kind[0].upper()}{kind[1:]}, {shown(record.get('runs'))} runs.")]
     if points := record.get("points"):
         blocks.append(_points(summary, points))
     if evaluation := record.get("evaluation"):

@@ -1,14 +1,15 @@
 """Response surfaces and whether they can be trusted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from string import ascii_uppercase
 from typing import Any
 
-from doe.report.sections.answer import record_table
-from doe.report.sections.blocks import Block, Bullets, Figures, Heading, Section, Table, Widget
 from doe.report.sections.plots_of_fits import diagnostic_plots
-from doe.report.sections.record import Record, factors, fits, part
+from doe.report.sections.record import Record, factors, fits, part, record_table
 from doe.report.words import probability
-from rbdyn.records.words import label, shown, with_error
+from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
+from rbdyn.base.words import counted, label, quantity, shown, with_error
 
 STATISTICS = (
     ("r2", "R²"), ("adjusted_r2", "adjusted R²"), ("predicted_r2", "predicted R²"), ("press", "PRESS"),
@@ -16,6 +17,9 @@ STATISTICS = (
 )  # fmt: skip
 
 
+STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+LEGEND = "*** p <= 0.001, ** p <= 0.01, * p <= 0.05; sums of squares of terms are partial (type III)"
+RUN_COLUMNS = ("observed", "predicted", "residual", "standardized", "studentized", "leverage", "cook")
 # Parts of a fit that are shown as they are.
 FURTHER = ("box_cox", "blocks", "canonical", "known_variance", "rival")
 
@@ -59,7 +63,7 @@ def _stationary(summary: Record, fitted: Record) -> Table:
     return Table("Stationary points", header, rows, "A point outside the region is an extrapolation.", text_columns=(len(given) + 1,))  # fmt: skip
 
 
-def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section:
     """Analysis of variance, what it says, and pictures of the residuals, a response at a time."""
     fitted = fits(summary)
     rows = [
@@ -68,31 +72,98 @@ def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     ]
     header = ["response", *(words for _, words in STATISTICS), "p of lack of fit"]
     blocks: list[Block] = [Table("Quality of the fits", header, rows)]
+    names = [each.name for each in factors(summary)]
     for name, each in fitted.items():
-        blocks += _one(name, each)
+        blocks += fit_blocks(name, each, names)
     return Section("diagnostics", "Diagnostics", blocks)
 
 
-def _one(name: str, fitted: Record) -> list[Block]:
-    blocks: list[Block] = [Heading(label(name))]
+def fit_blocks(name: str, fitted: Record, names: Sequence[str] = ()) -> list[Block]:
+    """One fit: analysis of variance, coefficients, equations, what they say; for who asks for all every run.
+
+    names : the factors behind the letters of the terms.
+    """
     # The heading says already of which response they speak.
     said = [sentence.removeprefix(f"{name}: ") for sentence in fitted.get("sentences") or []]
-    blocks.append(Bullets([text[:1].upper() + text[1:] for text in said]))
-    if runs := part(fitted, "diagnostics", "runs"):
-        caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
-        blocks.append(Figures(diagnostic_plots(name, runs), caption))
-    rows = [
-        (row["source"].replace("_", " "), shown(row.get("ss"), 5), shown(row.get("df")), shown(row.get("ms"), 5),
-         shown(row.get("f")), probability(row.get("p")))
-        for row in fitted.get("anova") or []
-        if "source" in row
-    ]  # fmt: skip
-    header = ("source", "sum of squares", "df", "mean square", "F", "p")
-    blocks.append(Table(f"Analysis of variance of {label(name)}", header, rows))
-    rest = {
+    runs = part(fitted, "diagnostics", "runs") or []
+    caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
+    further = {
         key: {name: value for name, value in fitted[key].items() if name != "sentence"}
         for key in FURTHER
         if isinstance(fitted.get(key), Mapping)
     }
-    blocks.append(record_table(f"Further figures of {label(name)}", rest, folded=True))
-    return blocks
+    return [
+        Heading(label(name)),
+        _anova(name, fitted),
+        _coefficients(name, fitted),
+        *(Paragraph(text, detail=Detail.USUAL) for text in (*_equations(name, fitted, names), _quality(fitted))),
+        Bullets([text[:1].upper() + text[1:] for text in said]),
+        Figures(diagnostic_plots(name, runs) if runs else (), caption),
+        _runs(name, runs),
+        replace(record_table(f"Further figures of {label(name)}", further, folded=True), detail=Detail.ALL),
+    ]
+
+
+def _anova(name: str, fitted: Record) -> Table:
+    rows = [
+        (row["source"].replace("_", " "), shown(row.get("ss"), 5), shown(row.get("df")), shown(row.get("ms"), 5),
+         shown(row.get("f")), *_significance(row.get("p")))
+        for row in fitted.get("anova") or []
+        if "source" in row
+    ]  # fmt: skip
+    weights = ", weights 1 / variance of the replicates" if fitted.get("weighting") == "replicates" else ""
+    power = "" if fitted.get("transform") is None else f", Box-Cox exponent {fitted['transform']:.3g}"
+    model = f"{fitted['model'].replace('_', ' ')} model, coded units{weights}{power}" if fitted.get("model") else ""
+    caption = f"Analysis of variance of {label(name)}: {model}".rstrip(": ")
+    header = ("source", "sum of squares", "df", "mean square", "F", "p", "")
+    return Table(caption, header, rows, LEGEND, text_columns=(6,), detail=Detail.USUAL)
+
+
+def _coefficients(name: str, fitted: Record) -> Table:
+    rows = []
+    for term, value in fitted["coefficients"].items():
+        tested = part(fitted, "tests", term) or {}
+        error = part(fitted, "standard_errors", term)
+        numbers = (shown(tested.get(key), 5) for key in ("low", "high", "t"))
+        inflation = shown(part(fitted, "vif", term), 5)
+        rows.append((term, _coefficient(value, error), *numbers, *_significance(tested.get("p")), inflation))
+    header = ("term", "coefficient ± standard error", "95 % from", "to", "t", "p", "", "VIF")
+    return Table(f"Coefficients of {label(name)}", header, rows, text_columns=(6,), detail=Detail.USUAL)
+
+
+def _significance(p: float | None) -> tuple[str, str]:
+    """A p value and its stars."""
+    return probability(p), "" if p is None else next((stars for limit, stars in STARS if p <= limit), "")
+
+
+def _equations(name: str, fitted: Record, names: Sequence[str]) -> list[str]:
+    """The surface in coded and in actual units, and which factor each letter is."""
+    power, left = fitted.get("transform"), quantity(name)[0]
+    if power is not None:
+        left = f"ln {left}" if power == 0 else f"({left}^{power:.3g} - 1)/{power:.3g}"
+    sides = ("coefficients", "coded"), ("actual_coefficients", "actual units")
+    equations = [f"{left} = {_sum(fitted[key])} ({words})" for key, words in sides if fitted.get(key)]
+    letters = zip(ascii_uppercase, names, strict=False)
+    return [*equations, ", ".join(f"{letter} = {label(factor)}" for letter, factor in letters)]
+
+
+def _sum(terms: Record) -> str:
+    return " ".join(f"{c:+.5g}{'' if term == '1' else ' ' + term}" for term, c in terms.items())
+
+
+def _quality(fitted: Record) -> str:
+    """Every figure of how well the surface fits, in one sentence."""
+    known = [f"{words} {shown(fitted[key], 5)}" for key, words in STATISTICS if fitted.get(key) is not None]
+    residual: Record = next((row for row in fitted.get("anova") or [] if row.get("source") == "residual"), {})
+    if residual.get("ms") is not None:
+        unit = "times the known error " if fitted.get("weighting") == "replicates" else ""
+        freedom = counted(residual["df"], "degree") + " of freedom"
+        known.append(f"residual standard deviation {shown(float(residual['ms']) ** 0.5, 5)} {unit}on {freedom}")
+    return ", ".join(known)
+
+
+def _runs(name: str, runs: Sequence[Record]) -> Table:
+    """What each run deviates by, and how much it steers the surface."""
+    rows = [(shown(run.get("run")), *(shown(run.get(key), 5) for key in RUN_COLUMNS)) for run in runs]
+    header = ("run", *RUN_COLUMNS)
+    return Table(f"Runs and residuals of {label(name)}", header, rows, folded=True, detail=Detail.ALL)

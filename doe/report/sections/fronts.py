@@ -1,16 +1,17 @@
 """The Pareto front: every trade-off on the surfaces, the picks, and the fronts that stand beside it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from doe.report.sections import plots_of_fronts as plots
-from doe.report.sections.answer import record_table, tolerances
-from doe.report.sections.blocks import Block, Figures, Section, Table, Widget, Words
+from doe.report.sections.answer import tolerances
 from doe.report.sections.plots_of_fronts import Front
 from doe.report.sections.record import Record, factors, nearest, part, responses
 from doe.report.sections.searches import in_few_runs
-from doe.report.words import change
-from rbdyn.records.words import chance, counted, label, shown, with_error
+from doe.report.words import SENSES, change, share_with_interval
+from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Section, Table, Widget
+from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -80,19 +81,21 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Figures([*pairs, plots.legend_of(sets, drawn, confirmed, bool(bounds(summary)))], "", "pairs"))
         caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
         blocks.append(Figures([plots.parallel(factors(summary), names, sets, drawn)], caption, "parallel"))
-    if marks:
-        blocks.append(_picks(summary, names, marks))
     where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
-    if gains := record.get("predicted_gains"):
-        rows = [(label(name), change(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
-        header = ("response", "change", "verdict")
-        blocks.append(Table(f"Changes on the surfaces {where}", header, rows, text_columns=(2,)))
-    blocks.append(Words(record.get("statement") or ""))
-    blocks += [_limits(record, where), tolerances(summary)]
-    blocks.append(Words(part(summary, "tolerances_sentence") or ""))
-    blocks += _search(record)
-    blocks += _beside(summary)
+    blocks += [_picks(summary, names, marks), _gains(f"Changes on the surfaces {where}", record.get("predicted_gains"))]
+    blocks += [Paragraph(record.get("statement") or ""), *_doubt(record)]
+    blocks += [_limits(record.get("constraints"), f"Limits on the surfaces {where}"), tolerances(summary)]
+    blocks += [*_search(record), *_beside(summary), *_given_point(record)]
     return Section("front", "Pareto front", blocks)
+
+
+def front_blocks(summary: Record) -> list[Block]:
+    """What ``doe front`` says: the front as in a report, and every point of it to who asks for all."""
+    names = [each["name"] for each in responses(summary)]
+    points = {str(number): point for number, point in enumerate(part(summary, "front", "front") or [], 1)}
+    every = replace(_picks(summary, names, points), caption="Every point of the front", detail=Detail.ALL)
+    section = front(summary, {})
+    return [every, *(section.blocks if section else ())]
 
 
 def bounds(summary: Record) -> dict[str, list[float]]:
@@ -112,67 +115,135 @@ def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -
         for name, point in marks.items()
     ]
     header = ["point", *(label(each.name) for each in given), *map(label, names)]
-    return Table("Picks on the surfaces", header, rows)
+    size = [len(part(summary, "front", "front") or []), part(summary, "front", "archive")]
+    of = f", {size[0]} of {size[1]} points" if all(size) else ""
+    return Table(f"Picks of the Pareto front on the surfaces{of} (95 % intervals of the mean)", header, rows)
 
 
-def _limits(record: Record, where: str) -> Table:
+def _gains(caption: str, gains: Record | None) -> Table:
+    """Gains on the surfaces, and by how much two single runs would differ anyway."""
+    rows = []
+    for name, gain in (gains or {}).items():
+        scatter = gain.get("single_run_scatter_percent")
+        rows.append(
+            (label(name), change(gain), str(gain.get("verdict") or ""), f"{error_alone(scatter)} %" if scatter else "")
+        )
+    header = ("response", "change", "verdict", "scatter of two single runs")
+    return Table(caption, header, rows, text_columns=(2,))
+
+
+def _doubt(record: Record) -> list[Block]:
+    """What the choice flatters, how sure the pick dominates, and why it is the pick."""
+    gains = record.get("predicted_gains") or {}
+    luck = {name: gain.get("selection_optimism_percent") for name, gain in gains.items()}
+    flattered = ", ".join(
+        f"{quantity(name)[0]} {percent:+.2f} %" for name, percent in luck.items() if percent is not None
+    )
+    sentences = [f"Selection bias to expect in these gains: {flattered}." if flattered else ""]
+    if sure := record.get("pick_dominates_baseline"):
+        odds = with_error(sure.get("probability"), 1.96 * (sure.get("standard_error") or 0.0))
+        pick = "the pick without tolerances" if record.get("tolerance_aware") else "the pick"
+        drawn = f"On {sure['draws']} surfaces" if sure.get("draws") else "On surfaces"
+        sentences.append(
+            f"{drawn} drawn from their errors {pick} dominates the baseline with probability {odds} (error of the draws alone)."
+        )
+    reason = part(record, "pick", "reason")
+    return [*map(Paragraph, sentences), Paragraph(f"Pick on the surfaces: {reason}." if reason else "", "small")]
+
+
+def _limits(limits: Sequence[Record] | None, caption: str) -> Table:
     rows = [
         (
-            f"{label(limit['response'])} {limit['sense']} {shown(limit['limit'])}",
+            f"{label(limit['response'])} {SENSES[limit['sense']]} {shown(limit['limit'])}",
             with_error(limit["value"], limit.get("error")),
             shown(limit.get("kept")),
             "" if limit.get("probability") is None else chance(limit["probability"]),
             shown(limit.get("demanded_probability")),
         )
-        for limit in record.get("constraints") or []
+        for limit in limits or []
         if {"response", "sense", "limit", "value"} <= set(limit)
     ]
     header = ("limit", "value", "kept by the value", "probability of keeping it", "demanded")
-    return Table(f"Limits on the surfaces {where}", header, rows)
+    return Table(caption, header, rows)
+
+
+def _given_point(record: Record) -> list[Block]:
+    """A point that was asked for, against the baseline and the front."""
+    point = record.get("point")
+    if not point:
+        return []
+    dominating, whole = point["dominated_by"], counted(len(record["front"]), "point")
+    verb = "dominates" if dominating == 1 else "dominate"
+    return [
+        _gains("Changes on the surfaces of the point asked for", point["predicted_gains"]),
+        Bullets([*point["sentences"], point["statement"]]),
+        _limits(point["constraints"], "Limits on the surfaces at the point asked for"),
+        Paragraph(f"{dominating} of the {whole} of the front {verb} it."),
+    ]
 
 
 def _search(record: Record) -> list[Block]:
     known = [
         f"{words} {shown(record[key])}"
         for key, words in (("generations", "generations"), ("evaluations", "evaluations"), ("seed", "seed"),
-                           ("hypervolume", "hypervolume"), ("archive", "points in the archive"), ("feasible_share", "feasible share"))
+                           ("hypervolume", "hypervolume"), ("largest_hypervolume", "of at most"),
+                           ("archive", "points in the archive"), ("feasible_share", "feasible share"))
         if record.get(key) is not None
     ]  # fmt: skip
-    blocks: list[Block] = [Words(f"NSGA-II: {', '.join(known)}.", "note")] if known else []
+    blocks: list[Block] = [Paragraph(f"NSGA-II: {', '.join(known)}.", "small")] if known else []
     history = [value for value in record.get("hypervolume_history") or [] if value is not None]
+    if history and record.get("hypervolume") is not None:
+        near = next((number for number, each in enumerate(history, 1) if each >= 0.99 * record["hypervolume"]), None)
+        blocks.append(Paragraph(f"99 % of the hypervolume after generation {near}." if near else "", "small"))
     if len(history) > 2:
         blocks.append(Figures([plots.hypervolume(history)], "Hypervolume by generation: flat at the end means found."))
     return blocks
 
 
 def _beside(summary: Record) -> list[Block]:
-    """How sure the pick is, and the fronts found in other ways."""
+    """The fronts found in other ways."""
     blocks: list[Block] = []
-    aware = part(summary, "front", "tolerance_aware")
-    if sure := part(summary, "front", "pick_dominates_baseline"):
-        chance = with_error(sure.get("probability"), 1.96 * (sure.get("standard_error") or 0.0))
-        pick = "the pick without tolerances" if aware else "the pick"
-        words = f"On surfaces drawn from their errors {pick} dominates the baseline with probability"
-        blocks.append(Words(f"{words} {chance} (error of the draws alone)."))
-    if aware:
-        blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
+    if aware := part(summary, "front", "tolerance_aware"):
+        blocks += _with_tolerances(summary, aware)
     return [*blocks, *in_few_runs(summary)]
 
 
-def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
-    kind = str(aware.get("kind") or "").replace("_", " ")
-    level = f" {shown(aware['quantile'])}" if aware.get("quantile") is not None and kind == "quantile" else ""
-    number = len(aware.get("front") or [])
-    blocks: list[Block] = [
-        Words(f"Front with tolerances: {kind}{level} over the tolerance box, {counted(number, 'point')}.")
-    ]
+def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
+    """What the responses are at the ends of the tolerances, what that costs, and whether the picks survive it."""
+    names = [each["name"] for each in responses(summary)]
+    widths = ", ".join(f"{label(name)} within ± {width:g}" for name, width in (aware.get("half_widths") or {}).items())
+    share = aware.get("quantile")
+    kind = "worst case" if share is None else f"{100 * share:g} % of the parts keep"
+    pick, survival = aware.get("pick") or {}, aware.get("survival") or {}
     points = {
         "baseline": aware.get("baseline_robust"),
         "plain pick": aware.get("plain_pick_robust"),
-        "pick with tolerances": part(aware, "pick", "robust"),
+        "pick with tolerances": pick.get("robust"),
+        "the same, nominal": pick.get("responses"),
     }
-    rows = [(point, *(shown(values.get(name)) for name in names)) for point, values in points.items() if values]
-    blocks.append(Table("What manufacture leaves of the responses", ["point", *map(label, names)], rows))
-    costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
-    blocks.append(record_table("What the tolerances cost", costs))
-    return blocks
+    rows = [(point, *(shown(values.get(name), 5) for name in names)) for point, values in points.items() if values]
+    sentences = [f"Front with tolerances: {counted(len(aware.get('front') or []), 'point')}."]
+    if pick.get("factors"):
+        place = ", ".join(
+            f"{each.words} {each.text(part(pick, 'factors', each.name), 1)} {each.unit}".rstrip()
+            for each in factors(summary)
+        )
+        reason = f"; {pick['reason']}" if pick.get("reason") else ""
+        sentences.append(f"Pick with tolerances: {place}{reason}.")
+    if aware.get("nominal_loss_percent") is not None:
+        less = f"{aware['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
+        percent = aware.get("robust_gain_percent")
+        more = "" if percent is None else f", and {percent:.2f} % more at the ends of the tolerances"
+        sentences.append(f"The front with tolerances has {less}{more}.")
+    if None not in (survival.get("plain_pick"), survival.get("pick")):
+        plain, with_them = (
+            share_with_interval(survival[name], survival.get(f"{name}_interval")) for name in ("plain_pick", "pick")
+        )
+        sentences.append(
+            f"Parts that still dominate the baseline: {plain} at the plain pick, {with_them} at the other."
+        )
+    sentences.append(survival.get("open_errors") or "")
+    if aware.get("plain_pick_inside") is False:
+        sentences.append("The tolerance box of the plain pick reaches out of the region: its figures are extrapolated.")
+    caption = f"At the ends of the tolerances, {widths}: {kind}" if widths else f"At the ends of the tolerances: {kind}"
+    return [Table(caption, ["point", *map(label, names)], rows), *map(Paragraph, sentences)]

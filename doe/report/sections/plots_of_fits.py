@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 from doe.report.sections.plot import Plot, Point, span
 from doe.report.sections.record import Record
-from rbdyn.records.words import label, shown
+from rbdyn.base.words import label, shown
 
 # Studentized residuals beyond these are looked at; Cook's distances beyond 1 move the fit.
 SUSPECT, INFLUENTIAL = 3.0, 1.0

@@ -8,7 +8,7 @@ from itertools import combinations
 from doe.report.sections.plot import Plot, Point, Range, legend, span, symbol, tick_text, ticks, wide_svg
 from doe.report.sections.record import Factor, Record, part
 from doe.report.words import half_width
-from rbdyn.records.words import label, quantity, shown
+from rbdyn.base.words import label, quantity, shown
 
 # Shape and role in the style sheet.
 MARKS = {

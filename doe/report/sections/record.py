@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from doe.report.words import probability
-from rbdyn.records.words import label, quantity, shown
+from rbdyn.base.blocks import Table
+from rbdyn.base.words import label, quantity, shown
 
 Record = Mapping[str, Any]
+# Characters above which a value is a sentence, to be broken.
+LONG = 40
 # The efficiencies of a design go by a capital letter.
 EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
@@ -86,6 +89,19 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
                 EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name),
                 probability(value) if key == "p" else shown(value),
             )
+
+
+def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
+    """Everything in nested tables, a row each."""
+    rows = list(scalars(record or {}))
+    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
+    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
+
+
+def allocation(chain: Record) -> dict[str, Any]:
+    """Parts of a dimension chain whose dimensions are known."""
+    needed = {"nominal_mm", "upper_mm", "lower_mm"}
+    return {name: each for name, each in (chain.get("allocation") or {}).items() if needed <= set(each)}
 
 
 def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:

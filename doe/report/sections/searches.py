@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-from doe.report.sections.blocks import Block, Figures, Heading, Table
 from doe.report.sections.plot import Plot, legend, span
 from doe.report.sections.record import Record, factors, part
-from rbdyn.records.words import label, shown, with_error
+from rbdyn.base.blocks import Block, Figures, Heading, Table
+from rbdyn.base.words import label, shown, with_error
 
 # Shape of the runs made for each reason; the style sheet has their colours.
 SHAPES = {"design": "square", "improvement": "hexagon", "check": "diamond", "extension": "triangle", "fresh": "plus"}

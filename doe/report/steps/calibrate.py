@@ -1,4 +1,4 @@
-"""What measurements on a rig identify of a scene's inputs, on the terminal, as JSON, as tables and as pictures."""
+"""What measurements on a rig identify of a scene's inputs: as blocks, as JSON, as tables and as pictures."""
 
 import csv
 from collections import Counter
@@ -14,9 +14,9 @@ from doe.study.input_sets import NORMAL
 from doe.study_file.cells import text_of
 from doe.unknown import inputs
 from doe.unknown.posterior import seen
-from rbdyn.cli.terminal import print_table
+from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.words import counted, quantity, shown
 from rbdyn.records.kept import digest_of, intact, sign
-from rbdyn.records.words import are, counted, quantity, shown
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
@@ -25,6 +25,7 @@ RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json
 CORNER, COMPARED = "corner.png", "measured.png"
 ENDS = (0.05, 0.5, 0.95)
 TAUS = (0.5, 0.05, 0.95)
+OFFSET = "A constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs."
 # Inputs that a corner plot shows at most, those that were learned best; what it leaves out at the ends of their ranges.
 SHOWN, END = 8, 1e-3
 
@@ -140,52 +141,70 @@ def _ends(logarithms: Array) -> list[float]:
     return np.exp(np.quantile(logarithms, ENDS)).tolist()
 
 
-def print_calibration(record: dict[str, Any]) -> None:
-    """The verdict with its reasons, a table of inputs, combinations, each output, how well the rest is predicted."""
-    reasons = record["reasons"]
-    print(f"{record['verdict']}{': ' if reasons else ''}{'; '.join(reasons)}")
-    rows = [
-        (key, record["learned"][key], each)
+def blocks(record: dict[str, Any]) -> list[Block]:
+    """The verdict with its reasons, the inputs, identified combinations, each output, how well the rest is predicted, notes."""
+    reasons = "; ".join(record["reasons"])
+    inputs = [
+        (key, *_interval(each), f"{record['learned'][key]:.2f}", each["seen"])
         for key, each in sorted(record["inputs"].items(), key=lambda pair: -record["learned"][pair[0]])
     ]
-    if rows:
-        print_table(
-            "inputs: 5 to 95 % before, the densest 90 % after, which may reach an end of the range",
-            ("input", "before", "after", "median", "contraction", ""),
-            [(key, *_interval(each), f"{share:.2f}", each["seen"]) for key, share, each in rows],
-        )
-    for each in record["combinations"]:
-        powers = " · ".join(f"{key}^{power:.2g}" for key, power in each["powers"].items())
-        print(f"known together: {powers} to {each['sd_percent']:.2g} % (before {each['sd_percent_before']:.2g} %)")
-    for name, each in record["outputs"].items():
-        if each["evidence"] is not None:
-            print(_output_words(quantity(name)[0], each))
-    if record["inputs"]:
-        print(
-            "a constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs"
-        )
-    if tried := record["held_out"]:
-        inside = f"{tried['inside_90_percent']} of {tried['values']} values in their 90 % interval"
-        print(f"{tried['rows']}: {inside}, CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})")
-        width = tried["width"]
-        print(
-            f"width of predictions: residuals of {counted(width['values'], 'value')} scatter {width['ratio']:.2g} times as "
-            f"much as predicted (chance {100.0 * width['chance']:.2g} %)"
-        )
-    for each in record["outliers"]:
-        far = f"{each['residual']:.1f} standard deviations"
-        print(f"{quantity(each['output'])[0]} of row {each['row']} is {far} off the others")
+    caption = "Inputs: 5 to 95 % before, the densest 90 % after, which may reach an end of the range"
+    header = ("input", "before", "after", "median", "contraction", "")
+    outputs = [
+        _output_words(quantity(name)[0], each)
+        for name, each in record["outputs"].items()
+        if each["evidence"] is not None
+    ]
+    return [
+        Paragraph(f"{record['verdict']}{': ' if reasons else ''}{reasons}", "statement"),
+        Table(caption, header, inputs, text_columns=(1, 2, 5)),
+        Bullets([*map(_combination, record["combinations"]), *outputs]),
+        Paragraph(OFFSET if inputs else ""),
+        Bullets([*_predicted(record["held_out"]), *_outliers(record)]),
+        Paragraph(_screened(record["screened"])),
+        *(Note(note, Detail.LEAST) for note in record["notes"]),
+    ]
+
+
+def _combination(each: dict[str, Any]) -> str:
+    """How well a product of powers is known."""
+    powers = " · ".join(f"{key}^{power:.2g}" for key, power in each["powers"].items())
+    return f"identified combination {powers}: known to {each['sd_percent']:.2g} % (before {each['sd_percent_before']:.2g} %)"
+
+
+def _predicted(tried: dict[str, Any] | None) -> list[str]:
+    """How well what was not learned from is predicted."""
+    if not tried:
+        return []
+    inside = f"{tried['inside_90_percent']} of {tried['values']} values in their 90 % interval"
+    width = tried["width"]
+    return [
+        f"{tried['rows']}: {inside}, CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})",
+        f"width of predictions: residuals of {counted(width['values'], 'value')} scatter {width['ratio']:.2g} times as much as "
+        f"predicted (chance {100.0 * width['chance']:.2g} %)",
+    ]
+
+
+def _outliers(record: dict[str, Any]) -> list[str]:
+    """Values far off the others, and what is learned without them."""
+    sentences = [
+        f"{quantity(each['output'])[0]} of row {each['row']} is {each['residual']:.1f} standard deviations off the others"
+        for each in record["outliers"]
+    ]
     if record["without_outliers"]:
-        told = ", ".join(f"{key} {share:.2f}" for key, share in record["without_outliers"].items())
-        print(f"contraction without these: {told}")
-    if record["screened"]:
-        most = max(record["screened"], key=lambda key: record["screened"][key])
-        print(
-            f"{counted(len(record['screened']), 'further input')} {are(len(record['screened']))} left at the scene's value: in a screening none made more than "
-            f"{100.0 * record['screened'][most]:.2g} % of an output's variance ({most})"
-        )
-    for note in record["notes"]:
-        print(f"note: {note}")
+        learned = ", ".join(f"{key} {share:.2f}" for key, share in record["without_outliers"].items())
+        sentences.append(f"contraction without these: {learned}")
+    return sentences
+
+
+def _screened(screened: dict[str, float] | None) -> str:
+    if not screened:
+        return ""
+    most = max(screened, key=lambda key: screened[key])
+    return (
+        f"{counted(len(screened), 'further input')} kept at the scene's value: screening found no effect above "
+        f"{100.0 * screened[most]:.2g} % of an output's variance ({most})."
+    )
 
 
 def _output_words(name: str, each: dict[str, Any]) -> str:

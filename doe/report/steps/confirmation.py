@@ -5,7 +5,7 @@ from typing import Any
 
 from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
-from doe.study.limits import Limit, limits_of
+from doe.study.limits import Limit, every_limit, limits_of
 from doe.study.predicted import PredictedGain
 from doe.study.whole import StudyResult
 from doe.study_file import Study
@@ -21,6 +21,9 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
             "responses": _quantities(outcome.study, each),
             "power_terms_W": dict(each.power_terms),
             "limits": limits_record(limits_of(outcome.study, each)),
+            "every_limit": [
+                {"response": limit.response, **_limit(limit)} for limit in every_limit(outcome.study, each)
+            ],
         }
         | ({} if each.friction_check is None else {"friction_check": dict(each.friction_check)})
         | {
@@ -42,11 +45,12 @@ def judged_limits_record(outcome: StudyResult) -> dict[str, Any]:
 
 def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
-    return {
-        limit.response: {key: getattr(limit, key) for key in ("bound", "sense", "value", "error", "verdict")}
-        | {"error": finite(limit.error), "probability": finite(limit.probability)}
-        for limit in limits
-    }
+    return {limit.response: _limit(limit) for limit in limits}
+
+
+def _limit(limit: Limit) -> dict[str, Any]:
+    known = {key: getattr(limit, key) for key in ("bound", "sense", "value", "verdict")}
+    return known | {"error": finite(limit.error), "probability": finite(limit.probability)}
 
 
 def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:

@@ -1,13 +1,13 @@
-"""A design as JSON and on the terminal."""
+"""A design as JSON, as CSV and as blocks."""
 
 from typing import Any
 
 from doe.designs import Design
 from doe.study.design import actual_of
 from doe.study_file import Study
-from rbdyn.cli.terminal import print_table
+from rbdyn.base.blocks import Block, Detail, Table
+from rbdyn.base.words import counted, label
 from rbdyn.records.cells import quoted_cell
-from rbdyn.records.words import counted
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
@@ -48,57 +48,65 @@ def print_csv(record: dict[str, Any]) -> None:
         print(",".join([str(run["run"]), *([str(run["block"])] if blocked else []), *values]))
 
 
-def print_design(record: dict[str, Any], quiet: bool = False, verbose: bool = False) -> None:
-    """The runs and what they can tell; quietly, actual values only; verbosely, also seeds and leverages."""
-    blocked = record["evaluation"]["blocks"] is not None
-    columns: dict[str, list[str]] = {"run": [str(run["run"]) for run in record["runs"]]}
-    if blocked:
-        columns["block"] = [str(run["block"]) for run in record["runs"]]
-    for name in record["factors"]:
-        columns[name] = [f"{run['factors'][name]:.6g}" for run in record["runs"]]
-    if not quiet:
-        columns["point"] = [run["kind"] for run in record["runs"]]
-        for name in record["factors"]:
-            columns[f"{name} (coded)"] = [f"{run['coded'][name]:+.4f}" for run in record["runs"]]
-    if verbose:
-        columns["standard"] = [str(run["standard"]) for run in record["runs"]]
-        columns["seed"] = [str(run["seed"]) for run in record["runs"]]
-        columns["leverage"] = [f"{x:.3f}" for x in record["evaluation"]["leverage"]]
-    title = f"{record['kind']}, {counted(len(record['runs']), 'run')}"
-    print_table(title, list(columns), list(zip(*columns.values(), strict=True)))
-    if not quiet:
-        _print_evaluation(record["evaluation"], verbose)
+def blocks(record: dict[str, Any]) -> list[Block]:
+    """The runs in actual values, the same in coded ones, what they can tell; for who asks for all seeds and leverages."""
+    evaluation, runs = record["evaluation"], record["runs"]
+    blocked = evaluation["blocks"] is not None
+    actual = [
+        (str(run["run"]), *([str(run["block"])] if blocked else []), *(f"{x:.6g}" for x in run["factors"].values()))
+        for run in runs
+    ]
+    coded = [(str(run["run"]), run["kind"], *(f"{x:+.4f}" for x in run["coded"].values())) for run in runs]
+    seeds = [
+        (str(run["run"]), str(run["standard"]), str(run["seed"]), f"{leverage:.3f}")
+        for run, leverage in zip(runs, evaluation["leverage"], strict=True)
+    ]
+    title = f"{record['kind'].replace('_', ' ')}, {counted(len(runs), 'run')}"
+    names = [label(name) for name in record["factors"]]
+    return [
+        Table(title, ("run", *(["block"] if blocked else []), *names), actual),
+        Table("Coded values", ("run", "point", *names), coded, text_columns=(1,), detail=Detail.USUAL),
+        Table("Order, seeds and leverages", ("run", "standard", "seed", "leverage"), seeds, detail=Detail.ALL),
+        *_evaluation(evaluation),
+    ]
 
 
-def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
-    freedom, variance = found["degrees_of_freedom"], found["scaled_prediction_variance"]
-    letters = found["efficiency_percent"].items()
+def _evaluation(found: dict[str, Any]) -> list[Block]:
+    """How good the design is for the largest model asked: as a whole, by term, by radius."""
     region = found["region"]
     size = f"{'radius' if region['shape'] == 'ball' else 'half-width'} {region['reach']:.4g}"
+    model = f"{found['model'].replace('_', ' ')} model, {counted(len(found['terms']), 'term')}"
+    title = f"{model}, over the {region['shape']} of {size} (coded)"
+    terms = [
+        (term, f"{inflation:.3f}", *(_percent(found["power_percent"][term][key]) for key in SIGMAS))
+        for term, inflation in found["vif"].items()
+    ]
+    header = ("term", "VIF", "power for 1 sigma [%]", "power for 2 sigma [%]")
+    shells = [tuple(f"{shell[key]:.3f}" for key in ("radius", "min", "mean", "max")) for shell in found["by_radius"]]
+    by_radius = "Scaled prediction variance by radius"
+    return [
+        Table(title, ("", "value"), _figures(found), text_columns=(1,), detail=Detail.USUAL),
+        Table("By term", header, terms, detail=Detail.USUAL),
+        Table(by_radius, ("radius", "least", "mean", "largest"), shells, detail=Detail.ALL),
+    ]
+
+
+def _figures(found: dict[str, Any]) -> list[tuple[str, str]]:
+    freedom, variance = found["degrees_of_freedom"], found["scaled_prediction_variance"]
+    letters = found["efficiency_percent"].items()
     rows = [
-        ["efficiency [%]", ", ".join(f"{letter.upper()} {value:.1f}" for letter, value in letters)],
-        ["scaled prediction variance", ", ".join(f"{name} {variance[name]:.2f}" for name in ("centre", "mean", "max"))],
-        ["its largest in the box of the front", f"{variance['box_max']:.2f}"],
-        ["degrees of freedom", ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in freedom.items())],
-        ["condition number of the model matrix", f"{found['condition_number']:.2f}"],
-        ["largest leverage", f"{max(found['leverage']):.3f}"],
+        ("efficiency [%]", ", ".join(f"{letter.upper()} {value:.1f}" for letter, value in letters)),
+        ("scaled prediction variance", ", ".join(f"{name} {variance[name]:.2f}" for name in ("centre", "mean", "max"))),
+        ("its largest in the box of the front", f"{variance['box_max']:.2f}"),
+        ("degrees of freedom", ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in freedom.items())),
+        ("condition number of the model matrix", f"{found['condition_number']:.2f}"),
+        ("largest leverage", f"{max(found['leverage']):.3f}"),
     ]
     if found["blocks"] is not None:
         relation = "orthogonal" if found["blocks"]["orthogonal"] else "not orthogonal"
         cosine = found["blocks"]["largest_cosine"]
-        rows.append(["blocks", f"{relation} to the terms (largest cosine {cosine:.3f})"])
-    title = (
-        f"{found['model']} model, {counted(len(found['terms']), 'term')}, over the {region['shape']} of {size} (coded)"
-    )
-    print_table(title, ["", "value"], rows)
-    terms = [
-        [term, f"{inflation:.3f}", *(_percent(found["power_percent"][term][key]) for key in SIGMAS)]
-        for term, inflation in found["vif"].items()
-    ]
-    print_table("", ["term", "VIF", "power for 1 sigma [%]", "power for 2 sigma [%]"], terms)
-    if verbose:
-        shells = [[f"{shell[key]:.3f}" for key in ("radius", "min", "mean", "max")] for shell in found["by_radius"]]
-        print_table("scaled prediction variance by radius", ["radius", "min", "mean", "max"], shells)
+        rows.append(("blocks", f"{relation} to the terms (largest cosine {cosine:.3f})"))
+    return rows
 
 
 SIGMAS = ("one_sigma", "two_sigma")

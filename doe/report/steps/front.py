@@ -1,6 +1,6 @@
-"""The Pareto front, and the tolerance-aware one beside it, as JSON and on the terminal."""
+"""The Pareto front, and the tolerance-aware one, as JSON; what was asked of both."""
 
-from collections.abc import Mapping
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -10,18 +10,34 @@ from doe.pareto import ParetoFront
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import REFERENCE, dominates
 from doe.report.steps.confirmation import gains_record, point_record
-from doe.report.words import change, share_with_interval
 from doe.response_surface import Surface
 from doe.study.back_off import SurfaceDoubt
 from doe.study.drawn import half_widths, predict_all
 from doe.study.edge import place_of
-from doe.study.goals import goals_of
+from doe.study.goals import goals_of, known_tolerances, region_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study.shares import open_errors
 from doe.study_file import Study
-from rbdyn.cli.terminal import print_table
 from rbdyn.records.record import finite
-from rbdyn.records.words import chance, counted, error_alone, with_error
+
+
+def asked_record(study: Study) -> dict[str, Any]:
+    """Factors with their ranges and responses with their goals."""
+    reach, known = region_of(study), known_tolerances(study)
+    low, high = (study.actual(side * reach) for side in (-1.0, 1.0))
+    return {
+        "factors": [
+            {
+                "letter": letter,
+                **factor.model_dump(include={"name", "key", "centre", "step", "resolution"}),
+                "low": float(low[index]),
+                "high": float(high[index]),
+                "tolerance": known.get(factor.name),
+            }
+            for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
+        ],
+        "responses": [response.model_dump() for response in study.file.response],
+    }
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -102,69 +118,6 @@ def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[s
     return record
 
 
-def print_front(record: dict[str, Any], verbose: bool = False) -> None:
-    """Baseline, picks, gains and convergence of a front; verbosely, every point of it."""
-    names = [*record["baseline"]["factors"], *record["baseline"]["responses"]]
-    points = {name: record[name] for name in ("baseline", "knee", "pick")}
-    points |= {f"pick by {rule}": point for rule, point in record["picks"].items()}
-    points |= {"the point asked for": record["point"]} if "point" in record else {}
-    if verbose:
-        points |= {str(number): point for number, point in enumerate(record["front"], 1)}
-    rows = [(name, *_cells(point)) for name, point in points.items()]
-    title = f"Pareto front on the surfaces, {len(record['front'])} of {record['archive']} points"
-    print_table(f"{title} (95 % intervals of the mean)", ("", *names), rows)
-    _print_gains("the pick", record["predicted_gains"])
-    sure = record["pick_dominates_baseline"]
-    print(record["statement"])
-    luck = {name: gain["selection_optimism_percent"] for name, gain in record["predicted_gains"].items()}
-    flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
-    print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
-    chance = with_error(sure["probability"], 1.96 * sure["standard_error"])
-    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance} (error of the draws alone)"
-    print(f"pick: {record['pick']['reason']}; {drawn}")
-    for limit in record["constraints"]:
-        print(f"limit: {limit_sentence(limit)}")
-    if record["feasible_share"] < 1.0:
-        print(f"{100 * record['feasible_share']:.1f} % of the evaluated points keep all limits")
-    _print_convergence(record)
-    if "tolerance_aware" in record:
-        print_tolerance_aware(record["tolerance_aware"])
-    if "point" in record:
-        point = record["point"]
-        _print_gains("the point asked for", point["predicted_gains"])
-        for sentence in [*point["sentences"], point["statement"]]:
-            print(sentence)
-        for limit in point["constraints"]:
-            print(f"limit at the point asked for: {limit_sentence(limit)}")
-        dominating, whole = point["dominated_by"], counted(len(record["front"]), "point")
-        print(f"{dominating} of the {whole} of the front {'dominates' if dominating == 1 else 'dominate'} it")
-
-
-def _print_convergence(record: dict[str, Any]) -> None:
-    history, whole = record["hypervolume_history"], record["hypervolume"]
-    reached = next(number for number, each in enumerate(history, 1) if each >= 0.99 * whole)
-    size = f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}"
-    when = f"generation {reached} of {record['generations']}, {record['evaluations']} evaluations"
-    print(f"{size}; 99 % of it after {when}")
-
-
-def _print_gains(whose: str, gains: dict[str, Any]) -> None:
-    rows = []
-    for name, gain in gains.items():
-        scatter = gain["single_run_scatter_percent"]
-        rows.append(
-            (name, change(gain), gain["verdict"], "unknown" if scatter is None else f"{error_alone(scatter)} %")
-        )
-    header = ("", "against the baseline", "verdict", "scatter of two single runs")
-    print_table(f"predicted gains of {whose}", header, rows)
-
-
-def _cells(point: dict[str, Any]) -> list[str]:
-    errors = point.get("errors", {})
-    factors = [f"{x:.5g}" for x in point["factors"].values()]
-    return factors + [with_error(x, errors.get(name)) for name, x in point["responses"].items()]
-
-
 def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
     """The responses with a goal where each is best or worst."""
     pairs = zip(front.goals.objectives, rows, strict=True)
@@ -189,18 +142,6 @@ def _limits(study: Study, surfaces: list[Surface], point: Array) -> list[dict[st
         }
         for index, sense, limit in goals_of(study).limited
     ]
-
-
-def limit_sentence(limit: Mapping[str, Any]) -> str:
-    """A limit at a point of the surfaces in words, the probability reached beside the one demanded."""
-    value = with_error(limit["value"], limit["error"])
-    odds = f"kept with a probability {_of(limit['probability'])}, {limit['demanded_probability']:g} demanded"
-    return f"{limit['response']} {limit['sense']} {limit['limit']:g}: {value} on the surfaces, {odds}"
-
-
-def _of(probability: float) -> str:
-    text = chance(probability)
-    return text if text[0].isalpha() else f"of {text}"
 
 
 def tolerance_aware_record(study: Study, surfaces: list[Surface], found: ToleranceAware) -> dict[str, Any]:
@@ -248,30 +189,3 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
             "open_errors": open_errors(surfaces),
         },
     }
-
-
-def print_tolerance_aware(record: dict[str, Any]) -> None:
-    """What the tolerances cost, and whether the picks survive them."""
-    pick, names = record["pick"], list(record["baseline_robust"])
-    widths = ", ".join(f"{name} within ± {width:g}" for name, width in record["half_widths"].items())
-    kind = "worst case" if record["kind"] == "worst_case" else f"{100 * record['quantile']:g} % of the parts keep"
-    rows = [
-        ("baseline", *(f"{record['baseline_robust'][name]:.5g}" for name in names)),
-        ("plain pick", *(f"{record['plain_pick_robust'][name]:.5g}" for name in names)),
-        ("tolerance-aware pick", *(f"{pick['robust'][name]:.5g}" for name in names)),
-        ("the same, nominal", *(f"{pick['responses'][name]:.5g}" for name in names)),
-    ]
-    print_table(f"after manufacture, {widths}: {kind}", ("", *names), rows)
-    at = ", ".join(f"{name} = {x:.5g}" for name, x in pick["factors"].items())
-    print(f"tolerance-aware pick: {at}; {pick['reason']}")
-    less = f"{record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
-    percent, survival = record["robust_gain_percent"], record["survival"]
-    more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
-    print(f"the tolerance-aware front has {less}{more}")
-    plain, aware = (
-        f"{share_with_interval(survival[name], survival[f'{name}_interval'])}" for name in ("plain_pick", "pick")
-    )
-    print(f"parts that still dominate the baseline: {plain} at the plain pick, {aware} at the tolerance-aware one")
-    print(survival["open_errors"])
-    if not record["plain_pick_inside"]:
-        print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")

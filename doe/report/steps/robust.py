@@ -1,4 +1,4 @@
-"""Whether the pick is better over what is not known: in words and as JSON."""
+"""Whether the pick is better over the unknown inputs: in words and as JSON."""
 
 import math
 from collections.abc import Sequence
@@ -8,8 +8,7 @@ from doe.report.words import of_hundred
 from doe.study.robust import Decider, Robust
 from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
-from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import counted, quantity, shown
+from rbdyn.base.words import counted, quantity, shown
 from rbdyn.scene.unknown import is_number
 
 # Share that is nearly all cases; gain in the chance of the right choice that is not worth a line.
@@ -85,17 +84,17 @@ def _front(front: RobustFront, names: Sequence[str], factors: Sequence[str]) -> 
 def robust_sentences(robust: Robust, factors: Sequence[str]) -> list[str]:
     """How likely the pick is better, what decides that, what hangs on the ranges, and what a robust point does."""
     each = ", ".join(
-        f"in {quantity(name)[0]} in {of_hundred(share)}"
+        f"{quantity(name)[0]} {of_hundred(share)} %"
         for name, share in zip(robust.responses, robust.better.each, strict=True)
     )
     whole = robust.better.all
-    sure = f"the gains {'hold over' if whole.value >= NEARLY_ALL else 'depend on'} what is not known"
+    sure = f"The gains {'hold over' if whole.value >= NEARLY_ALL else 'depend on'} the unknown inputs"
     return [
-        f"Of 100 cases the pick is better {each}, and in all of these in {of_hundred(whole)}: {sure} ({counted(len(robust.inputs), 'input')}, "
-        f"{robust.pairs} input sets, both designs at each).",
+        f"Probability that the pick is better: {each}; in all of these {of_hundred(whole)} %. {sure} "
+        f"({counted(len(robust.inputs), 'input')}, {robust.pairs} input sets, both designs at each).",
         _decision(robust),
         *_of_front(robust, factors),
-        f"With ranges half as wide it would be better in all in about {100.0 * _halved(robust):.0f}.",
+        f"With ranges half as wide it would be better in all with a probability of about {100.0 * _halved(robust):.0f} %.",
         *(f"{note}." for note in robust.notes),
     ]
 
@@ -112,7 +111,7 @@ def _of_front(robust: Robust, factors: Sequence[str]) -> list[str]:
     pick, *others = front.confirmed.values()
     best = max(others, key=lambda each: each.better.all.value)
     lost = [quantity(name)[0] for name, q2 in zip(robust.responses, front.q2, strict=True) if q2 < FORETOLD]
-    loose = f"; emulators foretell little of {' and '.join(lost)}, so a better one may exist" if lost else ""
+    loose = f"; the emulators predict little of {' and '.join(lost)}, so a better one may exist" if lost else ""
     if best.better.all.value <= pick.better.all.value:
         return [f"No point of the robust front that was simulated gains in all in more cases than the pick{loose}."]
     place = ", ".join(
@@ -120,28 +119,9 @@ def _of_front(robust: Robust, factors: Sequence[str]) -> list[str]:
         for name, x in zip(factors, best.point, strict=True)
     )
     return [
-        f"Surer is {place}: better in all in {of_hundred(best.better.all)}, the pick at the same input sets in "
-        f"{of_hundred(pick.better.all)}{loose}."
+        f"Safer alternative: {place} (better in all responses in {of_hundred(best.better.all)} of 100 cases; the pick at the "
+        f"same input sets in {of_hundred(pick.better.all)}){loose}."
     ]
-
-
-def print_robust_front(robust: Robust, factors: Sequence[str]) -> None:
-    """The pick and points of the robust front, simulated at the same input sets."""
-    if robust.front is None:
-        return
-    rows = [
-        (
-            name.removeprefix("robust "),
-            *(shown(float(x)) for x in each.point),
-            *(f"{100.0 * gain:.1f}, {of_hundred(p)}" for gain, p in zip(each.gains, each.better.each, strict=True)),
-            of_hundred(each.better.all),
-        )
-        for name, each in robust.front.confirmed.items()
-    ]
-    if rows:
-        header = ("", *(quantity(name)[0] for name in (*factors, *robust.responses)), "all")
-        title = "over what is not known: gain that is kept [%], and in how many of 100 cases it is one"
-        print_table(title, header, rows)
 
 
 def _pair(robust: Robust) -> dict[str, Any] | None:

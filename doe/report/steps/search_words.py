@@ -1,4 +1,4 @@
-"""What an adaptive search found, in sentences: the pick first, then why it ended, what holds the pick, how far to trust it."""
+"""What an adaptive search found, in sentences: the pick first, then why it ended, what limits the pick, how far to trust it."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from doe.study.compared import Compared
 from doe.study.held import Pull, near_limits, pulls
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import counted, improvement, quantity, with_error
+from rbdyn.base.words import counted, improvement, quantity, with_error
 
 SURE = 1.5  # root mean square miss in standard deviations up to which emulators knew how little they know
 HELD = {
-    "scene": "beyond which no bearing that keeps its clearance in operation is possible",
+    "scene": "beyond it the bearing would lose its operating clearance",
     "moves": "where the region has been moved as often as it may be",
     "": "where the responses turn",
     "end": "where the region searched ends",
@@ -59,19 +59,19 @@ def spent_sentence(study: Study, adaptive: Adaptive) -> str:
 
 
 def held_sentence(outcome: StudyResult) -> str:
-    """What holds the pick at every factor, the limits that it is near to, chains whose parts cannot be made."""
+    """What limits the pick at every factor, the limits that it is near to, chains whose parts cannot be made."""
     study, adaptive = outcome.study, outcome.adaptive
     assert adaptive is not None
     held: dict[str, list[str]] = {}
     for each in pulls(study, adaptive, outcome.pick.point):
         beyond = math.nan if each.face is None else each.face.better
-        told = "" if math.isnan(beyond) else f" (the front goes on beyond with a probability of {beyond:.2f})"
-        held.setdefault(_why(study, each), []).append(f"{_place(each.factor, each.at)}{told}")
+        odds = "" if math.isnan(beyond) else f" (the front goes on beyond with a probability of {beyond:.2f})"
+        held.setdefault(_why(study, each), []).append(f"{_place(each.factor, each.at)}{odds}")
     why = [f"{_listed(places)}, {words}" for words, places in held.items()]
     why += [f"the limit {each.shown} is near" for each in near_limits(adaptive, study, outcome.limits)]
     refused = [name for name, each in outcome.chains.items() if each.refused]
     why += [f"the parts of dimension chain {name} cannot be made" for name in refused]
-    return f"What holds the pick: {'; '.join(why)}."
+    return f"What limits the pick: {'; '.join(why)}."
 
 
 def _why(study: Study, pull: Pull) -> str:
@@ -88,37 +88,39 @@ def _end(study: Study, name: str) -> str:
     """Why the region may not grow at a factor."""
     ends = study.file.factor[study.factors.index(name)].allowed
     if ends is None:
-        return "where the region of the design ends and no allowed = [low, high] lets the search go on"
+        return "at the edge of the design region; set allowed = [low, high] to search further"
     return f"where allowed = {ends} ends" if study.file.adaptive.extend else "where extend = false keeps the search"
 
 
 def trust_sentence(study: Study, adaptive: Adaptive) -> str:
-    """How well the emulators foretold the fresh runs at their front."""
+    """How well the emulators predicted the fresh runs at their front."""
     found, front = adaptive.found, adaptive.found.front
     wanted = [study.responses[index] for index in front.goals.objectives]
     flattered = [f"{name} by {100.0 * x:.1f} %" for name, x in zip(wanted, front.optimism.tolist(), strict=True)]
     missed = np.hypot(found.bias, found.spread).tolist()
-    told = [f"{name} by {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
+    errors = [f"{name} {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
     sure = [name for name, times in zip(study.responses, missed, strict=True) if times > SURE]
-    claim = f"to know {_listed(sure)} better than they did" if sure else "no more than they knew"
+    claim = (
+        f"so their stated uncertainty of {_listed(sure)} is too small" if sure else "as their stated uncertainty allows"
+    )
     return (
-        f"The emulators foretold the fresh runs at {counted(len(front.points), 'point')} of the front better than these came, on average "
-        f"{_listed(flattered)} of the range on the front (below 0: worse), and missed {_listed(told)} standard deviations in root "
-        f"mean square: they claimed {claim}. What is reported of the front are these fresh runs alone."
+        f"At {counted(len(front.points), 'front point')} the emulators were optimistic on average by these shares of the front's range: "
+        f"{_listed(flattered)}. Their RMS errors in standard deviations are {_listed(errors)}, {claim}. "
+        "The front is reported by these fresh runs alone."
     )
 
 
 def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
     """The hypervolumes of the front and of those beside it."""
-    foretold, (fresh, error) = float(compared.search[-1]), compared.fresh
+    predicted, (fresh, error) = float(compared.search[-1]), compared.fresh
     points = len(adaptive.found.front.points)
-    share = f" ({100.0 * compared.surfaces / foretold:.0f} % of the first)" if foretold > 0.0 else ""
-    told = [
-        f"front foretold {foretold:.3f}",
+    share = f" ({100.0 * compared.surfaces / predicted:.0f} % of the first)" if predicted > 0.0 else ""
+    fronts = [
+        f"front predicted {predicted:.3f}",
         f"its {counted(points, 'point')} by their fresh runs {with_error(fresh, 1.96 * error)}",
         f"front on the surfaces, by the same emulators, {compared.surfaces:.3f}{share}",
     ]
-    return f"Hypervolumes on one scale, with the noise of their runs alone: {'; '.join(told)}."
+    return f"Hypervolumes on one scale, with the noise of their runs alone: {'; '.join(fronts)}."
 
 
 def _place(name: str, value: float, before: str = "") -> str:

@@ -1,4 +1,4 @@
-"""What is not known of a scene, on the terminal, as JSON, as tables and as a picture."""
+"""What the unknown inputs of a scene do: as blocks, as JSON, as tables and as a picture."""
 
 import csv
 from pathlib import Path
@@ -8,8 +8,8 @@ from doe.report.words import of_hundred
 from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.study_file.cells import text_of
 from doe.unknown.propagation import CONFIDENCE, Share
-from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import counted, quantity, shown, with_error
+from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"
@@ -56,7 +56,7 @@ def sentence(name: str, output: OutputRange) -> str:
     """'impact force 87.1 ± 0.4 N; 60 to 132 N in 90 % of the cases over the unknown inputs; the bar stiffness makes 87 %'."""
     words, unit = quantity(name)
     nominal, spread = output.nominal, output.spread
-    head = f"{words} {with_error(nominal.value, nominal.error)} {unit}".rstrip()
+    head = f"{words} {with_error(nominal.value, nominal.stated_error)} {unit}".rstrip()
     ends = f"{shown(spread.low)} to {shown(spread.high)} {unit}".rstrip()
     if spread.hidden:
         return f"{head}; simulation noise exceeds the effect of the inputs"
@@ -73,26 +73,32 @@ def _decides(output: OutputRange) -> str:
     return " and ".join(f"{key} makes {100.0 * index.value:.0f} %" for index, key in above) or "no input stands out"
 
 
-def print_uncertainty(found: Uncertainty) -> None:
-    """A sentence an output, a table of shares, which inputs are in no emulator."""
-    for name, output in found.outputs.items():
-        print(sentence(name, output))
+def blocks(found: Uncertainty) -> list[Block]:
+    """A sentence an output, a table of shares, where a run's variance comes from, which inputs are in no emulator, notes."""
     shares = [_by_key(output) for output in found.outputs.values()]
     rows = [(key, *(_share(each.get(key)) for each in shares)) for key in _keys(found)]
     floor = ("an input that does nothing", *(_share(output.floor) for output in found.outputs.values()))
-    title = f"{_what(found)} [%], {100.0 * CONFIDENCE:.0f} % intervals"
-    print_table(title, ("input", *(quantity(name)[0] for name in found.outputs)), [*rows, floor])
+    header = ("input", *(quantity(name)[0] for name in found.outputs))
+    caption = f"{_what(found)} [%], {100.0 * CONFIDENCE:.0f} % intervals"
     parts = [
         (quantity(name)[0], *(f"{100.0 * share:.1f}" for share in output.spread.variance.values()))
         for name, output in found.outputs.items()
     ]
-    print_table("what a single run's variance comes from [%]", ("output", "simulation", "integration", "inputs"), parts)
+    sources = ("output", "simulation", "integration", "inputs")
+    screened = ""
     if found.screened:
         most = max(found.screened, key=lambda key: found.screened[key])
-        share = f"alone none makes more than {100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
-        print(f"varied in every set, but in no emulator: {counted(len(found.screened), 'further input')}; {share}")
-    for note in found.notes:
-        print(f"note: {note}")
+        screened = (
+            f"Varied in every set, but in no emulator: {counted(len(found.screened), 'further input')}; "
+            f"alone none makes more than {100.0 * found.screened[most]:.2g} % of an output's variance ({most})."
+        )
+    return [
+        Bullets([sentence(name, output) for name, output in found.outputs.items()]),
+        Table(caption, header, [*rows, floor]),
+        Table("What a single run's variance comes from [%]", sources, parts),
+        Paragraph(screened),
+        *(Note(note, Detail.LEAST) for note in found.notes),
+    ]
 
 
 def _by_key(output: OutputRange) -> dict[str, Share]:
@@ -108,8 +114,8 @@ def _keys(found: Uncertainty) -> list[str]:
 def _what(found: Uncertainty) -> str:
     """What the shares are of."""
     if any(output.shapley for output in found.outputs.values()):
-        return "share of the variance over all inputs, divided among inputs that go together (Shapley)"
-    return "share of the variance over all inputs that is left while an input is unknown"
+        return "Share of the variance over all inputs, divided among inputs that go together (Shapley)"
+    return "Share of the variance over all inputs that is left while an input is unknown"
 
 
 def _share(share: Share | None) -> str:

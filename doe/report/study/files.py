@@ -64,7 +64,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     texts = {
         "report.html": html_report(record, clearance.motion_record(motions)),
         "report.md": markdown_report(record, pictures),
-        "answer.txt": answer_text(outcome),
+        "answer.txt": answer_text(record),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")

@@ -20,7 +20,7 @@ from doe.study.design import design_of
 from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import label, quantity
+from rbdyn.base.words import label, quantity
 
 # Marker and colour of the runs made for each reason and of the fronts; a legend where no point lies; pictures in a row.
 MARKERS = {

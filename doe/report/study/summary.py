@@ -1,6 +1,5 @@
 """summary.json: what a study asked for, and everything that it found, as plain numbers."""
 
-from string import ascii_uppercase
 from typing import Any
 
 from doe import clearance
@@ -8,14 +7,13 @@ from doe.report.steps.adaptive import adaptive_record, compared_record
 from doe.report.steps.confirmation import confirmation_record, gains_record, judged_limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
-from doe.report.steps.front import front_record, predicted_record
+from doe.report.steps.front import asked_record, front_record, predicted_record
 from doe.report.steps.robust import robust_record
 from doe.report.steps.search_words import held_sentence, search_sentences
 from doe.running.failure import grouped
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import statement
 from doe.study.design import evaluation
-from doe.study.goals import known_tolerances, region_of
 from doe.study.searched_pick import SearchedPick
 from doe.study.whole import StudyResult
 from doe.study_file import Study
@@ -92,24 +90,12 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
 
 def settings_record(study: Study) -> dict[str, Any]:
     """Scene, factors with their ranges, responses with their goals."""
-    reach, known = region_of(study), known_tolerances(study)
-    low, high = (study.actual(side * reach) for side in (-1.0, 1.0))
     scene = clearance.design_scenes(study, study.baseline[None])[0]
     return {
         "study_file": study.path.name,
         "scene_file": study.scene.file,
         "scene": scene.model_dump(mode="json", exclude_none=True),
-        "factors": [
-            {
-                "letter": letter,
-                **factor.model_dump(include={"name", "key", "centre", "step", "resolution"}),
-                "low": float(low[index]),
-                "high": float(high[index]),
-                "tolerance": known.get(factor.name),
-            }
-            for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
-        ],
-        "responses": [response.model_dump() for response in study.file.response],
+        **asked_record(study),
         "replicates": scene.numerics.replicates,
         "turns": scene.numerics.turns,
         "confirmation_replicates": study.file.confirmation.replicates,

@@ -14,9 +14,9 @@ from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
 from pydantic import BaseModel
 
+from rbdyn.base.words import filled_page
 from rbdyn.cli.keys import Key, keys, lines
 from rbdyn.cli.manual.docstrings import equations, library, trees_of
-from rbdyn.records.words import filled_page
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
 # Headings deeper than this stand on the page and in the search, not in the contents.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import Brief, Figure
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
 from rbdyn.dynamics.pace import Pace, log
@@ -17,7 +18,6 @@ from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.records.forecast import Notice
-from rbdyn.records.words import Brief, Figure
 from rbdyn.scene import Scene, rollers_only
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.optimize import linprog
 
 from rbdyn.arrays import Array
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
 from rbdyn.properties import table
-from rbdyn.records.words import counted
 
 ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array, Whole
+from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
-from rbdyn.records.words import counted
 
 
 @dataclass(frozen=True)

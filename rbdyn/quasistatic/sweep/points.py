@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from rbdyn.cli.ranges import listed
+from rbdyn.base.ranges import listed
 from rbdyn.faults import InputError, refuse, validated
 from rbdyn.scene.ball import BallScene
 

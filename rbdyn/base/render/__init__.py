@@ -1,0 +1,1 @@
+"""One tree of blocks, rendered three times: ``terminal``, ``markdown``, ``html``."""

@@ -1,0 +1,158 @@
+"""What ``rbdyn simulate`` says and writes of a roller bearing."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.words import counted, error_alone, label
+from rbdyn.records.cells import save_table
+from rbdyn.records.forecast import span
+
+if TYPE_CHECKING:
+    from rbdyn.result import Quantity, SimulationResult
+    from rbdyn.scene import Scene
+
+# Length of the history that --out draws.
+TRACE_TURNS = 10.0
+
+
+def blocks(result: "SimulationResult") -> list[Block]:
+    """Figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
+    from rbdyn.compiled.kernel import compiler_notes
+
+    figures = _figures(result)
+    samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
+    return [
+        _table(figures),
+        Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
+        *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
+        Paragraph(_run_sentence(result)),
+        *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
+        *(_clearances(result.clearance) if result.scene.get("mounting") else ()),
+        *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
+        *_further(result),
+        *notes(result.notes),
+        *notes(compiler_notes(), Detail.ALL),
+    ]
+
+
+def write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:
+    """Write result.json, history.csv and pictures; returns the names of the files."""
+    from rbdyn import plots
+    from rbdyn.dynamics.motion.history import history, most_turns
+
+    result.save(folder / "result.json")
+    turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
+    shown = history(scene, turns, notice=None)  # the simulation has stated its pace
+    save_table(shown.table(), folder / "history.csv", "%.6g")
+    title = f"first {turns:g} counted shaft turns"
+    plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
+    plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
+    return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
+
+
+def _figures(result: "SimulationResult") -> "dict[str, Quantity]":
+    """Figures of a run by their words; the contact force only where a film makes it another than the whole force."""
+    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
+    orbit = result.cage_orbit_radius_share
+    return {
+        f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force,
+        **({} if result.impact_contact_force == result.impact_force else contact),
+        "whirl deviation ratio": result.whirl_deviation_ratio,
+        **({} if orbit is None else {"radius of the cage's orbit over its radial play": orbit}),
+        "power loss [W]": result.power_loss,
+        "cage speed [rpm]": result.cage_speed_rpm,
+        "cage slip": result.cage_slip,
+    }
+
+
+def _table(figures: "dict[str, Quantity]") -> Table:
+    header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)")
+    rows = [
+        (words, figure.shown, _error(figure.statistical_error), _error(figure.numerical_error))
+        for words, figure in figures.items()
+    ]
+    return Table("", header, rows)
+
+
+def _error(error: float | None) -> str:
+    return "not estimated" if error is None else error_alone(error)
+
+
+def _run_sentence(result: "SimulationResult") -> str:
+    loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
+    runs = f"{counted(result.replicates, 'replicate')}, seed {result.seed}"
+    took = (
+        f"{result.cost['wall_s']:.2f} s{_predicted(result.cost)}, {result.cost['compile_s']:.1f} s to load or compile"
+    )
+    return f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}"
+
+
+def _predicted(cost: dict[str, float]) -> str:
+    """What was stated of the wall time on the way, if anything."""
+    if "predicted_most_s" not in cost:
+        return ""
+    return f" (predicted: {span(cost['predicted_least_s'], cost['predicted_most_s'])})"
+
+
+def _race_sentence(race: str, contact: dict[str, float]) -> str:
+    pressed = f"{contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} µm each way"
+    film = ""
+    if "lambda_ratio" in contact:
+        film = f", film {contact['central_film_um']:.2g} µm, lambda {contact['lambda_ratio']:.2g}"
+    return f"{race} race at its largest load: {pressed}{film}"
+
+
+def _clearances(clearance: dict[str, Any]) -> list[Block]:
+    """What makes each clearance in operation, the radial one with its fits one by one."""
+    plays = {
+        "clearance": clearance,
+        "guide clearance": clearance.get("guide"),
+        "pocket clearance": clearance.get("pocket"),
+    }
+    sentences = []
+    for name, play in plays.items():
+        if play is not None:
+            parts = {part.replace("_", " "): value for part, value in play.items() if isinstance(value, float)}
+            sentences.append(f"{name}: {', '.join(f'{part} {value:+.1f} µm' for part, value in parts.items())}")
+    return [Paragraph(sentence) for sentence in sentences]
+
+
+def _friction_sentence(check: dict[str, float | None]) -> str:
+    """The maker's friction in a line; [N mm] and [W]."""
+    power, rolling, sliding, heat, ratio = check.values()
+    model = (
+        f"SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 heat {heat:.3g} W"
+    )
+    share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
+    return f"maker's friction: {model}; {share}"
+
+
+def _further(result: "SimulationResult") -> list[Block]:
+    """What only a careful reader asks for: the transient, the losses one by one, the cost."""
+    losses = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
+    losses += [
+        (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance.items()
+    ]
+    gap = result.power_gap * result.power_loss.value
+    turns = result.transient_turns
+    return [
+        Paragraph("" if turns is None else f"transient: {counted(turns, 'shaft turn')}", detail=Detail.ALL),
+        Table(f"Power lost; the power balance closes to {gap:.2g} W", ("term", "W"), losses, detail=Detail.ALL),
+        Table(
+            "Cost", ("", ""), [(label(key), f"{value:.6g}") for key, value in result.cost.items()], detail=Detail.ALL
+        ),
+    ]
+
+
+def _target_sentence(target: dict[str, Any]) -> str:
+    chosen, cost = target["chosen"], target["cost"]
+    errors = target["relative_error"].items()
+    reached = ", ".join(f"{label(name)} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
+    aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
+    runs = (
+        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol {chosen['rtol']:g}"
+    )
+    spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
+    pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
+    return f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs"

@@ -1,0 +1,115 @@
+"""One tree of blocks, three renderings: the same figures with the same digits on a terminal, as Markdown and as HTML."""
+
+from __future__ import annotations
+
+import html
+import re
+
+import pytest
+from synthetic_study import RESPONSES, motion, summary
+
+from doe.report.html import html_report
+from doe.report.markdown import markdown_report
+from doe.report.sections import sections
+from doe.report.study.answer import answer_text, blocks
+from rbdyn.base.blocks import Bullets, Detail, Heading, Note, Paragraph, Section, Table, Tile, Tiles
+from rbdyn.base.render import html as page
+from rbdyn.base.render import markdown, terminal
+
+NUMBER = re.compile(r"[-+±]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+PICTURE = re.compile(r"<figure.*?</figure>|<details class=\"controls\".*?</details>", re.DOTALL)
+
+
+def numbers(text: str) -> list[str]:
+    """All figures of a text, in their order, with their signs and digits."""
+    return NUMBER.findall(text.replace("± ", "±"))
+
+
+def of_html(text: str) -> list[str]:
+    """Figures of the words of HTML; of pictures none."""
+    words = re.sub(r"<[^>]*>", " ", PICTURE.sub("", text))
+    return numbers(html.unescape(words).replace("\xa0", " "))
+
+
+def of_markdown(text: str) -> list[str]:
+    """Figures of Markdown."""
+    return numbers(html.unescape(re.sub(r"\\(.)", r"\1", text)))
+
+
+def of_terminal(part: Section) -> list[str]:
+    """Figures on a page without an end: there no table is broken, so none stands twice."""
+    rows = [terminal.text([block], Detail.ALL, 10_000) for block in part.blocks]
+    return numbers("".join(rows))
+
+
+def record() -> dict:
+    """The made-up study with everything that an answer can say."""
+    whole = summary()
+    limit = {"sense": "<=", "bound": 260.0, "value": 231.472, "error": 0.0057, "verdict": "kept", "probability": 0.99}
+    for name in ("baseline", "pick"):
+        whole["confirmation"][name]["limits"] = {RESPONSES[2]: limit}
+    whole["edge"] = {"sentence": "The pick lies 0.05 mm inside of the region."}
+    whole["adaptive"] = {"sentences": ["The pick has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."]}
+    whole["tolerances_sentence"] = "95 % of the parts keep the gain of 3.25 ± 0.41 %."
+    return whole
+
+
+@pytest.mark.parametrize("section", sections(record(), motion()), ids=lambda section: section.key)
+def test_every_section_has_the_same_figures_in_three_renderings(section):
+    """Terminal, Markdown and HTML of one section: the same numbers to the digit, in the same order.
+
+    Tiles have their own order on a page, which shows a figure with all that belongs to it together.
+    """
+    ours = of_terminal(section)
+    assert ours or section.key in ("notes", "motion", "surfaces")
+    assert ours == of_markdown(markdown.text(section.blocks))
+    tiles = any(isinstance(block, Tiles) for block in section.blocks)
+    arranged = sorted if tiles else list
+    assert arranged(ours) == arranged(of_html(page.section(section).partition("</h2>")[2]))
+
+
+def test_a_whole_study_has_the_same_figures_as_its_sections():
+    """The files of a study: report.md and report.html hold the numbers of the tree, answer.txt those of its answer."""
+    tree = sections(record())
+    whole = [number for part in tree for number in [*numbers(part.title), *of_terminal(part)]]
+    assert of_markdown(markdown_report(record()).partition("\n")[2]) == whole
+    body = html_report(record()).partition('<section id="answer"')[2].partition("</main>")[0]
+    parts = re.split(r'<section id="', body)
+    assert len(parts) == len(tree)
+    answer = numbers(answer_text(record()))
+    assert set(of_terminal(tree[0])) <= set(answer)
+    assert set(answer) <= {*of_terminal(tree[0]), *of_terminal(tree[-1])}
+    assert set(answer) <= set(numbers(terminal.text(blocks(record()))))
+    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in markdown_report(record())
+
+
+def test_no_key_stands_in_what_people_read():
+    """Words, never keys: neither factors nor responses by their names in the record."""
+    whole = record()
+    text = answer_text(whole) + terminal.text(blocks(whole), Detail.ALL)
+    for name in [*RESPONSES, *whole["pick"]]:
+        assert name not in text, name
+
+
+def test_every_block_is_rendered_three_times_and_details_are_for_who_asks():
+    """Unit: each kind of block on the terminal, as Markdown and as HTML; quietly no notes, only verbosely all."""
+    tree = [
+        Paragraph("A verdict of 5 %.", "statement"), Note("a limit of 1.5"), Heading("Parts"), Bullets(["one of 2"]),
+        Table("Sizes", ("part", "size"), [("ring & <b>", "1.0 ± 0.2")], "in mm", detail=Detail.ALL),
+        Tiles("Clearances", "pick", [Tile("guide", "0.185", "mm", [("baseline", "0.150")])]),
+    ]  # fmt: skip
+    quiet, usual, full = (terminal.text(tree, detail) for detail in Detail)
+    assert "note:" not in quiet and "note: a limit of 1.5" in usual and "1.0 ± 0.2" not in usual
+    assert "ring & <b>" in full and full.index("Sizes") < full.index("in mm")
+    assert "| guide [mm] | 0.185 | 0.150 |" in markdown.text(tree) and "ring &amp; &lt;b>" in markdown.text(tree)
+    written = "".join(map(page.render, tree))
+    assert "ring &amp; &lt;b&gt;" in written and "baseline 0.150 mm" in written
+    assert numbers(full) == of_markdown(markdown.text(tree))
+
+
+def test_a_terminal_breaks_sentences_between_words():
+    """Unit: at 40 columns no line is longer and no word is broken; a file keeps a sentence in one line."""
+    sentence = "The closing link is -0.0150 to 0.0483 mm in worst case, 0.0053 to 0.0368 mm by root sum square."
+    lines = terminal.text([Paragraph(sentence)], width=40).splitlines()
+    assert max(map(len, lines)) <= 40 and " ".join(lines) == sentence
+    assert terminal.text([Paragraph(sentence)]) == f"{sentence}\n"
