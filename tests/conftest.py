@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.faults import read_toml
 from rbdyn.scene import Scene
 

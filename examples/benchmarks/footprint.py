@@ -30,7 +30,7 @@ class Footprint:
 def footprint(scene: "Scene", bearing: "RollerBearing") -> Footprint:
     """Sizes for a scene whose bearing has been run. Raises KeyError where nothing was compiled for its laws."""
     from rbdyn.dynamics.integrators.method import explicit_method, method_of
-    from rbdyn.dynamics.parameters.scales import layout_of
+    from rbdyn.dynamics.parameters.state import layout_of
 
     pair = method_of(explicit_method(scene.numerics.method, scene.numerics.rtol), scene, bearing)
     return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))

@@ -30,7 +30,7 @@ from typing import NamedTuple
 from rbdyn.dynamics.companions import LEAST_DAMPING, Companions, companions_of, longest_step, usual_companions
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import light_contact
+from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor

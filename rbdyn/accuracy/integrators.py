@@ -17,7 +17,7 @@ from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
-from rbdyn.dynamics.parameters.scales import scales
+from rbdyn.dynamics.parameters.state import scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene

@@ -17,7 +17,7 @@ from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of,
 from rbdyn.arrays import Array, Whole
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
+from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.record import Record, shown

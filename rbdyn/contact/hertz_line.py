@@ -2,6 +2,8 @@
 
 A whole roller takes one of the plain laws. A roller with a profile, or between tilted rings, is cut into slices, each
 of which carries its share of a plain law at its own approach. Plain laws differ by 7 % at most between 50 and 800 N.
+
+Pressure that leaves a permanent dent of 1e-4 of a rolling element's diameter (ISO 76).
 """
 
 import math
@@ -12,6 +14,16 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, fma, reordered_sum, rough_power
 from rbdyn.compiled.kernel import VECTOR, kernel, law, settled_kernel
+
+BALLS, ROLLERS = 4200e6, 4000e6  # [Pa]
+
+
+def dent_sentence(pressure: float, limit: float, race: str) -> str:
+    """What a ``pressure`` above the ``limit`` [Pa] does to the "inner" or "outer" race, and the mend."""
+    kind = "rollers" if limit == ROLLERS else "balls"
+    what = f"{1e-6 * pressure:.0f} MPa on the {race} race are more than the {1e-6 * limit:.0f} MPa of ISO 76"
+    return f"{what}: the race dents; lessen the load or take more or larger {kind}"
+
 
 EXPONENT = 10.0 / 9.0
 # Below this an overlap is round-off; it keeps logarithms and roots finite.

@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from rbdyn.dynamics.parameters.scales import LightContact, light_contact
+from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.metrics import FACTOR, Replicate, bias_scale, companion_tolerance
 from rbdyn.scene import Scene
 

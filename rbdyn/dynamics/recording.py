@@ -1,4 +1,12 @@
-"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes."""
+"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes.
+
+How long the slow motions of a bearing take to relax, from its linearised equations of motion.
+
+Contacts ring in microseconds, but the cage's spin, the velocity of its centre and the spins of the rollers lose a
+disturbance only as fast as braking and driving moments change with them: in the time inertia over slope of the moments.
+Most moments act in passing contacts, so the slope is the mean over states of the running bearing. A run that counts fewer
+turns than a few such times shows the start of the bearing, not its steady figures, and no test of drift can see that.
+"""
 
 import math
 import time
@@ -6,6 +14,7 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +22,8 @@ from rbdyn.arrays import Array
 from rbdyn.dynamics.companions import Companions
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
-from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X
+from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.records import (
     ACCEPTED,
     DERIVATIVES,
@@ -24,16 +34,84 @@ from rbdyn.dynamics.integrators.records import (
     SAMPLES,
     SPEEDS,
     SQUARES,
+    carry_from,
+    empty_tally,
 )
-from rbdyn.dynamics.pace import Pace
-from rbdyn.dynamics.parameters.scales import scales
-from rbdyn.dynamics.relaxation import MOTIONS, Linearised
-from rbdyn.dynamics.run import Run, with_numerics
+from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales
+from rbdyn.dynamics.run import Pace, Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.records.forecast import Notice
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
+
+MOTIONS = ("the spin of the cage", "the motion of the cage's centre", "the spin of the rollers")
+# Change of a speed by which slopes are taken, over the speed that a contact can make.
+INCREMENT = 1e-4
+# Time after which accelerations are read, over that of a contact: short of any change.
+READING = 1e-6
+
+
+class Linearised:
+    """Reads decay rates in states along the way of a run."""
+
+    def __init__(self, run: Run) -> None:
+        scene = run.scene
+        state, z, scale = layout_of(scene), scene.bearing.rollers, scales(scene)
+        cage = state.first_body
+        self.run, self.reading_s = run, READING * scale.length / scale.speed
+        self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
+        self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
+        first = state.coefficients
+        self.coefficients = [] if first is None else list(range(first, state.size))
+        self.book = empty_tally()
+
+    def decay_rates(self) -> Array:
+        """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which stays as it is."""
+        at_rest, following, rates = self._accelerations([]), self.coefficients, []
+        if following:
+            # Each coefficient follows its steady value at a rate of its own.
+            alone = (at_rest - self._accelerations(following))[following] / self.increments[following]
+        for places in self.motions:
+            change = self._accelerations(places) - at_rest
+            if following:
+                change = self._accelerations(places, change[following] / alone) - at_rest
+            rates.append(-float(np.mean(change[places] / self.increments[places])))
+        return np.array(rates)
+
+    def _accelerations(self, places: Sequence[int], coefficients: Array | None = None) -> Array:
+        """Rates of change of the state where the speeds at some places are larger by their increments, and the traction
+        coefficients, where they are states, by ``coefficients``.
+        """
+        run, y = self.run, self.run.carry.y.copy()
+        y[places] += self.increments[places]
+        if coefficients is not None:
+            y[self.coefficients] += coefficients
+        probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
+        advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
+        return probe.k[0]
+
+
+class Relaxation(NamedTuple):
+    """The slowest motion and the time [s] in which it relaxes."""
+
+    motion: str
+    time_s: float
+
+
+def slowest(rates: Array) -> Relaxation | None:
+    """Slowest motion by decay rates (states, motions) [1/s]; None where no state was looked at or none of them decays.
+
+    Few states tell a rate roughly: it counts as one standard error larger, so that no run is lengthened for noise. A motion
+    that does not decay even so excites itself, and has no relaxation time.
+    """
+    count = len(rates)
+    if count < 2:
+        return None
+    likely = rates.mean(axis=0) + rates.std(axis=0, ddof=1) / math.sqrt(count)
+    times = [Relaxation(name, 1.0 / rate) for name, rate in zip(MOTIONS, likely.tolist(), strict=True) if rate > 0.0]
+    return max(times, key=lambda each: each.time_s, default=None)
+
 
 # Columns of a tally's whirl that make up a replicate's ``whirl`` and its ``orbit``.
 SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)

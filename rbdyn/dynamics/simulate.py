@@ -11,13 +11,19 @@ from rbdyn.dynamics.companions import TIGHT
 from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
-from rbdyn.dynamics.pace import Pace, log
-from rbdyn.dynamics.parameters.friction_check import friction_check, friction_notes
-from rbdyn.dynamics.parameters.left_out import film_drive_notes, heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.race_report import race_notes, race_report
+from rbdyn.dynamics.parameters.validity import (
+    film_drive_notes,
+    friction_check,
+    friction_notes,
+    heat_notes,
+    left_out_notes,
+    light_load_notes,
+    race_notes,
+    race_report,
+)
 from rbdyn.dynamics.recording import recording_of
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import Pace, log, prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import orbit_radius_share, whirl_notes, work_done

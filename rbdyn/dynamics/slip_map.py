@@ -17,10 +17,9 @@ from rbdyn.base.words import counted
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.pace import UNLIKE, Pace, log
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import UNLIKE, Pace, log, prepare
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError

@@ -12,8 +12,8 @@ from rbdyn.arrays import Array, Mask
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
+from rbdyn.contact.hertz_line import BALLS, dent_sentence
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.faults import MethodError
 from rbdyn.life import Life, Turning, turning_rings
 from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life

@@ -26,7 +26,7 @@ from doe.study.stages import study_stages
 from doe.study.status import study_status
 from doe.study_file import Study
 from rbdyn.cli.terminal import notice
-from rbdyn.dynamics import pace
+from rbdyn.dynamics import run
 from rbdyn.dynamics import simulate as module
 from rbdyn.records import forecast
 
@@ -55,7 +55,7 @@ def left(said: str) -> list[tuple[int, int]]:
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let what is left be stated of the shortest runs."""
     monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
-    monkeypatch.setattr(pace, "FIRST_LOOK_S", 0.0)
+    monkeypatch.setattr(run, "FIRST_LOOK_S", 0.0)
 
 
 @pytest.mark.parametrize(("command", "more", "runs"), [("simulate", (), 3), ("map", MAPPED, 6)])

@@ -24,7 +24,7 @@ from rbdyn.dynamics.forces.races import EqualRollers, RoundRace, WavyRace, unequ
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant
 from rbdyn.dynamics.forces.surroundings import Gravity, NoGravity
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 
 WAVINESS = "[{order=2, amplitude_um=5.0, phase_deg=10.0}, {order=13, amplitude_um=0.5, phase_deg=-30.0}]"
 SCHEDULE = (

@@ -18,7 +18,7 @@ from rbdyn.dynamics.forces.equations import LOAD, SHAFT, mechanical_energy
 from rbdyn.dynamics.forces.races import unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, SmoothRamps
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
 
 INTERPRETED = Path(__file__).parents[1] / "helpers" / "interpreted_invariants.py"

@@ -13,7 +13,7 @@ import pytest
 from rbdyn import Scene, history, simulate
 from rbdyn.dynamics.forces.state import CAGE_SPEED
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.start import start_state
+from rbdyn.dynamics.parameters.state import start_state
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
 RUN = (

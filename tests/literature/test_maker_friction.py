@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 from doe.report.sections.bearing import power
 from rbdyn import Scene
 from rbdyn.cli.app import app
-from rbdyn.dynamics.parameters.friction_check import friction_check, friction_notes
-from rbdyn.dynamics.parameters.left_out import light_load_notes
+from rbdyn.dynamics.parameters.validity import friction_check, friction_notes, light_load_notes
 from rbdyn.faults import InputError
 from rbdyn.life import maker_friction
 from rbdyn.life.rollers import minimum_loads

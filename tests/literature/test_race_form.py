@@ -178,7 +178,7 @@ def test_literature_orders_that_shake_a_ring(order):
 def test_unit_scene_makes_the_form(make_scene):
     """Unit: order, amplitude and phase of a scene; a clock only where a form turns; the reach holds the highest wave."""
     from rbdyn.dynamics.parameters.model import roller_bearing
-    from rbdyn.dynamics.parameters.scales import layout_of
+    from rbdyn.dynamics.parameters.state import layout_of
 
     standing = make_scene("bearing.outer_waviness=[{order=2, amplitude_um=10.0, phase_deg=90.0}]")
     bearing = roller_bearing(standing)

@@ -23,7 +23,7 @@ from rbdyn.dynamics.companions import (
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import dormand_prince, kutta_pair, rosenbrock
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import light_contact
+from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import Replicate

@@ -16,7 +16,7 @@ from numpy_twin import POWERS, twin
 from rbdyn.dynamics.forces.equations import LOADS, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT, pocket_loads
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import needs_clock
+from rbdyn.dynamics.parameters.state import needs_clock
 
 # Position round-off of 3e-18 m over the smallest approaches of the random states (some 1e-8 m) is 3e-10 of that
 # contact's load, and 1e-10 of the largest force on a body.

@@ -33,7 +33,7 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.integrators.records import empty_tally
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError, RunError
 

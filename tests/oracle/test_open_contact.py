@@ -9,7 +9,7 @@ import pytest
 from line_film_oracle import rigid
 
 from rbdyn.contact.rolling_resistance import film_forces, inlet, open_film, touching_gap
-from rbdyn.dynamics.parameters.left_out import film_drive_notes, left_out_notes
+from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import InputError
 

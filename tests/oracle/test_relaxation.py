@@ -6,9 +6,8 @@ import pytest
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.state import CAGE_SPEED, CAGE_VX, CAGE_VY
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import absolute_tolerance
-from rbdyn.dynamics.recording import Recording
-from rbdyn.dynamics.relaxation import Linearised, slowest
+from rbdyn.dynamics.parameters.state import absolute_tolerance
+from rbdyn.dynamics.recording import Linearised, Recording, slowest
 from rbdyn.dynamics.run import Run, with_numerics
 from tests.oracles.numpy_twin import twin
 

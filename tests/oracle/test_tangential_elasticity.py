@@ -15,8 +15,8 @@ from rbdyn.contact.traction import traction
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
-from rbdyn.dynamics.relaxation import Linearised
+from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.dynamics.recording import Linearised
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import InputError

@@ -20,7 +20,7 @@ from rbdyn.dynamics.integrators.implicit import differences, rodas
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, factor, jacobian, shifted, solve
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales, slip_scale
+from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width

@@ -16,7 +16,7 @@ from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance, refine_peak
 from rbdyn.dynamics.integrators.method_laws import interpolate
-from rbdyn.dynamics.parameters.scales import scales
+from rbdyn.dynamics.parameters.state import scales
 from rbdyn.faults import RunError
 
 PAIR = dp.DormandPrince()

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from rbdyn.contact.film_thickness import half_width
-from rbdyn.dynamics.parameters.left_out import heat_notes
-from rbdyn.dynamics.parameters.race_report import race_notes, race_report
-from rbdyn.dynamics.parameters.race_traction import rolling_contacts
+from rbdyn.dynamics.parameters.model import rolling_contacts
+from rbdyn.dynamics.parameters.validity import heat_notes, race_notes, race_report
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene

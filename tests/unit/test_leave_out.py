@@ -32,7 +32,7 @@ from rbdyn.dynamics.forces.race_lanes import open_contact
 from rbdyn.dynamics.forces.races import turned_multiple
 from rbdyn.dynamics.forces.schedule import segment
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import Run
 
@@ -111,7 +111,7 @@ NOT_NEEDED = (
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
     "rbdyn.accuracy", "rbdyn.accuracy.options", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
     "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion.history", "rbdyn.dynamics.forces.observe",
-    "rbdyn.dynamics.motion.rating", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
+    "rbdyn.dynamics.motion.history", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 

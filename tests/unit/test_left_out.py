@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from scipy.integrate import quad
 
-from rbdyn.dynamics.parameters.left_out import (
+from rbdyn.dynamics.parameters.validity import (
     LEFT_OUT,
     cylinder_moment,
     disc_moment,

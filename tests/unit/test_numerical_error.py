@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rbdyn.dynamics.parameters.scales import light_contact
+from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.result import Quantity
 
 BENCHMARKS = Path(__file__).parents[2] / "examples" / "benchmarks"

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from rbdyn.contact.rheology import LimitingShear
-from rbdyn.dynamics.parameters.left_out import light_load_notes
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.race_traction import _rheology
-from rbdyn.dynamics.parameters.start import start_state
+from rbdyn.dynamics.parameters.model import _rheology, roller_bearing
+from rbdyn.dynamics.parameters.state import start_state
+from rbdyn.dynamics.parameters.validity import light_load_notes
 from rbdyn.faults import InputError
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.lubricants import oil_at

@@ -6,8 +6,8 @@ import re
 import pytest
 
 import rbdyn
-from rbdyn.dynamics import pace
-from rbdyn.dynamics.pace import Pace
+from rbdyn.dynamics import run as pace
+from rbdyn.dynamics.run import Pace
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.records import forecast
 

@@ -15,8 +15,7 @@ from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_L
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
 from rbdyn.dynamics.integrators.method import explicit_method
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import CAGE_SHARES, absolute_tolerance
-from rbdyn.dynamics.parameters.start import start_state
+from rbdyn.dynamics.parameters.state import CAGE_SHARES, absolute_tolerance, start_state
 from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows

@@ -198,7 +198,7 @@ def test_unit_everything_off_loses_nothing(conservative):
 
 def test_invariant_guidance_brakes_or_drives(outer, inner, outer_result, evaluate):
     """Invariant: an outer land brakes the cage, an inner land drives it; the cage then runs faster, never past the shaft."""
-    from rbdyn.dynamics.parameters.start import start_state
+    from rbdyn.dynamics.parameters.state import start_state
 
     for scene, sign in ((outer, -1.0), (inner, 1.0)):
         bearing = roller_bearing(scene)

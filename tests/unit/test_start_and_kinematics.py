@@ -16,11 +16,10 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.forces.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.parameters import scales as scale_module
+from rbdyn.dynamics.parameters import state as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.race_report import race_report
-from rbdyn.dynamics.parameters.scales import scales
-from rbdyn.dynamics.parameters.start import start_state, static_share
+from rbdyn.dynamics.parameters.state import scales, start_state, static_share
+from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.run import Run
 from rbdyn.mounting import fits
 from rbdyn.scene import Scene

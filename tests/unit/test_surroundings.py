@@ -28,7 +28,7 @@ from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, Smooth
 from rbdyn.dynamics.forces.surroundings import Gravity, NoGravity, height_energy
 from rbdyn.dynamics.integrators.records import NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 7.0]), np.array([10.0, -4.0, 6.0, 6.5])

@@ -25,7 +25,7 @@ from rbdyn.contact.traction import (
     traction,
     traction_surface,
 )
-from rbdyn.dynamics.parameters.race_traction import film_report, race_traction
+from rbdyn.dynamics.parameters.model import film_report, race_traction
 from rbdyn.faults import InputError
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.scene import Scene

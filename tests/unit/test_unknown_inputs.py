@@ -9,7 +9,7 @@ from scipy import stats
 
 from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.cli.keys import keys
-from rbdyn.dynamics.parameters.scales import light_contact
+from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.faults import InputError, read_toml, validated
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene

@@ -11,7 +11,7 @@ from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS
 from rbdyn.dynamics.integrators.rosenbrock import STAGES, Differences, OneRoller, Rodas, arrow_matrix
-from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
+from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of
 from rbdyn.scene import Scene
 
 

@@ -1,4 +1,6 @@
-"""A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples."""
+"""A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples; and the rating
+life of the bearing by the loads that every roller saw (ISO/TS 16281) instead of static ones.
+"""
 
 import math
 from collections.abc import Iterator
@@ -11,19 +13,43 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.base.words import Brief, Figure
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.observe import OBSERVED, observe
-from rbdyn.dynamics.pace import Pace, log
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import layout_of
-from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads
+from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
+from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.dynamics.run import Pace, Run, log
 from rbdyn.faults import LONGEST_NAME, one_line, refuse
+from rbdyn.life import turning_rings
+from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.records.forecast import Notice
 from rbdyn.scene import Scene, rollers_only
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rbdyn.life.rollers import ReferenceLife
+
+def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Array) -> ReferenceLife:
+    """Reference life from loads [N] of every roller over time at azimuths [rad], (rows, rollers) each; they should span
+    whole cage turns.
+
+    Loads spread over the slices as at rest. Edge stresses count where the roller has a profile; a plain cylinder's
+    ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
+    """
+    drawing, radius = scene.bearing, 0.5 * scene.bearing.roller_diameter
+    nx, ny = np.cos(azimuth), np.sin(azimuth)
+    inner, outer = (
+        slice_loads(race_contact_law(scene, race), scene.slices, radius, loads, nx, ny)
+        for race, loads in (("inner", inner_load), ("outer", outer_load))
+    )
+    return reference_life(
+        inner,
+        outer,
+        capacity=drawing.rated_capacity,
+        gamma=drawing.diameter_ratio,
+        turning=turning_rings(*scene.operation.speeds),
+        angle=np.mod(azimuth, 2.0 * math.pi),
+        edges=drawing.roller_profile != "cylinder",
+    )
+
 
 # Numbers of a history, 0.8 GB: with its table and pictures 2 GB. 1000 turns of 10 rollers at 512 samples are 0.7e8.
 MOST_NUMBERS = 1e8
@@ -87,7 +113,6 @@ class History(Brief):
 
     def life(self) -> "ReferenceLife":
         """Reference rating life of ISO/TS 16281 from the loads of this history."""
-        from rbdyn.dynamics.motion.rating import rating_life
 
         return rating_life(self.scene, self.azimuth, self.inner_load, self.outer_load)
 

@@ -13,7 +13,7 @@ from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.records import DERIVATIVES
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.scales import absolute_tolerance
+from rbdyn.dynamics.parameters.state import absolute_tolerance
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.records.record import Record, derived, keyed, outside_json

@@ -12,7 +12,7 @@ import numpy as np
 
 from rbdyn.arrays import Array, Whole
 from rbdyn.contact.film_thickness import hertz_pressure
-from rbdyn.dynamics.parameters.race_traction import rolling_contacts
+from rbdyn.dynamics.parameters.model import rolling_contacts
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
