@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.arrays import Array, Whole
-from doe.running.failure import Failure
 from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
-from doe.running.store import Point, Store
+from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key

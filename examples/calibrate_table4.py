@@ -29,8 +29,7 @@ from scipy.stats import spearmanr
 from doe import clearance
 from doe.clearance import Simulations
 from doe.report.steps.calibrate import blocks, files_of, record_of, write
-from doe.running.failure import Failure
-from doe.running.store import Store
+from doe.running.store import Failure, Store
 from doe.study.calibration import Calibration, find_calibration
 from doe.study.calibration_question import Question, question_of, read_question
 from doe.unknown import inputs as unknown

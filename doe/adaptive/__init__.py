@@ -8,6 +8,5 @@
 - ``search``: design, batches, fresh runs; ``result``: what came out
 """
 
-from doe.adaptive.result import AdaptiveFront, Batch
-from doe.adaptive.runs import Border, Evaluate, Runs
-from doe.adaptive.search import Plan, adaptive_front
+from doe.adaptive.emulators import Border, Evaluate, Runs
+from doe.adaptive.search import AdaptiveFront, Batch, Plan, adaptive_front

@@ -1,4 +1,5 @@
-"""The search: design, batches where most is to be gained, a check of what is foretold, fresh runs at the finalists.
+"""The search: design, batches where most is to be gained, a check of the predictions, fresh runs at the finalists; whether it is to go
+beyond the border of its region, when it may stop, and what it gives.
 
 What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
 made afresh at the finalists and alone are reported, which had no part in their choice; what they tell helps to choose
@@ -8,27 +9,177 @@ the finalists that are left, but has no say in what was chosen.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy import special
 from scipy.stats import qmc
 
-from doe.adaptive.border import Place, faces, grown, outermost
-from doe.adaptive.candidates import Region, candidates, front_rows
-from doe.adaptive.emulators import Emulators, fit_emulators, shares_of
-from doe.adaptive.improvement import DRAWS, WORTH, Levels, batch, known_of, levels_of
-from doe.adaptive.result import AdaptiveFront, Batch
-from doe.adaptive.runs import Border, Evaluate, Face, Runs
-from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
-from doe.arrays import Array, Whole
+from doe.adaptive.acquisition import DRAWS, WORTH, Levels, Region, batch, candidates, front_rows, known_of, levels_of
+from doe.adaptive.emulators import Border, Emulators, Evaluate, Face, Runs, fit_emulators, shares_of
+from doe.arrays import Array, Rows, Whole
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
-from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
+from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, hypervolume, spread
 from doe.pareto.simulated import Samples, SimulatedFront
 from doe.threads import one_thread
 from rbdyn.base.words import counted
 from rbdyn.faults import MethodError
+
+NEAR = 0.05  # of the range of a factor: as near to a face a pick lies at it
+AHEAD, BETTER = 0.1, 0.9  # of the range beyond a face; chance there of what no point of the front dominates
+GROWTH, MOST_MOVES = 0.5, 3  # of the range a move; moves of a search
+DRAWN = 64  # functions
+
+
+class Place(NamedTuple):
+    """Where a search is looked at: what it knows, its region, points (n, k) of it, and how many faces it has moved."""
+
+    emulators: Emulators
+    region: Region
+    points: Array
+    moves: int
+
+
+def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator) -> list[Face]:
+    """The faces that the pick of the front foretold lies at."""
+    emulators, region, points, moves = place
+    rows, costs = front_rows(emulators, points)
+    pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
+    span, draws = region.high - region.low, emulators.draws(DRAWN, random)
+    found = []
+    for factor, side in product(range(pick.size - len(region.levels)), (-1, 1)):
+        face = (region.high if side > 0 else region.low)[factor]
+        if abs(pick[factor] - face) > NEAR * span[factor]:
+            continue
+        beyond = pick.copy()
+        beyond[factor] = face + side * AHEAD * span[factor]
+        drawn = emulators.goals.costs(draws(np.vstack([beyond, points[rows]])))
+        better = 1.0 - float(dominates(drawn[:, 1:], drawn[:, :1]).any(axis=1).mean())
+        found.append(
+            Face(
+                factor,
+                side,
+                float(face),
+                better,
+                "moves" if moves == MOST_MOVES else _held(border, region, factor, side),
+            )
+        )
+    return found
+
+
+def outermost(found: list[Face]) -> Face | None:
+    """The face to be moved: of those that nothing holds and that the front goes on beyond, the surest."""
+    free = [face for face in found if not face.held and face.better > BETTER]
+    return max(free, key=lambda face: face.better, default=None)
+
+
+def grown(border: Border, region: Region, factor: int, side: int) -> Region:
+    """The region with a face moved outward, as far as the border permits."""
+    low, high = region.low.copy(), region.high.copy()
+    by = GROWTH * (high - low)[factor]
+    if side > 0:
+        high[factor] = max(min(high[factor] + by, border.high[factor]), high[factor])
+    else:
+        low[factor] = min(max(low[factor] - by, border.low[factor]), low[factor])
+    return region._replace(low=low, high=high)
+
+
+def _held(border: Border, region: Region, factor: int, side: int) -> str:
+    wider = grown(border, region, factor, side)
+    if (
+        np.ptp([wider.low, wider.high], axis=0)[factor]
+        < (1.0 + AHEAD) * np.ptp([region.low, region.high], axis=0)[factor]
+    ):
+        return "allowed"
+    return "" if border.possible(np.array(list(product(*zip(wider.low, wider.high, strict=True))))) else "scene"
+
+
+@dataclass(frozen=True)
+class Batch:
+    """State of the search after ``runs`` runs that went well, those of the design included.
+
+    ``hypervolume`` of the front foretold and its standard deviation over the functions drawn from the emulators; ``gained``
+    by the last batch (NaN before the first); ``left`` to be gained if all were known. All on the scale of the front foretold
+    at that time; ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front. ``why``
+    the next batch was made: "improvement", or "check" of the front foretold; "" after the last.
+    """
+
+    runs: int
+    hypervolume: float
+    deviation: float
+    gained: float
+    left: float
+    why: str
+    reached: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveFront:
+    """A front found by emulators and confirmed by fresh runs.
+
+    ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
+    whole front that the emulators foretell, of which the rows ``shown`` have the largest hypervolume, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
+    ``region`` that was searched in the end. ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that stand for the front foretold at each; ``searched`` (n,) are all runs of design and search, in factor units,
+    ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
+    and where to (coded); ``faces`` that the pick lies at in the end.
+    ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
+    emulators by, in standard deviations. ``fresh``: number of the fresh runs. ``stopped``: why the search ended. ``seconds``
+    of the emulators and of the choice of runs.
+    """
+
+    front: SimulatedFront
+    archive: Array
+    shown: Rows
+    foretold: Array
+    deviations: Array
+    emulators: Emulators
+    region: Region
+    history: tuple[Batch, ...]
+    fronts: tuple[Array, ...]
+    moves: tuple[tuple[Face, float], ...]
+    faces: tuple[Face, ...]
+    searched: Samples
+    why: tuple[str, ...]
+    spent: Whole
+    bias: Array
+    spread: Array
+    fresh: int
+    stopped: str
+    seconds: float
+
+
+SHARE = 0.25  # of the deviation of the hypervolume over the fronts drawn: a batch that gains less gains nothing
+LEAST = 0.0025  # of the hypervolume: what the choice of the points that stand for a front may make of it
+BATCHES = 3  # that gain nothing in a row; with the first alone prototypes stopped with 2 % still to gain
+CHECKS = 8  # fresh runs on the front
+DOUBT = 0.05  # chance of calling right emulators wrong
+
+
+def nothing_gained(history: Sequence[Batch], since: int) -> bool:
+    """Whether the last batches after the one numbered ``since`` gained nothing."""
+    last = history[since + 1 :][-BATCHES:]
+    return len(last) == BATCHES and all(
+        each.gained < max(SHARE * each.deviation, LEAST * each.hypervolume) for each in last
+    )
+
+
+def missed(emulators: Emulators, runs: Runs) -> np.ndarray:
+    """What runs (n, m) that the emulators do not know miss them by, in standard deviations of the two together."""
+    means, deviations = emulators.predict(runs.points)
+    own = emulators.scatter(runs.points) / runs.replicates[:, None] + emulators.nuggets()
+    return np.asarray((runs.values - means) / np.sqrt(deviations**2 + own))
+
+
+def as_foretold(emulators: Emulators, runs: Runs) -> bool:
+    """Whether fresh runs lie within what the emulators foretell of them, all responses with a goal or a limit together."""
+    goals = emulators.goals
+    columns = sorted({*goals.objectives.tolist(), *(index for index, _, _ in goals.limited)})
+    off = missed(emulators, runs.rows(runs.good))[:, columns]
+    return off.size > 0 and bool(special.chdtrc(off.size, float((off**2).sum())) > DOUBT)
+
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
 TESTED = 4  # last batches that tell how right the emulators' deviations are

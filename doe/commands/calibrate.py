@@ -35,7 +35,7 @@ def calibrate(
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
-        from doe.running.agenda import ANSWER
+        from doe.running.runner import ANSWER
         from doe.study.calibration import find_calibration
         from doe.study.calibration_question import question_of, read_question
         from doe.study.stages_unknown import calibration_stages

@@ -86,7 +86,7 @@ def _answer(record: dict[str, Any], study: "Study", data: Path | None, path: Pat
 def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "tuple[Study, tuple[str, ...]]":
     """The study of the file; without one, of the table and what the command names of it, with notes. Raises InputError."""
     from doe.study_file import Study
-    from doe.study_file.of_table import study_of_table
+    from doe.study_file.study import study_of_table
 
     if path is not None:
         refuse(f"--{option}: {path} says it; leave out one or the other" for option, given in named.items() if given)

@@ -74,8 +74,7 @@ def _point(study: "Study", text: str) -> list[float]:
     from collections import Counter
     from math import nan
 
-    from doe.study_file.cells import is_number
-    from doe.study_file.table import RUN
+    from doe.study_file.table import RUN, is_number
 
     values = study.by_factor(study.baseline)
     parts = [part.strip() for part in text.split(",")]

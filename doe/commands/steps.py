@@ -126,7 +126,7 @@ def _store_folder(out: Path | None, source: Path) -> Iterator[Path]:
     if out is not None:
         yield output_folder(out, "doe", source)
         return
-    from doe.running.failure import StoppedError
+    from doe.running.store import StoppedError
 
     with tempfile.TemporaryDirectory() as folder:
         try:

@@ -35,7 +35,7 @@ def uncertainty(
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import blocks, record_of, write
-        from doe.running.agenda import ANSWER
+        from doe.running.runner import ANSWER
         from doe.study.stages_unknown import uncertainty_stages
         from doe.study.status import content_digest, runs_digest
         from doe.study.uncertainty import find_uncertainty

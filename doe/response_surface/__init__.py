@@ -1,9 +1,8 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
-``surface`` fits and predicts; ``least_squares`` solves, ``anova``, ``canonical``, ``diagnostics`` and
-``model_error`` judge, ``words`` says it in sentences.
+- ``surface`` fits, predicts, and says in sentences what the statistics mean; ``least_squares`` checks the runs and solves
+- ``anova``, ``model_error``, ``canonical``, ``box_cox`` judge; ``comparison``: against a Gaussian process
 """
 
 from doe.designs.model import model_matrix
-from doe.response_surface.surface import Surface, fit
-from doe.response_surface.words import describe
+from doe.response_surface.surface import Surface, describe, fit

@@ -26,8 +26,7 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array, Whole
-from doe.response_surface.anova import AnovaRow, find, ratio, sum_within
-from doe.response_surface.diagnostics import p_text
+from doe.response_surface.anova import AnovaRow, find, p_text, ratio, sum_within
 from doe.response_surface.least_squares import LeastSquares
 from rbdyn.records.record import Record, derived, keyed, outside_json
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from doe.running.failure import StoppedError
 from doe.running.runner import Ran
+from doe.running.store import StoppedError
 from rbdyn.faults import InputError
 
 # A scheduler that does not shake hands, take up a client or have a worker within so long [s] is not there.

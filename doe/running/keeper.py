@@ -9,9 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from doe.running.agenda import NOTE, Agenda, Stage, agendas_of
-from doe.running.outlook import forecast_of
-from doe.running.runner import Engine, Ledger, Progress, Ran
+from doe.running.runner import NOTE, Agenda, Engine, Ledger, Progress, Ran, Stage, agendas_of, forecast_of
 from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.forecast import Measured, Notice

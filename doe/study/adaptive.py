@@ -12,15 +12,15 @@ from scipy.stats import qmc
 from doe import clearance
 from doe.adaptive import AdaptiveFront, Batch, Border, Plan, adaptive_front
 from doe.adaptive import Runs as Known
-from doe.adaptive.candidates import Region
+from doe.adaptive.acquisition import Region
 from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto.search import InfeasibleError
 from doe.pareto.simulated import Samples, SimulatedFront
 from doe.response_surface import Surface
-from doe.running.failure import Failure, grouped
 from doe.running.runner import Progress
+from doe.running.store import Failure, grouped
 from doe.study.design import design_of
 from doe.study.front import named_faults
 from doe.study.goals import goals_of, region_of

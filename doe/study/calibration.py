@@ -11,7 +11,7 @@ from scipy import special
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered, screened
 from doe.study.rig_file import Rig

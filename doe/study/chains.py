@@ -9,7 +9,7 @@ from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.pareto.tolerance import WidestTolerances
 from doe.study.goals import region_of
 from doe.study_file import Study
-from doe.study_file.chain_section import chain_table
+from doe.study_file.sections import chain_table
 from rbdyn.faults import InputError, check_all
 
 

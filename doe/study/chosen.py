@@ -10,7 +10,7 @@ from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import Choice, Confirmed, confirm
 from doe.study.front import find_front

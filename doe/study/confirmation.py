@@ -9,7 +9,7 @@ from scipy import special
 from doe import clearance
 from doe.arrays import Array
 from doe.clearance import Simulations
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.goals import goals_of
 from doe.study.intervals import LEVEL, joint_freedom, standard_errors, times_wider
 from doe.study.predicted import verdict

@@ -14,8 +14,8 @@ from doe.designs import Design
 from doe.designs.design import replicate_groups
 from doe.designs.model import Model, Terms, model_terms
 from doe.study_file import Study
-from doe.study_file.design_section import KEYS_OF
-from doe.study_file.design_section import Design as DesignSettings
+from doe.study_file.sections import KEYS_OF
+from doe.study_file.sections import Design as DesignSettings
 from doe.study_file.table import Table, read_table
 from rbdyn.base.words import are, counted
 from rbdyn.faults import InputError, MethodError, refuse

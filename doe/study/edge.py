@@ -11,7 +11,7 @@ from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from, error_of_difference
 from doe.study.drawn import jacobian
 from doe.study.goals import beyond_runs, goals_of, region_of

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doe.adaptive.border import NEAR
-from doe.adaptive.runs import Face
+from doe.adaptive.emulators import Face
+from doe.adaptive.search import NEAR
 from doe.arrays import Array
 from doe.study.adaptive import Adaptive, costs_foretold
 from doe.study.goals import goals_of

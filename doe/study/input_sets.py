@@ -14,9 +14,9 @@ from scipy.stats import t as student
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.running.failure import Failure, sentence
+from doe.running.store import Failure, sentence
 from doe.study.scene_columns import key_values, unknown_keys
-from doe.study_file.cells import read_sheet
+from doe.study_file.table import read_sheet
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
 from rbdyn.base.words import shown

@@ -10,7 +10,7 @@ from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.emulator import pooled_variances
 from doe.pareto import Goals
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.input_sets import Case, run
 from rbdyn.scene.unknown import Input
 

@@ -9,7 +9,7 @@ from typing import Any
 from doe.arrays import Array
 from doe.study.rig_signals import KINDS, cage_speed, whirl
 from doe.study.scene_columns import key_values, unknown_keys
-from doe.study_file.cells import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
+from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
 from rbdyn.faults import InputError, refuse
 

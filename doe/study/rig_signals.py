@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doe.arrays import Array
-from doe.study_file.cells import Limits, read_sheet
+from doe.study_file.table import Limits, read_sheet
 from rbdyn.base.words import counted
 from rbdyn.faults import InputError, refuse
 

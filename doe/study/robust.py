@@ -13,7 +13,7 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array
 from doe.clearance import Simulations
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.goals import goals_of
 from doe.study.input_sets import ROUND_SEEDS, Case, case_of, run_notes, strongest
 from doe.study.pairs import Pairs, simulated

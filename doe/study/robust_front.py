@@ -16,7 +16,7 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.goals import goals_of, region_of, rounded_within
 from doe.study.input_sets import Case, Sets, declared, run
 from doe.study.pairs import Pairs, relative_gains, simulated

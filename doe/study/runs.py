@@ -10,10 +10,9 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
-from doe.running.failure import Failure, alike, sentence
 from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Progress
-from doe.running.store import Store
+from doe.running.store import Failure, Store, alike, sentence
 from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from doe.study_file.table import read_table

@@ -8,7 +8,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
-from doe.study_file.cells import LONGEST_NUMBER, WHOLE, Column, is_number
+from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, is_number
 from rbdyn.faults import LONGEST_NAME, MOST_FAULTS, one_line
 from rbdyn.scene import Scene
 

@@ -5,10 +5,10 @@ from typing import get_args
 
 from doe import clearance
 from doe.clearance import work_of
-from doe.running.agenda import ANSWER, ANSWER_S, Stage
+from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.study.runs import ordered_runs
 from doe.study_file import Study
-from doe.study_file.front_section import Front
+from doe.study_file.sections import Front
 
 # Wall time [s] that surfaces with their front take about, and the pick's tolerances with the chains.
 FRONT_S, TOLERANCES_S = 6.0, 1.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from doe.clearance import work_of
-from doe.running.agenda import ANSWER, ANSWER_S, Stage
+from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import Case, read_case
 from doe.study.robust import case_of_study

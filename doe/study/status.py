@@ -13,11 +13,9 @@ from typing import Any
 
 from doe import clearance
 from doe.clearance import points_of
-from doe.running.agenda import Agenda, Stage, agendas_of
-from doe.running.failure import Failure, grouped
 from doe.running.lock import folders_of
-from doe.running.outlook import forecast_of
-from doe.running.store import CurrentRun, EndedRun, Point, RunResult, Store
+from doe.running.runner import Agenda, Stage, agendas_of, forecast_of
+from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, grouped
 from doe.study.finished import finished, inputs_digest
 from doe.study.runs import STORE, ordered_runs
 from doe.study.stages import DESIGN, design_works, study_stages

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from doe.arrays import Array
 from doe.clearance import Simulations
-from doe.running.failure import Failure
+from doe.running.store import Failure
 from doe.study.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
 from doe.threads import one_thread
 from doe.unknown.propagation import (

@@ -13,11 +13,9 @@ from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
-from doe.running.agenda import ANSWER, Stage
-from doe.running.failure import Failure
 from doe.running.keeper import AgendaKeeper
-from doe.running.runner import Progress
-from doe.running.store import Store
+from doe.running.runner import ANSWER, Progress, Stage
+from doe.running.store import Failure, Store
 from doe.study.adaptive import Adaptive, advice, find_adaptive
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study

@@ -13,7 +13,7 @@ from doe.study.drawn import draw_all, predict_all, predict_paired
 from doe.study.goals import goals_of, known_tolerances, region_of, rigid
 from doe.study.shares import Drawn, draws_of, keeping, open_errors
 from doe.study_file import Study
-from doe.study_file.front_section import Tolerances
+from doe.study_file.sections import Tolerances
 
 
 def widest_of(

@@ -1,6 +1,6 @@
-"""STUDY.toml: ``study`` is the whole file, each ``*_section`` a table of it. Checked before anything runs.
+"""STUDY.toml: ``study`` is the whole file, ``sections`` its tables. Checked before anything runs.
 
-``table`` reads runs made elsewhere; ``of_table`` makes a study of such a table alone.
+``table`` reads runs made elsewhere.
 """
 
 from doe.study_file.study import Study, StudyFile

@@ -1,13 +1,191 @@
-"""Tables of runs: a column a factor and a response, optionally errors, replicates and blocks."""
+"""Tables of runs: a column a factor and a response, optionally errors, replicates and blocks; and the cells of CSV files: fields by the
+names of their columns, and one bounded reader for every number in them.
+"""
 
+import csv
+import io
+import math
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from doe.arrays import Array, Whole
-from doe.study_file.cells import UNKNOWN, Limits, Sheet, listed, quoted, read_sheet
-from rbdyn.faults import InputError, refuse
+from rbdyn.base.words import counted
+from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.records.cells import NUMBER, plain_cell, quoted_cell
+
+WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
+# Characters of a number: every double has a shorter form, and Python converts no integer of thousands of digits.
+LONGEST_NUMBER = 400
+# What stands where a number is unknown.
+UNKNOWN = ("", "nan")
+# Names that a message lists at most.
+MOST_NAMES = 20
+
+
+class Limits(NamedTuple):
+    """Numbers that a column may have: up to ``most`` in magnitude, 0 or at least ``least``, of this ``sign``, whole or not."""
+
+    most: float
+    least: float = 0.0
+    sign: Literal["any", "not negative", "positive"] = "any"
+    whole: bool = False
+
+    def fault(self, value: float) -> str:
+        """What is wrong with a value that is not within the limits, and how to fix it."""
+        if not math.isfinite(value) or (self.whole and value != round(value)):
+            return f"is not a {'whole' if self.whole else 'finite'} number; write a plain one"
+        if abs(value) > self.most:
+            return f"is beyond {self.most:g}; check the unit"
+        if value < 0.0 and self.sign == "not negative":
+            return "is below 0; check the sign"
+        if value <= 0.0 and self.sign == "positive":
+            return "is not above 0; check the sign"
+        return f"is nearer to 0 than {self.least:g}; check the unit"
+
+    def contains(self, value: float) -> bool:
+        """Whether a value is within the limits."""
+        return not self.broken(np.array([value]))
+
+    def broken(self, values: Array) -> list[int]:
+        """Places of the values (n,) that are not within the limits."""
+        size = np.abs(values)
+        within = (size <= self.most) & ((size >= self.least) | (size == 0.0))
+        within &= (values == np.round(values)) | (not self.whole)
+        within &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
+        return np.flatnonzero(~within).tolist()
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a CSV file: its ``name``, and the ``texts`` of its cells without blanks around them."""
+
+    path: Path
+    name: str
+    texts: Sequence[str]
+
+    def fault(self, row: int, words: str, value: bool = True) -> str:
+        """A sentence on the cell of a row, from 0, with its text unless ``value`` is False; rows count from 1 in it."""
+        text = self.texts[row]
+        plain = bool(NUMBER.fullmatch(text)) and len(text) < LONGEST_NAME
+        shown = f" = {text if plain else quoted(text)}" if value else ""
+        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in row {row + 1}{shown}: {words}"
+
+    def numbers(self, limits: Limits, unknown: Collection[str] = ()) -> tuple[Array, list[str]]:
+        """Numbers (n,) of the cells, and a sentence for each cell that has none within the ``limits``.
+
+        Cells whose text in lower case is ``unknown`` are NaN and no fault.
+        """
+        values = np.array([float(text) if is_number(text) else math.nan for text in self.texts])
+        faults = []
+        for row in limits.broken(values):
+            if self.texts[row].lower() not in unknown:
+                faults.append(self.fault(row, _slip(self.texts[row]) or limits.fault(values[row])))
+        return values, faults
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A CSV file: names in its ``header``, and ``rows`` with as many fields as they are written."""
+
+    path: Path
+    header: list[str]
+    rows: list[list[str]]
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Place of each column that has a name."""
+        return {name: place for place, name in enumerate(self.header) if name}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.places
+
+    def column(self, name: str) -> Column:
+        """The column of a name."""
+        place = self.places[name]
+        return Column(self.path, name, [plain_cell(row[place].strip()) for row in self.rows])
+
+    @property
+    def nameless(self) -> list[int]:
+        """Numbers, from 1, of columns that have cells and no name."""
+        places = [place for place, name in enumerate(self.header) if not name]
+        return [place + 1 for place in places if any(row[place].strip() for row in self.rows)]
+
+    def refuse_nameless(self) -> None:
+        """Raises InputError for columns that have cells and no name."""
+        refuse(f"{self.path}: column {number} has no name; name it or remove it" for number in self.nameless)
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Names in the header and fields of the rows of a CSV file, as many in each; blank lines are none.
+
+    Raises InputError where it is no CSV, has no rows, a name comes twice, or a row has more or fewer fields than the header.
+    """
+    lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
+    fields, start = [], 1
+    try:
+        for row in lines:
+            # A quoted empty field is a cell; a line of blanks is none.
+            if len(row) > 1 or (row and (row[0] == "" or row[0].strip())):
+                fields.append(row)
+            start = lines.line_num + 1
+    except csv.Error as error:
+        fix = "close the quotes that open there" if "unexpected end" in str(error) else "fix that line"
+        raise InputError([f"{path}: line {start}: is not CSV ({error}); {fix}"]) from None
+    if not fields:
+        raise InputError([f"{path}: is empty; write a header of names and a row a run"])
+    header, rows = [plain_cell(name.strip()) for name in fields[0]], fields[1:]
+    if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
+        raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
+    several = {name: count for name, count in Counter(header).items() if count > 1 and name}
+    faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in several.items()]
+    if not rows:
+        faults.append(f"{path}: has a header and no rows; add a row a run")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(header):
+            only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
+            fix = "remove the commas at its end" if only_commas else "give it a field a column, in the header's order"
+            faults.append(f"{path}: row {number} has {counted(len(row), 'field')} and the header {len(header)}; {fix}")
+    refuse(faults)
+    return Sheet(path, header, rows)
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number of bounded length; it may still be beyond all doubles."""
+    return len(text) <= LONGEST_NUMBER and NUMBER.fullmatch(text) is not None
+
+
+def text_of(value: Any) -> Any:
+    """What a CSV writer is given for a value, so that it reads as the same: TOML's words for booleans, no formulas."""
+    return str(value).lower() if isinstance(value, bool) else quoted_cell(value)
+
+
+def listed(names: Collection[str]) -> str:
+    """Names of columns for a message; of many the first."""
+    more = [f"{len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else []
+    return ", ".join([*(one_line(name, LONGEST_NAME) for name in islice(names, MOST_NAMES)), *more])
+
+
+def quoted(text: str) -> str:
+    """Text in quotes, cut where it is long."""
+    return repr(one_line(text, LONGEST_NAME))
+
+
+def _slip(text: str) -> str | None:
+    """The slip of the pen that makes a text no number, and how to fix it; None for none that is known."""
+    if len(text) > LONGEST_NUMBER:
+        return f"is longer than {LONGEST_NUMBER} characters; write a shorter number"
+    if text.lower() in UNKNOWN:
+        return "is not a finite number; fill it in or remove the row"
+    return "is not a finite number; write a point for the decimal comma" if "," in text else None
+
 
 # Fourth powers of larger values overflow; larger labels and counts are no whole numbers in floating point.
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")

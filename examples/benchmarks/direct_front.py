@@ -25,9 +25,8 @@ from doe.pareto import ParetoFront
 from doe.pareto.search import spread
 from doe.pareto.simulated import SimulatedFront
 from doe.report.steps.confirmation import point_record
-from doe.running.failure import Failure, grouped
 from doe.running.runner import Progress
-from doe.running.store import Store
+from doe.running.store import Failure, Store, grouped
 from doe.study.adaptive import Evaluator
 from doe.study.front import find_front
 from doe.study.goals import goals_of, region_of

@@ -15,8 +15,7 @@ import numpy as np
 from doe import clearance
 from doe.clearance import Simulations
 from doe.pareto.manufacture import Interval, percent, random_offsets
-from doe.running.failure import Failure
-from doe.running.store import Store
+from doe.running.store import Failure, Store
 from doe.study.goals import goals_of
 from doe.study_file import Study
 from doe.unknown.decision import wilson

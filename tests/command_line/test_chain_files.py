@@ -9,7 +9,7 @@ from doe_command import doe
 
 from doe.dimension_chain import read_chains, solve
 from doe.report.sections.parts import chain_blocks
-from doe.study_file.chain_section import StudyChain, chain_table
+from doe.study_file.sections import StudyChain, chain_table
 from rbdyn.base.blocks import Detail
 from rbdyn.base.render import terminal
 from rbdyn.faults import InputError, read_toml

@@ -16,9 +16,8 @@ from test_study_status import Killed, killed_in, study_command
 
 from doe import clearance
 from doe.commands.status import print_status
-from doe.running.agenda import Stage
 from doe.running.keeper import agenda_in
-from doe.running.runner import Ledger
+from doe.running.runner import Ledger, Stage
 from doe.running.store import Point
 from doe.study.finished import inputs_digest
 from doe.study.runs import STORE, run_design

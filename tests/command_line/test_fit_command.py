@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 from doe.cli import app
 from doe.report.sections.fits import fit_blocks
 from doe.report.steps.fit import fit_record
-from doe.running.failure import StoppedError
+from doe.running.store import StoppedError
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study

@@ -12,7 +12,7 @@ from doe.report.steps.front import front_record
 from doe.study.front import find_front
 from doe.study.goals import known_tolerances
 from doe.study.widest import widest_of
-from doe.study_file.front_section import Tolerances
+from doe.study_file.sections import Tolerances
 from rbdyn.base.words import with_error
 from rbdyn.faults import InputError
 

@@ -21,9 +21,9 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.commands.status import print_status
-from doe.running.agenda import ANSWER_S, Stage
 from doe.running.keeper import agenda_in
 from doe.running.lock import STALE_S, at_work
+from doe.running.runner import ANSWER_S, Stage
 from doe.running.store import Point, Store
 from doe.study.finished import inputs_digest
 from doe.study.runs import STORE, run_design

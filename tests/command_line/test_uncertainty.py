@@ -23,7 +23,7 @@ from doe.study.robust import Decision, check_robust, judge
 from doe.study.robust_front import fresh_rows
 from doe.study.uncertainty import OUTPUTS, find_uncertainty
 from doe.study_file import Study
-from doe.study_file.front_section import Robust
+from doe.study_file.sections import Robust
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
 from rbdyn.records.sources import code_behind

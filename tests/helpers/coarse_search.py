@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from doe.adaptive import candidates, improvement, search
+from doe.adaptive import acquisition, search
 
 FEWER: tuple[tuple[Any, dict[str, int]], ...] = (
-    (candidates, {"EVERYWHERE": 7, "CHILDREN": 32}),
-    (improvement, {"LEVELS": 10, "MOST_LEVELS": 200}),
+    (acquisition, {"EVERYWHERE": 7, "CHILDREN": 32}),
+    (acquisition, {"LEVELS": 10, "MOST_LEVELS": 200}),
     (search, {"DRAWS": 8, "ROUNDS": 1, "SHOWN": 50, "FEW": 256}),
 )
 

@@ -15,7 +15,7 @@ from scipy import ndimage
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, Runs, adaptive_front
-from doe.adaptive.candidates import Region
+from doe.adaptive.acquisition import Region
 from doe.pareto.goals import Goals
 from doe.pareto.search import best_for_hypervolume, hypervolume, non_dominated, spread
 

@@ -13,13 +13,12 @@ from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from short_studies import EXAMPLES
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
 
-from doe.adaptive.emulators import Emulators, fit_emulators
-from doe.adaptive.runs import Runs
+from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.html import html_report
 from doe.report.steps.adaptive import emulators_record
 from doe.study_file import Study
-from doe.study_file.design_section import Category
+from doe.study_file.sections import Category
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from doe.study.input_sets import read_sample
 from doe.study.rig_file import OUTPUTS, Rig, read_rig
 from doe.study.rig_signals import Mean, cage_speed, whirl
 from doe.study.runs import read_runs
-from doe.study_file.of_table import study_of_table
+from doe.study_file.study import study_of_table
 from rbdyn.scene.uncertain import Law
 
 # What a hand or another program writes for a number.

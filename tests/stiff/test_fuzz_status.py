@@ -14,8 +14,8 @@ from short_studies import short_study
 
 from doe.clearance import points_of
 from doe.commands.status import print_status
-from doe.running.agenda import NOTE
 from doe.running.keeper import agenda_in
+from doe.running.runner import NOTE
 from doe.running.store import Store
 from doe.study.finished import inputs_digest
 from doe.study.runs import STORE, ordered_runs

@@ -11,11 +11,9 @@ from known_fronts import box, first_runs, noisy, search
 from scipy import special
 
 from doe.adaptive import Batch, Border, Plan, adaptive_front
-from doe.adaptive.candidates import Region, candidates, worth_it
-from doe.adaptive.emulators import embedded, fit_emulators, shares_of
-from doe.adaptive.improvement import Known, batch, dominated, levels_of
-from doe.adaptive.runs import Runs
-from doe.adaptive.settling import as_foretold, missed, nothing_gained
+from doe.adaptive.acquisition import Known, Region, batch, candidates, dominated, levels_of, worth_it
+from doe.adaptive.emulators import Runs, embedded, fit_emulators, shares_of
+from doe.adaptive.search import as_foretold, missed, nothing_gained
 from doe.pareto.goals import Goals
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
 

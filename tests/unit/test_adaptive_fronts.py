@@ -23,8 +23,8 @@ from known_fronts import (
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, adaptive_front
-from doe.adaptive.candidates import Region
-from doe.adaptive.runs import Runs
+from doe.adaptive.acquisition import Region
+from doe.adaptive.emulators import Runs
 from doe.designs import central_composite
 
 

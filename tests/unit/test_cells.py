@@ -14,7 +14,7 @@ from short_studies import short_study, silent
 
 from doe.study.runs import read_runs, run_design
 from doe.study_file import Study
-from doe.study_file.cells import read_sheet
+from doe.study_file.table import read_sheet
 from rbdyn.records.cells import NUMBER, plain_cell, quoted_cell, save_table
 
 DANGEROUS = tuple("=+-@\t\r\n")

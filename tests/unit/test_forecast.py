@@ -5,8 +5,7 @@ from functools import reduce
 
 import pytest
 
-from doe.running.agenda import Agenda, Stage
-from doe.running.outlook import BESIDES, forecast_of
+from doe.running.runner import BESIDES, Agenda, Stage, forecast_of
 from rbdyn.records.forecast import Forecast, Measured, duration, span
 
 

@@ -23,7 +23,7 @@ from doe.study.surfaces import fit_surfaces
 from doe.study.whole import run_study
 from doe.study.widest import widest_of
 from doe.study_file import Study
-from doe.study_file.front_section import Tolerances
+from doe.study_file.sections import Tolerances
 from rbdyn.faults import InputError
 
 GUIDANCE = """[design]

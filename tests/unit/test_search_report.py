@@ -14,8 +14,8 @@ from scipy.stats import qmc
 from short_studies import EXAMPLES, SHORT, short_study, silent
 
 from doe import clearance
-from doe.adaptive.candidates import Region
-from doe.adaptive.runs import Face
+from doe.adaptive.acquisition import Region
+from doe.adaptive.emulators import Face
 from doe.pareto.search import REFERENCE
 from doe.report.sections.searches import in_few_runs
 from doe.report.steps.search_words import SURE, held_sentence

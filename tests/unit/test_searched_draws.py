@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import qmc
 from short_studies import short_study
 
-from doe.adaptive.emulators import fit_emulators
-from doe.adaptive.runs import Runs
+from doe.adaptive.emulators import Runs, fit_emulators
 from doe.pareto.simulated_tolerance import Neighbourhood
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import Confirmed

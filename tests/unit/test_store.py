@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 
 from doe.running import lock
-from doe.running.failure import Failure, grouped
-from doe.running.store import Point, Store
+from doe.running.store import Failure, Point, Store, grouped
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import digest_of
 
@@ -127,7 +126,7 @@ def test_folder_that_cannot_be_written_is_told_as_such():
 
 
 def test_file_that_another_process_holds_is_told_as_such(path, monkeypatch):
-    monkeypatch.setattr("doe.running.database.PATIENCE_S", 0.1)
+    monkeypatch.setattr("doe.running.store.PATIENCE_S", 0.1)
     with Store(path) as holder, Store(path) as other:
         holder._connection.execute("BEGIN EXCLUSIVE")
         with pytest.raises(InputError, match=r"another process holds it; start again when that has ended$"):

@@ -17,7 +17,7 @@ from doe.study.drawn import half_widths
 from doe.study.surface_draws import Simulated, coefficient_root, drawn_responses, field_root, residual_correlation
 from doe.study.widest import widest_of
 from doe.study_file import Study
-from doe.study_file.front_section import Tolerances
+from doe.study_file.sections import Tolerances
 
 DESIGN = central_composite(3, centre_replicates=6).coded
 TERMS = ("1", "A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2")

@@ -11,7 +11,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.study.calibration import Calibration
 from doe.study.input_sets import NORMAL
-from doe.study_file.cells import text_of
+from doe.study_file.table import text_of
 from doe.unknown import inputs
 from doe.unknown.posterior import seen
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table

@@ -6,7 +6,7 @@ from typing import Any
 
 from doe.report.words import of_hundred
 from doe.study.uncertainty import OutputRange, Uncertainty
-from doe.study_file.cells import text_of
+from doe.study_file.table import text_of
 from doe.unknown.propagation import CONFIDENCE, Share
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.words import counted, quantity, shown, with_error

@@ -10,7 +10,7 @@ from doe.report.steps.fit import fit_record
 from doe.report.steps.front import asked_record, front_record, predicted_record
 from doe.report.steps.robust import robust_record
 from doe.report.steps.search_words import held_sentence, search_sentences
-from doe.running.failure import grouped
+from doe.running.store import grouped
 from doe.study.adaptive import Adaptive
 from doe.study.confirmation import statement
 from doe.study.design import evaluation

@@ -1,0 +1,315 @@
+"""Tables of STUDY.toml: factors and the design; goals, the front, its search and the widest tolerances; dimension chains."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from rbdyn.faults import Consistent, InputError, Strict, read_toml
+from rbdyn.fields import Figure, Number, Positive, no_power_of_two
+
+# A name that heads a column of a table: one field whoever writes or reads it.
+Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
+# Steps beside a value, or resolutions within a step, that are finer than this are lost in rounding.
+FINEST = 1e-9
+
+
+class Factor(Consistent):
+    """A factor: its name, its key in the scene, its values."""
+
+    name: Name
+    """Name of the factor in tables and messages."""
+    key: Annotated[str, Field(min_length=3)] = ""
+    """Its key in the scene, such as cage.pocket_clearance_mm; needed beside [scene]."""
+    centre: Number
+    """Value at coded 0."""
+    step: Positive
+    """Change of the value per coded unit."""
+    resolution: Positive | None = None
+    """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
+    tolerance: Positive | None = None
+    """Half width of what manufacture makes of it."""
+    whole: bool = False
+    """Whether only whole numbers are made, such as rollers; runs and pick are rounded to them."""
+    allowed: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
+
+    def faults(self) -> Iterator[str]:
+        if self.step < FINEST * abs(self.centre):
+            yield f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it"
+        if self.resolution is not None and self.resolution < FINEST * self.step:
+            steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
+            yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
+        if self.whole and self.resolution is not None:
+            yield f"resolution = {self.resolution:g}: whole = true has none but 1; leave it out"
+        if self.whole and self.tolerance is not None:
+            yield f"tolerance = {self.tolerance:g}: whole = true has none; leave it out"
+        if self.whole and self.step < 1.0:
+            yield f"step = {self.step:g}: is less than a whole number; widen it"
+
+    @property
+    def finest(self) -> float | None:
+        """Smallest step that is made."""
+        return 1.0 if self.whole else self.resolution
+
+
+class Category(Consistent):
+    """A factor without numbers, which only the adaptive search changes; a whole design is made at each of its values."""
+
+    name: Name
+    """Name of the factor in tables and messages."""
+    key: Annotated[str, Field(min_length=3)]
+    """Its key in the scene, such as cage.guidance."""
+    categories: Annotated[list[str | bool], Field(min_length=2, max_length=8)]
+    """Values of the key; the first is the baseline's."""
+    inactive: dict[str, list[str]] = {}
+    """By value, the names of factors that mean nothing there, such as {roller = ["guide_clearance_mm"]}: their keys stay as
+    the scene has them."""
+
+    def inactive_at(self, place: int) -> list[str]:
+        """Names of the factors that mean nothing at the value in this place."""
+        return self.inactive.get(_in_toml(self.categories[place]), [])
+
+    def faults(self) -> Iterator[str]:
+        values = [_in_toml(each) for each in self.categories]
+        mend, alien = f"write one of {', '.join(values)}", [name for name in self.inactive if name not in values]
+        yield from (f"inactive.{name}: is none of the categories; {mend}" for name in alien)
+        if len(self.categories) > len({*map(str, self.categories)}):
+            yield f"categories = {self.categories}: name each value once"
+
+
+def _in_toml(value: str | bool) -> str:
+    return value if isinstance(value, str) else str(value).lower()
+
+
+Kind = Literal[
+    "central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol", "definitive_screening",
+    "d_optimal", "i_optimal",
+]  # fmt: skip
+Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"]
+
+# Keys that only some kinds of design know.
+KEYS_OF = {
+    "central_composite": {"alpha", "cube", "blocks", "cube_blocks"},
+    "box_behnken": {"blocks"},
+    "full_factorial": {"levels"},
+    "latin_hypercube": {"runs"},
+    "sobol": {"runs"},
+    "definitive_screening": set[str](),
+    "d_optimal": {"runs", "augment"},
+    "i_optimal": {"runs", "augment"},
+}
+# Runs at the centre unless told.
+CENTRES = {"central_composite": 6, "box_behnken": 6, "definitive_screening": 1}
+
+
+class Design(Consistent):
+    """Which runs are made, and in which order. Optimal ones are so for the terms of all response models."""
+
+    kind: Kind = "central_composite"
+    """Kind of design."""
+    alpha: Alpha | Annotated[float, Field(gt=0.0, le=10.0)] = "rotatable"
+    """Distance of the star points of a central composite design in coded units, by a rule or as a number."""
+    cube: Literal["full", "resolution_v"] = "full"
+    """Cube of a central composite design: all corners, or a fraction of resolution V."""
+    centre_replicates: Annotated[int, Field(ge=0, le=100)] | None = None
+    """Runs at the centre: 6 for central composite and Box-Behnken designs where left out, 1 for definitive screening, else
+    none."""
+    blocks: bool = False
+    """Whether the runs are made in orthogonal blocks."""
+    cube_blocks: Literal[1, 2, 4] = 1
+    """Blocks into which the cube is cut; needs blocks = true."""
+    levels: Annotated[int, Field(ge=2, le=100)] = 3
+    """Levels a factor of a full factorial."""
+    runs: Annotated[int, Field(ge=2, le=10000)] = 60
+    """Runs of a Latin hypercube or Sobol sequence; of an optimal design, which has no default, those beside runs that are
+    given or at the centre."""
+    augment: str | None = None
+    """Table of runs that were made, beside the study: an optimal design keeps them as they are and adds its own, so that all
+    together tell most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
+    order: Literal["standard", "random"] = "standard"
+    """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the design and of its runs."""
+
+    @property
+    def centres(self) -> int:
+        """Number of centre points."""
+        return CENTRES.get(self.kind, 0) if self.centre_replicates is None else self.centre_replicates
+
+    def faults(self) -> Iterator[str]:
+        alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
+        mend = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
+        yield from (f"{key}: {mend}" for key in type(self).model_fields if key in alien)
+        if self.kind in ("d_optimal", "i_optimal") and "runs" not in self.model_fields_set:
+            yield f"runs: missing; kind = {self.kind!r} needs the number of runs to make"
+        if self.cube_blocks > 1 and not self.blocks:
+            yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it"
+
+
+class Goal(Consistent):
+    """What is wanted of a response."""
+
+    goal: Literal["min", "max", "target", "none"] = "min"
+    """What is wanted: small, large, near target, or nothing (watched, or held by its limits only)."""
+    target: Figure | None = None
+    """Value to come near to, for goal = "target"."""
+    lower: Figure | None = None
+    """Limit that the response must not fall below."""
+    upper: Figure | None = None
+    """Limit that the response must not exceed."""
+    weight: Positive = 1.0
+    """Weight in the desirability and weights picks."""
+    desired: Annotated[list[Figure], Field(min_length=2, max_length=2)] | None = None
+    """Ends of the desirability: nil at one, full at the other (for a target nil at both)."""
+
+    def faults(self) -> Iterator[str]:
+        if self.goal == "target" and self.target is None:
+            yield 'target: missing; goal = "target" needs the number to come near to'
+        if self.goal != "target" and self.target is not None:
+            yield f'target = {self.target}: goal = "{self.goal}" has none; write goal = "target"'
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            yield f"lower = {self.lower}: must be below upper = {self.upper}"
+        if self.desired is not None:
+            low, high = self.desired
+            if self.goal == "none":
+                yield f'desired = {self.desired}: goal = "none" desires nothing; leave it out'
+            elif low >= high:
+                yield f"desired = {self.desired}: must rise; write the lower end first"
+            elif self.target is not None and not low < self.target < high:
+                yield f"desired = {self.desired}: must have target = {self.target} between its ends"
+
+
+class Front(Strict):
+    """NSGA-II on the surfaces, within the region of the design."""
+
+    population: Annotated[int, Field(ge=8, le=10000)] = 100
+    """Points of a generation."""
+    generations: Annotated[int, Field(ge=1, le=100000)] = 200
+    """Generations of the search."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the search."""
+    pick: Literal["knee", "desirability", "weights"] = "knee"
+    """Rule that makes the pick among the points of the front that dominate the baseline."""
+    draws: Annotated[int, Field(ge=100, le=100000)] = 1000
+    """Surfaces drawn for the front's uncertainty."""
+    tolerance_aware: Literal["none", "worst_case", "quantile"] = "none"
+    """A second front, of what the factors' tolerances leave of a point: its worst case or its quantile."""
+    quantile: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
+    """Quantile of a tolerance-aware front."""
+    distribution: Literal["normal", "uniform"] = "normal"
+    """How parts scatter within the tolerances."""
+    tolerance_samples: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
+    """Parts drawn for a quantile."""
+
+
+class Adaptive(Strict):
+    """The search with emulators, from the runs of the design on."""
+
+    budget: Annotated[int, Field(ge=10, le=10000)] = 100
+    """Runs, those of the design and the last fifth, fresh ones at the points of the front, included."""
+    batch: Annotated[int, Field(ge=1, le=1000)] = 8
+    """Runs chosen at once, so that many workers have work; the search knows a little less of each than one by one."""
+    extend: bool = True
+    """Whether the region grows where the front lies at its edge, as far as the factors' "allowed" permit."""
+    least_clearance_um: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """Diametral clearance that is left to the bearing in operation, mounted, hot and at speed, wherever the region grows: below
+    0 it would be preloaded. What the floor of the land's film needs of the guide clearance the scene itself demands."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the search and its runs."""
+    set: list[str] = []
+    """Keys of the scene that are replaced, as "key=value". Where figures drift, a run is lengthened to twice the turns asked for
+    at most, unless numerics.extend_limit stands here or is less in the scene."""
+
+
+class Robust(Consistent):
+    """Whether the pick beats the baseline over what is not known of the scene, with --robust."""
+
+    points: Annotated[int, Field(ge=32, le=1024)] = 256
+    """Input sets, a power of two; the baseline and the pick are simulated at each."""
+    settle: Annotated[float, Field(ge=0.0, le=4.0)] = 0.5
+    """Further simulations, as a share of the first, spent on the input sets where a gain is in doubt."""
+    front: Literal["quantile", "mean", "none"] = "quantile"
+    """A front of what holds over the unknowns: the quantile or the mean of each gain over the baseline; some of its points are
+    simulated beside the pick."""
+    quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
+    """Quantile of a robust front: in how many of the cases a gain may be less."""
+
+    def faults(self) -> list[str]:
+        return no_power_of_two("points = ", self.points)
+
+
+class Tolerances(Strict):
+    """Widest tolerances of the factors about the pick."""
+
+    probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    """Probability that a part keeps its share of every predicted gain, and all limits."""
+    keep: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    """Share of each predicted gain that must be kept."""
+    aim: Literal["ratios", "product", "sum"] = "ratios"
+    """"ratios" keeps the ratios of the factors' own tolerances (of their steps, where one has none); "product" and
+    "sum" maximise that of the half widths."""
+    distribution: Literal["normal", "uniform"] = "normal"
+    """How parts scatter within the tolerances."""
+    surface_uncertainty: bool = False
+    """Whether the errors of the surfaces count too."""
+    samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096
+    """Parts drawn."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the parts."""
+
+
+class StudyChain(Consistent):
+    """Dimension chain whose closing link is the picked value of a factor. Its links stand here or in a file."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """Name of the chain."""
+    factor: str
+    """The factor whose picked value the chain must close."""
+    half_width_mm: Annotated[float, Field(gt=0.0)] | None = None
+    """Half width of the closing link about the pick; the tolerance that the study derives for the factor where left
+    out."""
+    file: str | None = None
+    """CHAIN.toml beside the study, which has the links under the chain's name."""
+    link: list[dict[str, Any]] = []
+    """Links, as in a CHAIN.toml."""
+    allocate: dict[str, Any] = {}
+    """How tolerances are shared, as in a CHAIN.toml."""
+    monte_carlo: dict[str, Any] = {}
+    """Monte Carlo of the assemblies, as in a CHAIN.toml."""
+    selective: dict[str, Any] | None = None
+    """Selective assembly, as in a CHAIN.toml."""
+
+    def faults(self) -> Iterator[str]:
+        if self.file is None and not self.link:
+            yield "link: missing; give the links, or the file that has them"
+        if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
+            yield f"file = {self.file!r}: has the links and all about them; leave out one or the other"
+
+
+def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float | None = None) -> Mapping[str, Any]:
+    """CHAIN.toml contents of a study's chain at a picked value [mm]; ``folder`` is where the study lies.
+
+    ``half_width`` [mm] stands in where the chain gives none. Raises InputError where neither is there, or the chain is
+    not in its file.
+    """
+    half = chain.half_width_mm if chain.half_width_mm is not None else half_width
+    if half is None:
+        why = f"missing, and no tolerance of {chain.factor} is known; add it"
+        raise InputError([f"chain {chain.name}: half_width_mm: {why}"])
+    limits = {"lower_mm": value - half, "upper_mm": value + half}
+    if chain.file is not None:
+        named = _of_file(chain.name, folder / chain.file)
+        return {**{key: each for key, each in named.items() if key != "name"}, "closing_link": limits}
+    table = {"closing_link": limits, "link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
+    return table if chain.selective is None else table | {"selective": chain.selective}
+
+
+def _of_file(name: str, path: Path) -> Mapping[str, Any]:
+    """Table of the chain of that name in a file of chains."""
+    chains = read_toml(path).get("chain", [])
+    for chain in chains if isinstance(chains, list) else []:
+        if isinstance(chain, dict) and chain.get("name") == name:
+            return chain
+    raise InputError([f"{path}: no chain is named {name}; name it [[chain]] name = {name!r}"])
