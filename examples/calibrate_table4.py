@@ -30,10 +30,9 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.report.steps.calibrate import blocks, files_of, record_of, write
 from doe.running.store import Failure, Store
-from doe.study.calibration import Calibration, find_calibration
-from doe.study.calibration_question import Question, question_of, read_question
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
+from doe.workflow.calibration import Calibration, Question, find_calibration, question_of, read_question
 from rbdyn.base.render.terminal import show
 from rbdyn.scene.unknown import put
 

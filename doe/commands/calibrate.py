@@ -36,10 +36,9 @@ def calibrate(
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
         from doe.running.runner import ANSWER
-        from doe.study.calibration import find_calibration
-        from doe.study.calibration_question import question_of, read_question
-        from doe.study.stages_unknown import calibration_stages
-        from doe.study.status import content_digest
+        from doe.workflow.calibration import find_calibration, question_of, read_question
+        from doe.workflow.stages_unknown import calibration_stages
+        from doe.workflow.status import content_digest
 
         asked = read_question(path, data, free or (), overrides or ())
         made_of = question_of(asked)

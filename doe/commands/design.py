@@ -21,9 +21,9 @@ def design(
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
         from doe.report.steps.design import blocks, design_record, print_csv
-        from doe.study.checked import check_study
-        from doe.study.design import design_of, evaluation
         from doe.study_file import Study
+        from doe.workflow.runs import design_of, evaluation
+        from doe.workflow.whole import check_study
 
         loaded = Study.load(path)
         # Without its scene the runs are made elsewhere, and only the design itself can be judged.

@@ -51,7 +51,7 @@ def fit(
         loaded, notes = _study(path, data, {"factor": factor, "response": response, "model": model})
         kept.enter_context(keeping_runs(out, loaded.path))
         from doe.report.steps.fit import fit_record, fit_tables
-        from doe.study.surfaces import unrivalled, with_rivals
+        from doe.workflow.surfaces import unrivalled, with_rivals
 
         surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)

@@ -38,9 +38,9 @@ def front(
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out, path):
         from doe.report.steps.front import asked_record, front_record, given_point_record
-        from doe.study.front import find_front, with_survival
-        from doe.study.goals import check_goals
         from doe.study_file import Study
+        from doe.workflow.front import find_front, with_survival
+        from doe.workflow.runs import check_goals
 
         loaded = Study.load(path)
         check_goals(loaded)

@@ -34,9 +34,9 @@ def new(
 ) -> None:
     """Write a commented study of a scene's clearances on standard output."""
     with guarded(as_json):
-        from doe.study.checked import check_study
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
+        from doe.workflow.whole import check_study
         from rbdyn.cli.template import filled
         from rbdyn.faults import read_toml, validated
         from rbdyn.scene import Scene, rollers_only

@@ -28,7 +28,7 @@ def status(
 ) -> None:
     """Tell where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
     with guarded(as_json):
-        from doe.study.status import status_of
+        from doe.workflow.status import status_of
 
         if out is not None and out.exists() and not out.is_dir():
             raise InputError([f"--out {out}: is a file; name the folder of the results"])

@@ -31,7 +31,7 @@ def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
     """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
     study of the file ``source`` runs there."""
     from doe.running.lock import at_work
-    from doe.study.runs import STORE
+    from doe.workflow.runs import STORE
 
     with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out / STORE):
         yield
@@ -62,7 +62,7 @@ def simulations_in(
     """Simulations of what the file ``source`` asks for, kept in the store of a folder and counted in an agenda."""
     from doe.clearance import Simulations
     from doe.running.store import Store
-    from doe.study.runs import STORE
+    from doe.workflow.runs import STORE
 
     with Store(folder / STORE, source.stem) as store, stages(quiet, workers) as progress:
         progress = progress if agenda is None else agenda.announced(progress)
@@ -82,7 +82,7 @@ def noted_agenda(
     """The agenda of a command in the store of its folder, for ``doe status``, which states what is left unless ``quiet``;
     ``inputs``: the digest of what it answers, ``asked``: also of what decides its runs."""
     from doe.running.keeper import agenda_in
-    from doe.study.runs import STORE
+    from doe.workflow.runs import STORE
 
     threads = workers or os.cpu_count() or 1
     with agenda_in(folder / STORE, command, threads, options, inputs, notice(quiet), asked) as agenda:
@@ -110,8 +110,8 @@ class Effort(NamedTuple):
 
 def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]":
     """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
-    from doe.study.runs import read_runs, run_design
-    from doe.study.surfaces import fit_surfaces
+    from doe.workflow.runs import read_runs, run_design
+    from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
         return fit_surfaces(study, read_runs(study, data))

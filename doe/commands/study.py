@@ -33,7 +33,7 @@ def study(
 
         loaded = Study.load(path)
         output_folder(folder, "doe", path)
-        from doe.study.finished import finished, inputs_digest
+        from doe.workflow.status import finished, inputs_digest
 
         digest = inputs_digest(loaded, adaptive, robust)
         if not (verbose or retry) and (record := finished(folder, digest)):
@@ -44,7 +44,7 @@ def study(
             return
         from doe.report.study.answer import blocks
         from doe.report.study.files import write
-        from doe.study.whole import run_study
+        from doe.workflow.whole import run_study
 
         options = {"adaptive": adaptive, "robust": robust}
         with noted_agenda(folder, "doe study", workers, quiet, options, digest) as agenda:

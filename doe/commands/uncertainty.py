@@ -36,9 +36,9 @@ def uncertainty(
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import blocks, record_of, write
         from doe.running.runner import ANSWER
-        from doe.study.stages_unknown import uncertainty_stages
-        from doe.study.status import content_digest, runs_digest
-        from doe.study.uncertainty import find_uncertainty
+        from doe.workflow.stages_unknown import uncertainty_stages
+        from doe.workflow.status import content_digest, runs_digest
+        from doe.workflow.uncertainty import find_uncertainty
         from rbdyn.dynamics.target import target_of
 
         refuse([] if points is None else no_power_of_two("--points ", points))

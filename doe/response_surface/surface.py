@@ -63,7 +63,7 @@ class Surface(Record):
     transform for an untransformed fit, None where values or fit allow none.
     ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
     curvature, ``known_variance`` where the errors of the runs are not known, ``model_error`` where lack of fit is not
-    significant, ``rival`` until `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
+    significant, ``rival`` until `doe.workflow.surfaces.with_rivals` has compared it with a Gaussian process.
     """
 
     name: str = outside_json()

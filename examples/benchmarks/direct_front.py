@@ -27,12 +27,11 @@ from doe.pareto.simulated import SimulatedFront
 from doe.report.steps.confirmation import point_record
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store, grouped
-from doe.study.adaptive import Evaluator
-from doe.study.front import find_front
-from doe.study.goals import goals_of, region_of
-from doe.study.runs import STORE, run_design
-from doe.study.surfaces import fit_surfaces, standard_errors
 from doe.study_file import Study
+from doe.workflow.adaptive import Evaluator
+from doe.workflow.front import find_front
+from doe.workflow.runs import STORE, goals_of, region_of, run_design
+from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.words import counted, with_error
 from rbdyn.cli.terminal import progress_bar
 from rbdyn.faults import InputError, MethodError, RunError

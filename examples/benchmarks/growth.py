@@ -177,7 +177,7 @@ def rig(rows: int, columns: int, folder: Path) -> list[str]:
     header = ",".join(["operation.inner_speed_rpm", "impact_force_N", "impact_force_N_sd", *names])
     (folder / "rig.csv").write_text("\n".join([header, *lines]), "utf-8")
     return python(
-        "from doe.study.rig_file import read_rig; len(read_rig(Path(sys.argv[1])).conditions)", folder / "rig.csv"
+        "from doe.workflow.rig import read_rig; len(read_rig(Path(sys.argv[1])).conditions)", folder / "rig.csv"
     )
 
 
@@ -187,7 +187,7 @@ def signal_rows(size: int, folder: Path) -> list[str]:
     lines = (f"{row * 1e-4:.4f},{9000.0 + draw.gauss(0.0, 9.0):.2f}" for row in range(size))
     (folder / "s.csv").write_text("\n".join(["t_s,cage_speed_rpm", *lines]), "utf-8")
     return python(
-        "from doe.study.rig_signals import cage_speed; cage_speed(Path(sys.argv[1]), 'cage_speed', 1)", folder / "s.csv"
+        "from doe.workflow.rig import cage_speed; cage_speed(Path(sys.argv[1]), 'cage_speed', 1)", folder / "s.csv"
     )
 
 

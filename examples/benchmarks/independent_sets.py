@@ -26,9 +26,9 @@ from scipy import stats
 import rbdyn
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study.robust import Robust, judge
-from doe.study.uncertainty import OUTPUTS, Uncertainty, find_uncertainty
 from doe.study_file import Study
+from doe.workflow.robust import Robust, judge
+from doe.workflow.uncertainty import OUTPUTS, Uncertainty, find_uncertainty
 from rbdyn.scene.uncertain import Law, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of
 

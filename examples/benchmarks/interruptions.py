@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.running.store import Store
-from doe.study.runs import STORE
+from doe.workflow.runs import STORE
 from rbdyn.dynamics.slip_map import POINTS
 
 EXAMPLES = Path(__file__).resolve().parents[1]

@@ -122,8 +122,7 @@ def simulated(folder: Path, kind: str, number: int) -> Answer:
     from doe.clearance import Simulations
     from doe.report.steps.calibrate import record_of
     from doe.running.store import Store
-    from doe.study.calibration import find_calibration
-    from doe.study.calibration_question import question_of, read_question
+    from doe.workflow.calibration import find_calibration, question_of, read_question
 
     scene, rig, truth = simulated_rig(folder, kind, number)
     question = read_question(scene, rig, (), ())
@@ -230,7 +229,7 @@ def answer(what: str, folder: Path, kind: str, number: int) -> Answer:
     from rbdyn.records.kept import code_version
 
     path = folder / f"{what}_{kind}_{number}.json"
-    version = code_version(SIMULATION, "doe.study.calibration")
+    version = code_version(SIMULATION, "doe.workflow.calibration")
     if path.exists() and (kept := json.loads(path.read_text("utf-8")))["version"] == version:
         return Answer(**kept["answer"])
     one = surrogate(kind, number) if what == "surrogate" else simulated(folder, kind, number)

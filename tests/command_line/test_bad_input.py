@@ -16,9 +16,9 @@ from doe.cli import app
 from doe.dimension_chain import read_chains
 from doe.report.steps.design import design_record
 from doe.report.study.summary import design_record as summary_design
-from doe.study.design import design_of, evaluation
 from doe.study_file import Study
 from doe.study_file.table import read_table
+from doe.workflow.runs import design_of, evaluation
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.sweep.points import parsed
@@ -243,7 +243,7 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
     from types import SimpleNamespace
 
     from doe.report.study.files import _runs_table
-    from doe.study.runs import Runs
+    from doe.workflow.runs import Runs
 
     path = study(tmp_path, ('alpha = "rotatable"', 'alpha = "orthogonal_blocks"\nblocks = true'))
     path.write_text(path.read_text(encoding="utf-8").partition("[reference]")[0], encoding="utf-8")

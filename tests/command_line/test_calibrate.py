@@ -13,10 +13,8 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
-from doe.study.calibration import find_calibration
-from doe.study.calibration_question import read_question
-from doe.study.rig_file import read_rig
-from doe.study.rig_signals import cage_speed
+from doe.workflow.calibration import find_calibration, read_question
+from doe.workflow.rig import cage_speed, read_rig
 from rbdyn.base.render.terminal import text
 from rbdyn.scene import Scene
 

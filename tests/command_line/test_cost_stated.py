@@ -19,11 +19,9 @@ from doe.commands.status import print_status
 from doe.running.keeper import agenda_in
 from doe.running.runner import Ledger, Stage
 from doe.running.store import Point
-from doe.study.finished import inputs_digest
-from doe.study.runs import STORE, run_design
-from doe.study.stages import study_stages
-from doe.study.status import study_status
 from doe.study_file import Study
+from doe.workflow.runs import STORE, run_design
+from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.cli.terminal import notice
 from rbdyn.dynamics import run
 from rbdyn.dynamics import simulate as module

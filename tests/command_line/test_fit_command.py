@@ -16,10 +16,10 @@ from doe.cli import app
 from doe.report.sections.fits import fit_blocks
 from doe.report.steps.fit import fit_record
 from doe.running.store import StoppedError
-from doe.study.runs import read_runs
-from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from doe.study_file.table import read_table
+from doe.workflow.runs import read_runs
+from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.blocks import Detail
 from rbdyn.base.render.terminal import text
 
@@ -245,7 +245,7 @@ def test_unit_a_cell_that_is_no_number_leaves_no_column_out(tmp_path, named, cel
 
 def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeypatch):
     """Unit: a Gaussian process costs the cube of the runs; without it the surface stands and a note says so."""
-    monkeypatch.setattr("doe.study.surfaces.MOST_RIVALLED", 11)
+    monkeypatch.setattr("doe.workflow.surfaces.MOST_RIVALLED", 11)
     shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear", "-q")
     assert (
         shown.exit_code == 0

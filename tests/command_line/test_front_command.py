@@ -9,10 +9,10 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.report.steps.front import front_record
-from doe.study.front import find_front
-from doe.study.goals import known_tolerances
-from doe.study.widest import widest_of
 from doe.study_file.sections import Tolerances
+from doe.workflow.front import find_front
+from doe.workflow.pick import widest_of
+from doe.workflow.runs import known_tolerances
 from rbdyn.base.words import with_error
 from rbdyn.faults import InputError
 
@@ -207,7 +207,9 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     assert unsure.half_widths.tolist() == [0.0, 0.0, 0.0] and "even the exact pick" in unsure.sentence
 
 
-@pytest.mark.parametrize("place", ["doe.study.front.front", "doe.study.surfaces.fit", "doe.study.design._design"])
+@pytest.mark.parametrize(
+    "place", ["doe.workflow.front.front", "doe.workflow.surfaces.fit", "doe.workflow.runs._design"]
+)
 def test_invariant_a_slip_of_the_code_is_not_called_bad_input(tmp_path, monkeypatch, place):
     """Invariant: an error of a library below a command is raised on as what it is, with no file or key named in it."""
     study, _, _ = front_of(tmp_path)

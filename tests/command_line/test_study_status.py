@@ -25,11 +25,17 @@ from doe.running.keeper import agenda_in
 from doe.running.lock import STALE_S, at_work
 from doe.running.runner import ANSWER_S, Stage
 from doe.running.store import Point, Store
-from doe.study.finished import inputs_digest
-from doe.study.runs import STORE, run_design
-from doe.study.stages import FRONT_S, study_stages
-from doe.study.status import content_digest, scene_status, status_of, study_status
 from doe.study_file import Study
+from doe.workflow.runs import STORE, run_design
+from doe.workflow.status import (
+    FRONT_S,
+    content_digest,
+    inputs_digest,
+    scene_status,
+    status_of,
+    study_stages,
+    study_status,
+)
 from rbdyn.dynamics import simulate as module
 from rbdyn.faults import read_toml
 from rbdyn.records.kept import digest_of, sign

@@ -16,14 +16,13 @@ from typer.testing import CliRunner
 from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import MOST_PAIRS, robust_record, robust_sentences
-from doe.study.finished import CODE, inputs_digest
-from doe.study.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
-from doe.study.limits import odds_sentence
-from doe.study.robust import Decision, check_robust, judge
-from doe.study.robust_front import fresh_rows
-from doe.study.uncertainty import OUTPUTS, find_uncertainty
 from doe.study_file import Study
 from doe.study_file.sections import Robust
+from doe.workflow.confirmation import odds_sentence
+from doe.workflow.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
+from doe.workflow.robust import Decision, check_robust, fresh_rows, judge
+from doe.workflow.status import CODE, inputs_digest
+from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
 from rbdyn.records.sources import code_behind
@@ -75,7 +74,7 @@ def _closed_form(patch: pytest.MonkeyPatch) -> None:
         impact = 100.0 + scene.cage.mass_g - 45.0 + 5.0 * bar + scatter
         return replace(instant_result(scene), impact_force=Quantity(impact, 0.45, None, 10.0, 9))
 
-    patch.setattr("doe.study.uncertainty.OUTPUTS", ("impact_force_N",))
+    patch.setattr("doe.workflow.uncertainty.OUTPUTS", ("impact_force_N",))
     patch.setattr("doe.unknown.propagation.REFITS", 4)  # intervals of shares are not the subject
     patch.setattr("rbdyn.dynamics.simulate.simulate", simulate)
     patch.setattr("rbdyn.dynamics.run.prepare", lambda scene, bearing: 0.0)
@@ -83,8 +82,8 @@ def _closed_form(patch: pytest.MonkeyPatch) -> None:
 
 def test_record_files_and_resumption(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulation itself: every file and key, and the same record from the store."""
-    monkeypatch.setattr("doe.study.uncertainty.MOST", 16)
-    monkeypatch.setattr("doe.study.uncertainty.MOST_EFFORT", 2)
+    monkeypatch.setattr("doe.workflow.uncertainty.MOST", 16)
+    monkeypatch.setattr("doe.workflow.uncertainty.MOST_EFFORT", 2)
     monkeypatch.setattr("doe.unknown.propagation.REFITS", 4)
     scene, out = _scene(tmp_path), tmp_path / "out"
     command = [str(scene), "--target", "50%", "--out", str(out), "--json", *(f"--set={each}" for each in SHORT)]
@@ -150,8 +149,8 @@ def runs_in(folder: Path) -> int:
 def test_interrupted_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a shorter plan left in the store and what runs anew give the same bits as all of it at once."""
     _closed_form(monkeypatch)
-    monkeypatch.setattr("doe.study.uncertainty.MOST", 16)  # none is added
-    monkeypatch.setattr("doe.study.uncertainty.MOST_EFFORT", 1)
+    monkeypatch.setattr("doe.workflow.uncertainty.MOST", 16)  # none is added
+    monkeypatch.setattr("doe.workflow.uncertainty.MOST_EFFORT", 1)
     command = [str(_scene(tmp_path)), "--json", *(f"--set={each}" for each in SHORT)]
     assert _run(*command, "--points", "16", "--out", str(tmp_path / "parts")).exit_code == 0
     assert runs_in(tmp_path / "parts") == 17
@@ -164,7 +163,7 @@ def test_inputs_that_go_together_have_shapley_effects(tmp_path: Path, monkeypatc
     """Of a sample in whose rows mass and bar go together, no Sobol' index; effects are those of the closed form and sum to one;
     rows stay rows."""
     _closed_form(monkeypatch)
-    monkeypatch.setattr("doe.study.uncertainty.MOST", 64)
+    monkeypatch.setattr("doe.workflow.uncertainty.MOST", 64)
     random = np.random.default_rng(1)
     mass = 45.0 + 3.0 * random.standard_normal(200)
     rows = np.column_stack([mass, 3e7 * np.exp(0.2 * (mass - 45.0) + 0.2 * random.standard_normal(200))])
@@ -457,7 +456,7 @@ def test_replicates_follow_the_share_of_noise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: float, most: int
 ) -> None:
     """Inputs make a variance of 25/12: two replicates leave 0.02, 0.13 and 0.86 of a run's variance to noise."""
-    monkeypatch.setattr("doe.study.uncertainty.OUTPUTS", OUTPUTS[:1])
+    monkeypatch.setattr("doe.workflow.uncertainty.OUTPUTS", OUTPUTS[:1])
     simulations = _Outputs(error)
     found = find_uncertainty(_scene(tmp_path, IMBALANCE), (), simulations, 64, 1.0)  # type: ignore[arg-type]
     # After the scene as it is; what ran before comes from the store.
@@ -493,7 +492,7 @@ def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: py
     ]
     assert overriding(case, ["numerics.turns=20"]) == ["--set numerics.turns=20 changes every run"]
     assert overriding(case, ["cage.imbalance_um=3.0"]) == []
-    monkeypatch.setattr("doe.study.uncertainty.OUTPUTS", OUTPUTS[:1])
+    monkeypatch.setattr("doe.workflow.uncertainty.OUTPUTS", OUTPUTS[:1])
     found = find_uncertainty(_scene(tmp_path, IMBALANCE), overrides[:1], _Outputs(0.1), 16, 1.0)  # type: ignore[arg-type]
     assert found.notes[0].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
 

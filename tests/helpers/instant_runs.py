@@ -47,7 +47,7 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
 
     ``patch(target, name, value)`` replaces an attribute, such as ``monkeypatch.setattr``.
     """
-    from doe.study import surfaces
+    from doe.workflow import surfaces
     from rbdyn.dynamics import run
     from rbdyn.dynamics import simulate as module
 
@@ -73,8 +73,8 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     """The program."""
     from doe.commands.steps import keeping_runs
     from doe.commands.study import study as doe_study
-    from doe.study.runs import run_design
     from doe.study_file import Study
+    from doe.workflow.runs import run_design
     from rbdyn.cli.terminal import guarded, output_folder, print_json
 
     ran = instantly(setattr, seconds)

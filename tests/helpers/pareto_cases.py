@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.study.runs import read_runs
-from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.workflow.runs import read_runs
+from doe.workflow.surfaces import fit_surfaces
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = EXAMPLES / "ccd_table4.csv"

@@ -29,7 +29,7 @@ EDGES = {
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
-    "doe/study": "asks for chains",
+    "doe/workflow": "asks for chains",
 }
 
 

@@ -24,10 +24,10 @@ from doe.report.sections.plot import Plot
 from doe.report.sections.record import scalars
 from doe.report.study.plots import response_surface
 from doe.report.words import change, rounded_down
-from doe.study.edge import Outward
-from doe.study.runs import read_runs
-from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.workflow.pick import Outward
+from doe.workflow.runs import read_runs
+from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.words import label, quantity, shown, with_error
 from rbdyn.plots.roller import cage_orbit
 

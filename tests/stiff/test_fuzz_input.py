@@ -12,10 +12,10 @@ import pytest
 from mutations import mutated, outcome
 
 from doe.dimension_chain import read_chains
-from doe.study.checked import check_study
-from doe.study.design import design_of
 from doe.study_file import Study
 from doe.study_file.table import read_table as read_runs_table
+from doe.workflow.runs import design_of
+from doe.workflow.whole import check_study
 from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.result import SimulationResult

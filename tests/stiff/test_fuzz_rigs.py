@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 from mutations import EXTREMES, mutated, outcome
 
-from doe.study.input_sets import read_sample
-from doe.study.rig_file import OUTPUTS, Rig, read_rig
-from doe.study.rig_signals import Mean, cage_speed, whirl
-from doe.study.runs import read_runs
 from doe.study_file.study import study_of_table
+from doe.workflow.input_sets import read_sample
+from doe.workflow.rig import OUTPUTS, Mean, Rig, cage_speed, read_rig, whirl
+from doe.workflow.runs import read_runs
 from rbdyn.scene.uncertain import Law
 
 # What a hand or another program writes for a number.

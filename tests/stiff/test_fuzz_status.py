@@ -17,11 +17,9 @@ from doe.commands.status import print_status
 from doe.running.keeper import agenda_in
 from doe.running.runner import NOTE
 from doe.running.store import Store
-from doe.study.finished import inputs_digest
-from doe.study.runs import STORE, ordered_runs
-from doe.study.stages import study_stages
-from doe.study.status import study_status
 from doe.study_file import Study
+from doe.workflow.runs import STORE, ordered_runs
+from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of, sign
 

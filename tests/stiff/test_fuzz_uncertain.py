@@ -16,11 +16,11 @@ import pytest
 from scipy.stats import spearmanr
 
 from doe import clearance
-from doe.study.input_sets import Case, case_of
-from doe.study.robust import case_of_study
 from doe.study_file import Study
 from doe.study_file.study import StudyFile
 from doe.unknown import inputs
+from doe.workflow.input_sets import Case, case_of
+from doe.workflow.robust import case_of_study
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import FOLLOWING, value_of

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from short_studies import short_study
 
-from doe.study.confirmation import Choice, confirmed_from, whirl_sentence
 from doe.study_file import Study
+from doe.workflow.confirmation import Choice, confirmed_from, whirl_sentence
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
 from rbdyn.dynamics.integrators.advance import book_whirl
 from rbdyn.dynamics.integrators.records import WHIRL

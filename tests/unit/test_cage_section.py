@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from doe.study.input_sets import case_of
+from doe.workflow.input_sets import case_of
 from rbdyn.cli.app import app
 from rbdyn.contact.cage_bar import CageSection, Elastic, bar_stiffness
 from rbdyn.dynamics.parameters.model import roller_bearing

@@ -23,8 +23,8 @@ from short_studies import SHORT, short_study, silent
 from doe.running import cluster
 from doe.running.runner import Ran
 from doe.running.store import Store
-from doe.study.runs import STORE, run_design
 from doe.study_file import Study
+from doe.workflow.runs import STORE, run_design
 from rbdyn.faults import InputError, RunError
 
 HERE = Path(__file__).parent

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.designs import central_composite
-from doe.study.design import check_runs, design_of, evaluation
 from doe.study_file import Study
+from doe.workflow.runs import check_runs, design_of, evaluation
 from rbdyn.faults import InputError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

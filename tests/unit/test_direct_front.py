@@ -20,10 +20,10 @@ from short_studies import SHORT, rows, short_study, silent, stored
 from doe.clearance import Simulations
 from doe.pareto import Goals
 from doe.running.store import Store
-from doe.study.front import find_front
-from doe.study.runs import STORE, read_runs
-from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.workflow.front import find_front
+from doe.workflow.runs import STORE, read_runs
+from doe.workflow.surfaces import fit_surfaces
 from rbdyn.faults import InputError
 
 BRIEF = direct_front.Settings(60, 8, 2, turns=3.0, discard_turns=1.0, set=["numerics.impact_window_turns=1"])

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from doe.study.calibration_question import cases_of
-from doe.study.input_sets import case_of
-from doe.study.rig_file import read_rig
-from doe.study.rig_signals import whirl
+from doe.workflow.calibration import cases_of
+from doe.workflow.input_sets import case_of
+from doe.workflow.rig import read_rig, whirl
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion.history import history
 from rbdyn.dynamics.parameters.model import roller_bearing

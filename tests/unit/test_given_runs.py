@@ -11,10 +11,9 @@ from short_studies import SHORT, short_study, silent
 
 from doe import clearance
 from doe.report.study.files import write
-from doe.study.design import actual_of, check_given, design_of, evaluation
-from doe.study.runs import ordered_runs, run_design
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.runs import actual_of, check_given, design_of, evaluation, ordered_runs, run_design
+from doe.workflow.whole import run_study
 from rbdyn.faults import InputError
 
 CCD = 'kind = "central_composite"'

@@ -15,15 +15,13 @@ from test_study_adaptive import ROLLERS, with_kinds, written
 from doe import clearance
 from doe.adaptive.emulators import embedded, settled
 from doe.report.study.files import write
-from doe.study.adaptive import check_adaptive, region_in_units
-from doe.study.design import check_runs, design_of
-from doe.study.goals import tolerances_of
-from doe.study.runs import Runs
-from doe.study.surfaces import fit_surfaces
-from doe.study.whole import run_study
-from doe.study.widest import widest_of
 from doe.study_file import Study
 from doe.study_file.sections import Tolerances
+from doe.workflow.adaptive import check_adaptive, region_in_units
+from doe.workflow.pick import widest_of
+from doe.workflow.runs import Runs, check_runs, design_of, tolerances_of
+from doe.workflow.surfaces import fit_surfaces
+from doe.workflow.whole import run_study
 from rbdyn.faults import InputError
 
 GUIDANCE = """[design]

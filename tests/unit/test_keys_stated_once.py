@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doe.study.input_sets import Case, case_of, check_overrides, read_case
-from doe.study.robust import case_of_study
 from doe.study_file import Study
 from doe.unknown.inputs import values_of
+from doe.workflow.input_sets import Case, case_of, check_overrides, read_case
+from doe.workflow.robust import case_of_study
 from rbdyn.faults import InputError, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Law, Uncertain

@@ -17,9 +17,17 @@ from doe.pareto.front import (
     non_dominated_share,
     selection_optimism,
 )
-from doe.study.drawn import draw_all, half_widths, jacobian, predict_all, predict_draws, predict_paired
-from doe.study.front import find_front
-from doe.study.predicted import predicted_gains, statement
+from doe.workflow.front import find_front
+from doe.workflow.surfaces import (
+    draw_all,
+    half_widths,
+    jacobian,
+    predict_all,
+    predict_draws,
+    predict_paired,
+    predicted_gains,
+    statement,
+)
 
 PAPER_PICK = np.array([0.017, 0.187, 0.285])  # Chen et al. 2022, Table 8
 

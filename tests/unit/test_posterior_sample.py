@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from doe.report.steps.calibrate import write_sample
-from doe.study.input_sets import read_case, read_sample
 from doe.unknown.inputs import values_of
+from doe.workflow.input_sets import read_case, read_sample
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
 from rbdyn.scene.uncertain import Law

@@ -20,11 +20,11 @@ from doe.pareto.search import REFERENCE
 from doe.report.sections.searches import in_few_runs
 from doe.report.steps.search_words import SURE, held_sentence
 from doe.report.study.files import write
-from doe.study.goals import goals_of
-from doe.study.held import pulls
-from doe.study.limits import Limit
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.adaptive import pulls
+from doe.workflow.confirmation import Limit
+from doe.workflow.runs import goals_of
+from doe.workflow.whole import run_study
 from rbdyn.base.blocks import Figures
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '

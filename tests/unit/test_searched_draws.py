@@ -11,12 +11,12 @@ from short_studies import short_study
 
 from doe.adaptive.emulators import Runs, fit_emulators
 from doe.pareto.simulated_tolerance import Neighbourhood
-from doe.study.adaptive import Adaptive
-from doe.study.confirmation import Confirmed
-from doe.study.goals import goals_of, region_of
-from doe.study.searched_draws import draws_about
-from doe.study.shares import DRAWS
 from doe.study_file import Study
+from doe.workflow.adaptive import Adaptive
+from doe.workflow.confirmation import Confirmed
+from doe.workflow.front import DRAWS
+from doe.workflow.pick import draws_about
+from doe.workflow.runs import goals_of, region_of
 
 
 def bent(coded):

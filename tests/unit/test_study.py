@@ -19,15 +19,14 @@ from short_studies import SHORT, rows, short_study, silent, stored
 from doe import clearance
 from doe.report.steps.front import front_record
 from doe.report.study.files import write
-from doe.study.confirmation import Confirmed, gains
-from doe.study.finished import finished as is_finished
-from doe.study.finished import inputs_digest
-from doe.study.front import find_front
-from doe.study.reference import reference_runs
-from doe.study.runs import read_runs, run_design
-from doe.study.surfaces import fit_surfaces
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.confirmation import Confirmed, gains
+from doe.workflow.front import find_front
+from doe.workflow.runs import read_runs, run_design
+from doe.workflow.status import finished as is_finished
+from doe.workflow.status import inputs_digest
+from doe.workflow.surfaces import fit_surfaces, reference_runs
+from doe.workflow.whole import run_study
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import run_key
 

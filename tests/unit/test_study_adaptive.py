@@ -20,11 +20,11 @@ from doe.report.steps.adaptive import adaptive_record
 from doe.report.steps.search_words import spent_sentence
 from doe.report.study.files import write
 from doe.running.store import Store
-from doe.study.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
-from doe.study.runs import STORE, run_design
-from doe.study.surfaces import fit_surfaces
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
+from doe.workflow.runs import STORE, run_design
+from doe.workflow.surfaces import fit_surfaces
+from doe.workflow.whole import run_study
 from rbdyn.faults import InputError
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
@@ -302,7 +302,7 @@ def test_advice_where_surfaces_miss_more_than_noise():
     from pareto_cases import EXAMPLES
 
     study = Study.load(EXAMPLES / "clearance_study.toml")
-    from doe.study.runs import read_runs
+    from doe.workflow.runs import read_runs
 
     runs = read_runs(study, EXAMPLES / "ccd_table4.csv")
     bent = runs.values + 1e3 * np.sin(3.0 * runs.coded[:, :1])

@@ -10,13 +10,13 @@ from short_studies import SHORT, short_study, silent
 
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study.chains import check_chains, solve_chains
-from doe.study.chosen import choices
-from doe.study.confirmation import Confirmed, Gain, gains, statement
-from doe.study.front import find_front
-from doe.study.runs import read_runs
-from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.workflow.confirmation import Confirmed, Gain, gains, statement
+from doe.workflow.front import find_front
+from doe.workflow.pick import choices
+from doe.workflow.runs import read_runs
+from doe.workflow.surfaces import fit_surfaces
+from doe.workflow.whole import check_chains, solve_chains
 from rbdyn.faults import InputError
 
 

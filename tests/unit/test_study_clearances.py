@@ -12,10 +12,8 @@ from short_studies import SHORT, short_study, silent
 from doe import clearance
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
-from doe.study.checked import check_study
-from doe.study.operating import operating_clearances, scenes_of
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.whole import check_study, operating_clearances, run_study, scenes_of
 from rbdyn.faults import InputError, MethodError
 from rbdyn.properties.catalogue import classes_at
 

@@ -14,13 +14,12 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.report.study.files import write
-from doe.study.back_off import Conditioned, Missed
-from doe.study.confirmation import Confirmed
-from doe.study.edge import edge_of, place_of, share_at_edge
-from doe.study.goals import region_of, rounded_within
-from doe.study.limits import Limit, every_limit, limits_of, sentence, verdict_of
-from doe.study.whole import run_study
 from doe.study_file import Study
+from doe.workflow.confirmation import Confirmed, Limit, every_limit, limits_of, sentence, verdict_of
+from doe.workflow.front import Conditioned, Missed
+from doe.workflow.pick import edge_of, place_of, share_at_edge
+from doe.workflow.runs import region_of, rounded_within
+from doe.workflow.whole import run_study
 from rbdyn.faults import InputError
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
@@ -157,7 +156,7 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     corner = study.centre + reach * [0.0, 1.0, 0.0]
     assert share_at_edge(study, np.array([corner, study.centre])) == 0.5
     from doe.response_surface import fit
-    from doe.study.design import design_of
+    from doe.workflow.runs import design_of
 
     coded = design_of(study).coded
     values = [50.0 - 2.0 * coded[:, 1] + 1e-9 * np.sin(np.arange(20)) for _ in study.responses]

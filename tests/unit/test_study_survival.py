@@ -24,11 +24,11 @@ from short_studies import SHORT, short_study, silent, stored
 from doe import clearance
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study.confirmation import Choice, confirm
-from doe.study.reference import reference_runs
-from doe.study.runs import STORE, run_design
-from doe.study.status import study_status
 from doe.study_file import Study
+from doe.workflow.confirmation import Choice, confirm
+from doe.workflow.runs import STORE, run_design
+from doe.workflow.status import study_status
+from doe.workflow.surfaces import reference_runs
 from rbdyn.faults import RunError
 from rbdyn.records.kept import digest_of
 

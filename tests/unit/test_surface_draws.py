@@ -12,12 +12,18 @@ from doe.pareto.manufacture import interval_of_share, percent, random_offsets
 from doe.pareto.tolerance import widest_tolerances
 from doe.response_surface import fit, model_matrix
 from doe.response_surface.model_error import correlation
-from doe.study.design import design_of
-from doe.study.drawn import half_widths
-from doe.study.surface_draws import Simulated, coefficient_root, drawn_responses, field_root, residual_correlation
-from doe.study.widest import widest_of
 from doe.study_file import Study
 from doe.study_file.sections import Tolerances
+from doe.workflow.pick import widest_of
+from doe.workflow.runs import design_of
+from doe.workflow.surfaces import (
+    Simulated,
+    coefficient_root,
+    drawn_responses,
+    field_root,
+    half_widths,
+    residual_correlation,
+)
 
 DESIGN = central_composite(3, centre_replicates=6).coded
 TERMS = ("1", "A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2")

@@ -12,8 +12,8 @@ from doe.designs.model import model_terms
 from doe.report.steps.fit import fit_record
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
-from doe.study.runs import Runs
-from doe.study.surfaces import independent_values, standard_errors, with_rivals
+from doe.workflow.runs import Runs
+from doe.workflow.surfaces import independent_values, standard_errors, with_rivals
 
 POINTS = central_composite(3).coded
 CENTRE, STEP = np.array([0.02, 0.15, 0.3]), np.array([0.005, 0.05, 0.05])

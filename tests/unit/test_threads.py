@@ -9,12 +9,12 @@ from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
 from doe.report.steps.fit import fit_record
-from doe.study.runs import read_runs
-from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study_file import Study
 from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
 from doe.unknown.propagation import Runs, emulated, sobol, spread_of
+from doe.workflow.runs import read_runs
+from doe.workflow.surfaces import fit_surfaces, with_rivals
 
 THREADS = (1, 2)
 

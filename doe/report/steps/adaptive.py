@@ -9,10 +9,9 @@ from doe.arrays import Array, Rows
 from doe.emulator.likelihood import JITTER
 from doe.pareto.simulated import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
-from doe.study.adaptive import Adaptive, levels_at
-from doe.study.compared import Compared
-from doe.study.goals import region_of
 from doe.study_file import Study
+from doe.workflow.adaptive import Adaptive, Compared, levels_at
+from doe.workflow.runs import region_of
 from rbdyn.records.record import finite
 
 

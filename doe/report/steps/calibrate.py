@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from doe.arrays import Array
-from doe.study.calibration import Calibration
-from doe.study.input_sets import NORMAL
 from doe.study_file.table import text_of
 from doe.unknown import inputs
 from doe.unknown.posterior import seen
+from doe.workflow.calibration import Calibration
+from doe.workflow.input_sets import NORMAL
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.records.kept import digest_of, intact, sign

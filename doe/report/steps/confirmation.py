@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from doe.arrays import Array
-from doe.study.confirmation import Confirmed, Gain, statement
-from doe.study.limits import Limit, every_limit, limits_of
-from doe.study.predicted import PredictedGain
-from doe.study.whole import StudyResult
 from doe.study_file import Study
+from doe.workflow.confirmation import Confirmed, Gain, Limit, every_limit, limits_of, statement
+from doe.workflow.surfaces import PredictedGain
+from doe.workflow.whole import StudyResult
 from rbdyn.records.record import finite
 
 

@@ -3,8 +3,8 @@
 from typing import Any
 
 from doe.designs import Design
-from doe.study.design import actual_of
 from doe.study_file import Study
+from doe.workflow.runs import actual_of
 from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.words import counted, label
 from rbdyn.records.cells import quoted_cell

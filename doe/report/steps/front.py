@@ -11,13 +11,11 @@ from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import REFERENCE, dominates
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.response_surface import Surface
-from doe.study.back_off import SurfaceDoubt
-from doe.study.drawn import half_widths, predict_all
-from doe.study.edge import place_of
-from doe.study.goals import goals_of, known_tolerances, region_of
-from doe.study.predicted import PredictedGain, predicted_gains, statement
-from doe.study.shares import open_errors
 from doe.study_file import Study
+from doe.workflow.front import SurfaceDoubt, open_errors
+from doe.workflow.pick import place_of
+from doe.workflow.runs import goals_of, known_tolerances, region_of
+from doe.workflow.surfaces import PredictedGain, half_widths, predict_all, predicted_gains, statement
 from rbdyn.records.record import finite
 
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from doe.report.words import of_hundred
-from doe.study.robust import Decider, Robust
-from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
+from doe.workflow.robust import Decider, Robust, RobustFront
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.scene.unknown import is_number
 

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from doe.study.adaptive import Adaptive
-from doe.study.compared import Compared
-from doe.study.held import Pull, near_limits, pulls
-from doe.study.whole import StudyResult
 from doe.study_file import Study
+from doe.workflow.adaptive import Adaptive, Compared, Pull, near_limits, pulls
+from doe.workflow.whole import StudyResult
 from rbdyn.base.words import counted, improvement, quantity, with_error
 
 SURE = 1.5  # root mean square miss in standard deviations up to which emulators knew how little they know

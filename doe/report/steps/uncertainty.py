@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from doe.report.words import of_hundred
-from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.study_file.table import text_of
 from doe.unknown.propagation import CONFIDENCE, Share
+from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json

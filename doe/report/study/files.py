@@ -11,8 +11,8 @@ from doe.report.steps.adaptive import archive_table
 from doe.report.steps.fit import fit_tables
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
-from doe.study.design import RUNS_TABLE
-from doe.study.whole import StudyResult
+from doe.workflow.runs import RUNS_TABLE
+from doe.workflow.whole import StudyResult
 from rbdyn.records.cells import save_table
 from rbdyn.records.kept import digest_of, sign
 from rbdyn.result import write_json

@@ -16,10 +16,10 @@ from matplotlib.ticker import MaxNLocator
 from doe.report.sections.record import Record
 from doe.report.sections.searches import curves, spent_runs
 from doe.response_surface import Surface
-from doe.study.design import design_of
-from doe.study.robust_front import RobustFront
-from doe.study.whole import StudyResult
 from doe.study_file import Study
+from doe.workflow.robust import RobustFront
+from doe.workflow.runs import design_of
+from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 
 # Marker and colour of the runs made for each reason and of the fronts; a legend where no point lies; pictures in a row.

@@ -11,12 +11,12 @@ from doe.report.steps.front import asked_record, front_record, predicted_record
 from doe.report.steps.robust import robust_record
 from doe.report.steps.search_words import held_sentence, search_sentences
 from doe.running.store import grouped
-from doe.study.adaptive import Adaptive
-from doe.study.confirmation import statement
-from doe.study.design import evaluation
-from doe.study.searched_pick import SearchedPick
-from doe.study.whole import StudyResult
 from doe.study_file import Study
+from doe.workflow.adaptive import Adaptive
+from doe.workflow.confirmation import statement
+from doe.workflow.pick import SearchedPick
+from doe.workflow.runs import evaluation
+from doe.workflow.whole import StudyResult
 from rbdyn.records.record import finite
 from rbdyn.result import versions
 

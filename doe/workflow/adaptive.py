@@ -1,10 +1,10 @@
-"""The front found in few runs: emulators learn the simulator, and each run goes where it is expected to gain most."""
+"""The front found in few runs: emulators learn the simulator, and each run goes where it is expected to gain most. Fronts of one study on one scale, and what limits the pick, factor by factor."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
@@ -13,21 +13,21 @@ from doe import clearance
 from doe.adaptive import AdaptiveFront, Batch, Border, Plan, adaptive_front
 from doe.adaptive import Runs as Known
 from doe.adaptive.acquisition import Region
-from doe.adaptive.search import check_budget
+from doe.adaptive.emulators import Face
+from doe.adaptive.search import NEAR, check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.pareto.search import InfeasibleError
-from doe.pareto.simulated import Samples, SimulatedFront
+from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
+from doe.pareto.simulated import DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.response_surface import Surface
 from doe.running.runner import Progress
 from doe.running.store import Failure, grouped
-from doe.study.design import design_of
-from doe.study.front import named_faults
-from doe.study.goals import goals_of, region_of
-from doe.study.runs import Runs, ordered_runs, runs_of
-from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
 from doe.threads import one_thread
+from doe.workflow.confirmation import Limit
+from doe.workflow.front import named_faults
+from doe.workflow.runs import Runs, design_of, goals_of, ordered_runs, region_of, runs_of
+from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.faults import InputError, MethodError, RunError, check_all, refuse
 from rbdyn.scene import Scene
 
@@ -313,3 +313,87 @@ def _about(study: Study, found: AdaptiveFront, levels: tuple[int, ...]) -> Sampl
     beside = np.tile(_coded_levels(study, levels), (len(coded), 1))
     means, deviations = found.emulators.predict(np.hstack([coded / reach, beside]))
     return Samples(study.actual(coded), means, deviations)
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Hypervolumes between ``ideal`` and ``nadir`` (q,), in costs, of the front foretold.
+
+    By the last emulators: ``search`` (b,), of the fronts foretold before every batch and after the last, and ``surfaces``, of
+    the polynomials' front as it is drawn. By the simulator, with its standard error: ``fresh``, of the search's points by
+    their fresh runs.
+    """
+
+    ideal: Array
+    nadir: Array
+    search: Array
+    surfaces: float
+    fresh: tuple[float, float]
+
+
+def compared(study: Study, adaptive: Adaptive, on_surfaces: Array) -> Compared:
+    """Fronts of a search and of the surfaces, (n, k) in factor units, on one scale."""
+    found, goals = adaptive.found, adaptive.found.front.goals
+    costs = goals.costs(found.foretold)
+    best = costs[non_dominated(costs)]
+    scale = best.min(axis=0), best.max(axis=0)
+    return Compared(
+        *scale,
+        search=np.array([hypervolume(goals.costs(found.emulators.predict(each)[0]), *scale) for each in found.fronts]),
+        surfaces=hypervolume(costs_foretold(study, adaptive, on_surfaces), *scale),
+        fresh=noisy_hypervolume(found.front.costs, found.front.cost_errors, *scale, DRAWS, found.front.seed),
+    )
+
+
+AWAY = 0.1  # of the range of a factor: so far to both sides of the pick the emulators are asked
+LITTLE = 0.01  # of the range of a cost on the front: what changes less does not pull
+
+
+class Pull(NamedTuple):
+    """A factor of the pick: the responses that get better with ``more`` of it, those with ``less``, those that ``turn``
+    there. ``face``: that of the region searched it lies at, None inside."""
+
+    factor: str
+    at: float
+    more: list[str]
+    less: list[str]
+    turn: list[str]
+    face: Face | None
+
+
+def pulls(study: Study, adaptive: Adaptive, pick: Array) -> list[Pull]:
+    """How the responses with a goal pull at every factor of a point (k,) in factor units."""
+    names = [study.responses[index] for index in goals_of(study).objectives]
+    span = np.ptp(adaptive.found.front.goals.costs(adaptive.found.foretold), axis=0)
+    found = []
+    for index, (low, high) in enumerate(adaptive.edges.tolist()):
+        sides = np.clip(pick[index] + AWAY * (high - low) * np.array([-1.0, 0.0, 1.0]), low, high)
+        at = np.tile(pick, (3, 1))
+        at[:, index] = sides
+        below, here, above = costs_foretold(study, adaptive, at) / np.where(span > 0.0, span, 1.0)
+        more = (here - above > LITTLE) & (above < below)
+        less = (here - below > LITTLE) & (below <= above)
+        turn = ~more & ~less & (np.maximum(above, below) - here > LITTLE)
+        ways = [[name for name, one in zip(names, each, strict=True) if one] for each in (more, less, turn)]
+        at_face = _face(study, adaptive, index, float(pick[index]))
+        found.append(Pull(study.factors[index], float(pick[index]), ways[0], ways[1], ways[2], at_face))
+    return found
+
+
+def _face(study: Study, adaptive: Adaptive, index: int, at: float) -> Face | None:
+    """The face that a factor lies at, as the search left it; where its own pick lay elsewhere, the "end" of the region that was
+    searched, if that might have grown."""
+    low, high = adaptive.edges[index].tolist()
+    allowed = study.file.factor[index].allowed if study.file.adaptive.extend else None
+    for side, end in ((-1, low), (1, high)):
+        if abs(at - end) <= NEAR * (high - low):
+            known = (face for face in adaptive.found.faces if (face.factor, face.side) == (index, side))
+            open_end = allowed is not None and abs(allowed[int(side > 0)] - end) > NEAR * (high - low)
+            return next(known, Face(index, side, float("nan"), float("nan"), "end" if open_end else "allowed"))
+    return None
+
+
+def near_limits(adaptive: Adaptive, study: Study, limits: Sequence[Limit]) -> list[Limit]:
+    """The limits that have next to no room left, against the range of the response over all runs."""
+    ranges = dict(zip(study.responses, np.ptp(adaptive.found.emulators.runs.values, axis=0).tolist(), strict=True))
+    return [limit for limit in limits if limit.room <= NEAR * ranges[limit.response]]

@@ -1,27 +1,131 @@
-"""Where a command stands, from its folder: its stages, runs that are done, failed, under way or missing, and the time left.
-
-What is finished is told by the answer's files alone; whether something runs, by the processes that live.
+"""The stages of a study, whether it lies finished in its folder, and where a command stands: runs done, failed, under way or missing, and the
+time left. Loads nothing heavy for a plain study.
 """
 
+import json
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from doe import clearance
-from doe.clearance import points_of
+from doe.clearance import points_of, work_of
 from doe.running.lock import folders_of
-from doe.running.runner import Agenda, Stage, agendas_of, forecast_of
+from doe.running.runner import ANSWER, ANSWER_S, Agenda, Stage, agendas_of, forecast_of
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, grouped
-from doe.study.finished import finished, inputs_digest
-from doe.study.runs import STORE, ordered_runs
-from doe.study.stages import DESIGN, design_works, study_stages
 from doe.study_file import Study
+from doe.study_file.sections import Front
+from doe.workflow.runs import STORE, ordered_runs
 from rbdyn.faults import InputError, read_toml
-from rbdyn.records.kept import code_version, digest_of
+from rbdyn.records.kept import code_version, digest_of, intact
+from rbdyn.records.sources import source_digest
+from rbdyn.result import read_json, versions
+
+# Wall time [s] that surfaces with their front take about, and the pick's tolerances with the chains.
+FRONT_S, TOLERANCES_S = 6.0, 1.0
+# Wall time [s] of the emulators for a batch of an adaptive search.
+BATCH_S = 0.6
+DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
+
+
+def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
+    """Stages of ``doe study`` with these options, to the end. Raises InputError where the study is impossible.
+
+    Further points, where a limit is not kept, are among the most that a stage may run: nobody knows whether they are needed.
+    """
+    works = {
+        key: work
+        for at in (study.every_level if adaptive else [study.levels])
+        for key, work in design_works(study.at(at))
+    }
+    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
+    if adaptive:
+        from doe.adaptive.search import FRESH
+
+        usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
+        (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
+        settings, runs = study.file.adaptive, max(study.file.adaptive.budget - len(works), 0)
+        # A search that gains nothing more stops after a batch and its fresh runs.
+        fewest = min(settings.batch + round(FRESH * settings.budget), runs)
+        stage = Stage.of("adaptive front", runs, work_of(scene), fewest=fewest)
+        stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
+    # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
+    rules = len(get_args(Front.model_fields["pick"].annotation))
+    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
+    one = work_of(clearance.confirmation_scene(study, study.baseline))
+    limited = any(each.lower is not None or each.upper is not None for each in study.file.response)
+    tries = study.file.confirmation.tries - 1 if limited else 0
+    most = points + tries + (len(study.factors) if adaptive else 0)
+    # Picks by several rules may be one point of the drawing.
+    stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region", fewest=2, most=most))
+    if robust or clearance.declares_unknowns(study):
+        from doe.workflow.stages_unknown import robust_stage
+
+        stages.append(robust_stage(study))
+    if study.file.tolerances is not None or study.file.chain:
+        stages.append(Stage(TOLERANCES, besides_s=TOLERANCES_S))
+    return [*stages, Stage(ANSWER, besides_s=ANSWER_S)]
+
+
+def design_works(study: Study) -> list[tuple[str, float]]:
+    """Key and work of every design run. Raises InputError."""
+    ordered = ordered_runs(study)
+    points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
+    return [(point.key, work_of(scene)) for point, scene in zip(points, ordered.scenes, strict=True)]
+
+
+# What simulates, what judges, and what tells it.
+CODE = ("rbdyn.dynamics.simulate", "doe.workflow.whole", "doe.report.study.files")
+
+
+def inputs_digest(study: Study, adaptive: bool = False, robust: bool = False) -> str:
+    """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
+    named = [study.scene.file, *(chain.file for chain in study.file.chain)]
+    named += [] if study.file.reference is None else [study.file.reference.file]
+    named += [study.file.design.augment, *_samples(study)]
+    asked = json.dumps([adaptive, robust, versions()], sort_keys=True)
+    texts = study.path.name, study.file.model_dump_json(), asked, source_digest(*CODE)
+    files = (_content(study.beside(name)) for name in named if name is not None)
+    return digest_of(b"".join([*(text.encode() for text in texts), *files]))
+
+
+def finished(folder: Path, digest: str) -> dict[str, Any] | None:
+    """The record of a finished study of these inputs, as it was written, whose files are all there; else None."""
+    try:
+        record = read_json(folder / "summary.json")
+        whole = (
+            intact(record)
+            and record["inputs"] == digest
+            and all(map(Path.is_file, map(folder.joinpath, record["files"])))
+        )
+        whole = whole and record["answer_sha256"] == digest_of((folder / "answer.txt").read_bytes())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return record if whole else None
+
+
+def _samples(study: Study) -> list[str]:
+    """The posterior sample of unknown inputs that the study or, without such a table there, its scene names."""
+    if study.file.uncertain is not None:
+        return list(filter(None, [study.file.uncertain.sample]))
+    with suppress(InputError):
+        declared = read_toml(study.beside(study.scene.file)).get("uncertain")
+        if isinstance(declared, dict) and isinstance(name := declared.get("sample"), str):
+            return [str(Path(study.scene.file).parent / name)]
+    return []
+
+
+def _content(path: Path) -> bytes:
+    """Bytes of a file; of one that cannot be read, which the study refuses later, none."""
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError):
+        return b""
+
 
 FORMAT = "doe.status/1"
 # Folders of commands on a scene, where none is named.

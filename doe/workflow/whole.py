@@ -1,45 +1,190 @@
-"""The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside."""
+"""The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside. Clearances in operation, the chains solved at the pick, and what is wrong with a study before anything runs."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
+import numpy as np
+
+from doe import clearance
 from doe.arrays import Array
 from doe.clearance import Simulations, declares_unknowns
 from doe.designs import Design
-from doe.dimension_chain import ChainResult
+from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
 from doe.running.keeper import AgendaKeeper
 from doe.running.runner import ANSWER, Progress, Stage
 from doe.running.store import Failure, Store
-from doe.study.adaptive import Adaptive, advice, find_adaptive
-from doe.study.chains import solve_chains
-from doe.study.checked import check_study
-from doe.study.chosen import Chosen, choose
-from doe.study.compared import Compared, compared
-from doe.study.confirmation import Confirmed, Gain, gains, whirl_sentence
-from doe.study.design import check_given, design_of
-from doe.study.edge import Edge, edge_of
-from doe.study.finished import inputs_digest
-from doe.study.front import find_front, with_survival
-from doe.study.goals import check_goals
-from doe.study.limits import Limit, Verdict, limits_of, odds_sentence, sentence, verdict_of
-from doe.study.operating import OperatingClearances, operating_clearances, scenes_of
-from doe.study.reference import Beside, beside
-from doe.study.robust import Robust, check_robust, judge, robust_advice
-from doe.study.runs import STORE, Runs, run_design
-from doe.study.searched_draws import draws_about
-from doe.study.searched_pick import SearchedPick, neighbourhood
-from doe.study.stages import FRONT, TOLERANCES, study_stages
-from doe.study.surfaces import fit_surfaces, with_rivals
-from doe.study.widest import widest_of
 from doe.study_file import Study
+from doe.study_file.sections import chain_table
 from doe.threads import one_thread
+from doe.workflow.adaptive import Adaptive, Compared, advice, check_adaptive, compared, find_adaptive
+from doe.workflow.confirmation import (
+    Confirmed,
+    Gain,
+    Limit,
+    Verdict,
+    gains,
+    limits_of,
+    odds_sentence,
+    sentence,
+    verdict_of,
+    whirl_sentence,
+)
+from doe.workflow.front import find_front, with_survival
+from doe.workflow.pick import Chosen, Edge, SearchedPick, choose, draws_about, edge_of, neighbourhood, widest_of
+from doe.workflow.robust import Robust, check_robust, judge, robust_advice
+from doe.workflow.runs import (
+    STORE,
+    Runs,
+    check_given,
+    check_goals,
+    check_runs,
+    design_of,
+    ordered_runs,
+    region_of,
+    run_design,
+)
+from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
+from doe.workflow.surfaces import Beside, beside, fit_surfaces, reference_runs, with_rivals
 from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
+from rbdyn.faults import InputError, MethodError, check_all
+from rbdyn.properties.catalogue import classes_at
+from rbdyn.records.record import Record
+from rbdyn.scene import Scene
+from rbdyn.scene.notes import catalogued
+
+RADIAL = "bearing.radial_clearance_mm"
+# Which clearance of a scene a key holds as drawn.
+CLEARANCES = {RADIAL: "radial", "cage.guide_clearance_mm": "guide", "cage.pocket_clearance_mm": "pocket"}
+
+
+class OperatingClearances(Record):
+    """Factors that are clearances, at the baseline and at the pick.
+
+    ``operating``: by name of the factor the clearance in operation [mm] by name of the point; empty without [mounting], which
+    alone makes it differ. ``class_sentence``: into which class of ISO 5753-1 the pick's radial clearance falls; empty where
+    that is no factor or the bore is unknown.
+    """
+
+    operating: dict[str, dict[str, float]]
+    class_sentence: str
+
+
+def operating_clearances(study: Study, points: Mapping[str, Scene]) -> OperatingClearances:
+    """Of scenes by name of their point, "pick" among them."""
+    operating = {
+        factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
+        for factor in study.file.factor
+        if factor.key in CLEARANCES and all(_changes(scene, factor.key) for scene in points.values())
+    }
+    radial = any(factor.key == RADIAL for factor in study.file.factor)
+    pick = points["pick"]
+    bore, drawn_um = bore_of(pick), 1e3 * pick.bearing.radial_clearance_mm
+    named = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
+    return OperatingClearances(operating, named)
+
+
+def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
+    """The scenes of both points (k,)."""
+    return {
+        "baseline": clearance.confirmation_scene(study.at(()), baseline),
+        "pick": clearance.confirmation_scene(study, pick),
+    }
+
+
+def bore_of(scene: Scene) -> float | None:
+    """Bore of the bearing [mm]; None where the scene does not state it."""
+    if scene.mounting is not None:
+        return scene.mounting.bore_mm
+    listed = catalogued(scene.bearing)
+    return None if listed is None else listed[1].bore
+
+
+def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
+    """Which classes of ISO 5753-1 hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
+    where = f"ISO 5753-1 at a bore of {bore:g} mm: the pick's radial clearance of {drawn_um:.3g} um"
+    try:
+        classes = classes_at(bore, drawn_um, kind)
+    except MethodError:
+        return ""
+    if not classes:
+        return f"{where} falls in no class."
+    first, *others = (f"{each.name} ({each.lower:g} to {each.upper:g} um)" for each in classes)
+    return f"{where} falls in {first}{f', also in {others[0]}' if others else ''}."
+
+
+def _changes(scene: Scene, key: str) -> bool:
+    return scene.mounting is not None and scene.clearances[CLEARANCES[key]] is not None
+
+
+def _operating_mm(scene: Scene, key: str) -> float:
+    play = scene.clearances[CLEARANCES[key]]
+    assert play is not None
+    return 1e3 * play.operating
+
+
+def check_chains(study: Study) -> None:
+    """Raises InputError for a chain that has no solution at the centre, or whose half width nothing gives.
+
+    One whose half width is still to be found is tried with the widest that the region allows.
+    """
+    computed_later = study.file.tolerances is not None
+    half_widths = region_of(study) * study.step if computed_later else np.full(study.step.size, np.nan)
+    numbers = range(len(study.file.chain))
+    check_all(partial(_chain, study, number, study.centre, half_widths) for number in numbers)
+
+
+def solve_chains(
+    study: Study, pick: Array, tolerances: WidestTolerances | None
+) -> tuple[dict[str, ChainResult], list[str]]:
+    """Every chain by name at the picked point (k,), and why any has no parts."""
+    half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
+    solved, notes = {}, []
+    for number, chain in enumerate(study.file.chain):
+        if (place := study.factors.index(chain.factor)) in study.inactive:
+            notes.append(f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories")
+            continue
+        widest, given = half_widths[place], chain.half_width_mm
+        if given is not None and given > widest:
+            why = f"wider than the {widest:.3g} within which the gains are kept as [tolerances] asks"
+            where = f"{study.path}: chain {chain.name}: half_width_mm = {given:g}"
+            notes.append(f"{where}: {why}; narrow it, or keep less")
+        try:
+            parts = _chain(study, number, pick, half_widths)
+            solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
+        except InputError as error:
+            notes += error.faults
+    return solved, notes
+
+
+def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain:
+    chain = study.file.chain[number]
+    factor = study.factors.index(chain.factor)
+    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else None
+    source = f"{study.path}: chain {chain.name}"
+    try:
+        table = chain_table(chain, study.path.parent, float(point[factor]), half_width)
+    except InputError as error:
+        raise InputError([f"{study.path}: {fault}" for fault in error.faults]) from None
+    return chain_from(table, source)
+
+
+def check_study(study: Study, adaptive: bool = False) -> Runs | None:
+    """The published runs, if any; ``adaptive``: also of that search. Raises InputError with all faults of keys, responses, scenes, design and chains."""
+    check_all(
+        (
+            lambda: check_runs(study, ordered_runs(study).design),
+            lambda: clearance.confirmation_scene(study, study.baseline),
+            lambda: check_chains(study),
+            lambda: check_adaptive(study, adaptive),
+        )
+    )
+    return reference_runs(study)
 
 
 @dataclass(frozen=True, repr=False)

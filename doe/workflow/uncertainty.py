@@ -7,7 +7,6 @@ from pathlib import Path
 from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.store import Failure
-from doe.study.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
 from doe.threads import one_thread
 from doe.unknown.propagation import (
     Emulated,
@@ -22,6 +21,7 @@ from doe.unknown.propagation import (
     sobol,
     spread_of,
 )
+from doe.workflow.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
 from rbdyn.base.words import are, counted
 from rbdyn.faults import RunError
 from rbdyn.result import Quantity, SimulationResult

@@ -1,24 +1,64 @@
-"""Simulations at chosen points, and whether what they gain over the baseline is more than their error."""
+"""Simulations at chosen points: whether what they gain over the baseline is more than their error, and whether they keep the limits.
 
+Intervals are Student's at the degrees of freedom that are behind the errors; a limit is kept, broken or undecided.
+"""
+
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import special
 
 from doe import clearance
 from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.store import Failure
-from doe.study.goals import goals_of
-from doe.study.intervals import LEVEL, joint_freedom, standard_errors, times_wider
-from doe.study.predicted import verdict
 from doe.study_file import Study
 from doe.threads import one_thread
-from rbdyn.base.words import improvement
+from doe.unknown.propagation import Share
+from doe.workflow.runs import goals_of
+from doe.workflow.surfaces import gain_verdict
+from rbdyn.base.words import chance, improvement, with_error
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.result import SimulationResult
+
+LEVEL = 0.95  # that a stated interval holds the truth
+
+
+def standard_errors(half_widths: ArrayLike, freedom: ArrayLike) -> Array:
+    """Standard errors from half-widths of 95 %, any shape; of an unknown half-width (NaN) none."""
+    return np.nan_to_num(np.asarray(half_widths, float)) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
+
+
+def joint_freedom(errors: Sequence[Array], freedom: Sequence[Array]) -> Array:
+    """Degrees of freedom of the root sum square of independent standard ``errors``, each with its own; infinitely many of
+    none."""
+    variances = [each**2 for each in errors]
+    spread = np.sum([each**2 / behind for each, behind in zip(variances, freedom, strict=True)], axis=0)
+    total = np.sum(variances, axis=0)
+    return np.divide(total**2, spread, out=np.full_like(total, np.inf), where=spread > 0.0)
+
+
+def times_wider(freedom: ArrayLike, count: int) -> Array:
+    """How many times wider half-widths of 95 % are where ``count`` of them are to hold together (Bonferroni)."""
+    together = 1.0 - 0.5 * (1.0 - LEVEL) / count
+    return np.asarray(special.stdtrit(freedom, together) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
+
+
+def one_sided(freedom: ArrayLike, probability: float) -> Array:
+    """What part of a half-width of 95 % holds on one side with a ``probability``."""
+    return np.asarray(special.stdtrit(freedom, probability) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
+
+
+def chance_above(room: ArrayLike, half_width: ArrayLike, freedom: ArrayLike) -> Array:
+    """Probability that a value, estimated ``room`` above a bound with a ``half_width`` of 95 %, lies above it."""
+    scaled = np.asarray(room) / np.asarray(half_width) * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
+    return np.asarray(special.stdtr(freedom, scaled))
+
 
 WHIRL = "whirl_deviation_ratio"
 
@@ -89,7 +129,7 @@ class Gain(Record):
     percent: float
     error: float = keyed("error_percent")
     goal: str = "min"
-    verdict: str = derived(lambda self: verdict(self.percent, self.error))
+    verdict: str = derived(lambda self: gain_verdict(self.percent, self.error))
     freedom: float = outside_json(default=np.inf)
 
     def error_among(self, count: int) -> float:
@@ -194,3 +234,111 @@ def statement(gains: Sequence[Gain]) -> str:
 def _improved(gain: Gain, count: int) -> str:
     """A gain in words, with the error that holds together with those of so many."""
     return f"{gain.response} {improvement(gain.percent, gain.error_among(count), gain.goal)}"
+
+
+Verdict = Literal["kept", "undecided", "broken"]
+
+# From the best to the worst.
+ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit of a response against its simulated ``value`` with its joint 95 % half-width ``error`` (NaN: unknown).
+
+    ``one_sided`` times the half-width is the error on one side at the probability that the study asks for; ``freedom``:
+    degrees of freedom of the error.
+    """
+
+    response: str
+    sense: str
+    bound: float
+    value: float
+    error: float
+    one_sided: float
+    freedom: float = math.inf
+
+    @property
+    def room(self) -> float:
+        """How far the value is on the good side of the bound; negative beyond it."""
+        return self.bound - self.value if self.sense == "<=" else self.value - self.bound
+
+    @property
+    def verdict(self) -> Verdict:
+        """Kept by more than the one-sided error, broken by more than the error, else undecided."""
+        if self.room > self.one_sided * self.error:
+            return "kept"
+        return "broken" if -self.room > self.error else "undecided"
+
+    @property
+    def probability(self) -> float:
+        """With which the bound is kept, by the error of the value; NaN where that is unknown."""
+        if not self.error > 0.0:
+            return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
+        return float(chance_above(self.room, self.error, self.freedom))
+
+    @property
+    def shown(self) -> str:
+        """The limit with its value in words."""
+        sure = "error unknown" if math.isnan(self.error) else f"probability {chance(self.probability)}"
+        return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {sure})"
+
+
+def every_limit(study: Study, confirmed: Confirmed) -> list[Limit]:
+    """All limits of the study at a simulated point, a lower and an upper one of a response each by itself."""
+    freedom = confirmed.joint_freedom
+    sides = one_sided(freedom, study.file.confirmation.limit_probability).tolist()
+    columns = (confirmed.values.tolist(), confirmed.error.tolist(), sides, freedom.tolist())
+    known = list(zip(*columns, strict=True))
+    return [
+        Limit(study.responses[index], sense, bound, *known[index]) for index, sense, bound in goals_of(study).limited
+    ]
+
+
+def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
+    """The limits of the study at a simulated point, one a response: of a lower and an upper one that with the worse
+    verdict, or with less room."""
+    worst: dict[str, Limit] = {}
+    for limit in every_limit(study, confirmed):
+        known = worst.get(limit.response)
+        if known is None or _badness(limit) > _badness(known):
+            worst[limit.response] = limit
+    return [worst[name] for name in study.responses if name in worst]
+
+
+def verdict_of(limits: Sequence[Limit]) -> Verdict:
+    """The worst verdict; kept without limits."""
+    return max((limit.verdict for limit in limits), key=ORDER.index, default="kept")
+
+
+def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
+    """What became of the limits at the pick, the bad ones first; empty without limits."""
+    if not limits:
+        return ""
+    words = {
+        "broken": "LIMIT BROKEN at the pick: {}, beyond by more than its error",
+        "undecided": "LIMIT UNDECIDED at the pick: {}, too near the bound for its error",
+        "kept": f"Limit kept at the pick, probability {probability:g} demanded: {{}}",
+    }
+    parts = []
+    for verdict in reversed(ORDER):
+        group = [limit.shown for limit in limits if limit.verdict == verdict]
+        parts += [words[verdict].format(", ".join(group))] if group else []
+    tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
+    return f"{'. '.join(parts)} ({tries})."
+
+
+def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
+    """How likely the pick keeps its limits over the unknown inputs, or the command that tells; empty without limits."""
+    if not goals_of(study).limited:
+        return ""
+    if odds is None:
+        return f"The odds of keeping the limits over the unknown inputs: doe study {study.path.name} --robust."
+    shares = ", ".join(
+        f"{name} {100.0 * p:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %)" for name, (p, low, high) in odds.items()
+    )
+    return f"Probability that the pick keeps its limits over the unknown inputs: {shares}."
+
+
+def _badness(limit: Limit) -> tuple[int, float]:
+    return ORDER.index(limit.verdict), -limit.room

@@ -6,14 +6,13 @@ from pathlib import Path
 
 from doe.clearance import work_of
 from doe.running.runner import ANSWER, ANSWER_S, Stage
-from doe.study.calibration_question import Question, cases_of
-from doe.study.input_sets import Case, read_case
-from doe.study.robust import case_of_study
-from doe.study.robust_front import CONFIRMED, POINTS, fresh_rows
-from doe.study.uncertainty import MOST, MOST_EFFORT, OUTPUTS
 from doe.study_file import Study
 from doe.unknown import inputs
 from doe.unknown.calibration import TRIED, sets_a_wave
+from doe.workflow.calibration import Question, cases_of
+from doe.workflow.input_sets import Case, read_case
+from doe.workflow.robust import CONFIRMED, POINTS, case_of_study, fresh_rows
+from doe.workflow.uncertainty import MOST, MOST_EFFORT, OUTPUTS
 from rbdyn.scene import Scene
 
 # Wall time [s] that the emulators of a robust judgement take about.

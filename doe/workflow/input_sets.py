@@ -1,31 +1,146 @@
-"""Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
+"""Input sets of a scene with unknown inputs: which inputs vary, the scenes at values of them, their runs; and columns of tables that are keys
+of a scene.
+
+
+"""
 
 import copy
+import difflib
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any, get_args
 
 import numpy as np
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from scipy.stats import t as student
 
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.store import Failure, sentence
-from doe.study.scene_columns import key_values, unknown_keys
-from doe.study_file.table import read_sheet
+from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, read_sheet
+from doe.study_file.table import is_number as is_numeral
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
 from rbdyn.base.words import shown
-from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, one_line, read_toml, refuse, set_key
+from rbdyn.faults import (
+    LONGEST_NAME,
+    MOST_FAULTS,
+    Claims,
+    InputError,
+    RunError,
+    assignment_faults,
+    key_path,
+    one_line,
+    read_toml,
+    refuse,
+    set_key,
+)
 from rbdyn.records.kept import digest_of
 from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
+
+# Of a whole number, as in TOML.
+LARGEST_BITS = 63
+
+
+def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
+    """Values (n,) of the scene's key that a column is named by, and a sentence for each cell that has none.
+
+    One of the ``choices`` that the key's law states stays as it is stated; else the key's type in a scene decides what is
+    number, boolean or text.
+    """
+    adapter, known = _adapter(column.name), dict[str, Any]()
+    faults = []
+    for row, text in enumerate(column.texts):
+        if text not in known:
+            known[text] = next(_accepted(text, adapter, choices), None)
+        if known[text] is None:
+            faults.append(column.fault(row, _words(column.name, text)))
+    return [known[text] for text in column.texts], faults
+
+
+def unknown_keys(keys: Iterable[str]) -> list[str]:
+    """A sentence for each column whose name is no key of a scene; the first ones name the nearest key."""
+    sentences = list[str]()
+    for key in keys:
+        table, _, name = key.rpartition(".")
+        known = _fields(key)
+        if name not in known:
+            # To look for the nearest name takes longer than all else; nobody reads beyond the first sentences.
+            near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1) if len(sentences) < MOST_FAULTS else []
+            fix = f"did you mean {table}.{near[0]}?" if near else "rename or remove it"
+            sentences.append(f"column {one_line(key, LONGEST_NAME)}: unknown key; {fix}")
+    return sentences
+
+
+def _readings(text: str) -> list[Any]:
+    """What a text may mean, the narrowest type first."""
+    readings: list[Any] = [text.lower() == "true"] if text.lower() in ("true", "false") else []
+    if is_numeral(text) and math.isfinite(float(text)):
+        whole = WHOLE.fullmatch(text) and int(text).bit_length() <= LARGEST_BITS
+        readings += [int(text), float(text)] if whole else [float(text)]
+    return [*readings, text]
+
+
+def _accepted(text: str, adapter: TypeAdapter[Any], choices: Sequence[Any]) -> Iterator[Any]:
+    """Values that a text may stand for, the likeliest first."""
+    readings = _readings(text)
+    stated = [choice for choice in choices if any(_alike(choice, reading) for reading in readings)]
+    if len(stated) == 1:
+        yield stated[0]
+    for reading in stated or readings:
+        try:
+            yield adapter.validate_python(reading, strict=True)
+        except ValidationError:
+            continue
+
+
+def _alike(choice: Any, reading: Any) -> bool:
+    """Whether a reading is a choice: of one type, or both numbers."""
+    if isinstance(choice, str) and isinstance(reading, str):
+        return choice.strip() == reading
+    kinds = {type(choice), type(reading)}
+    return (len(kinds) == 1 or kinds == {int, float}) and bool(choice == reading)
+
+
+def _words(key: str, text: str) -> str:
+    if not text:
+        return "is empty; fill it in or remove the row"
+    if len(text) > LONGEST_NUMBER:
+        return f"is longer than {LONGEST_NUMBER} characters; write a shorter value"
+    return f"is no value of that key; rbdyn keys {key} tells which are"
+
+
+def _adapter(key: str) -> TypeAdapter[Any]:
+    """What accepts the values of a dotted key of a scene."""
+    field = _fields(key)[key.rpartition(".")[2]]
+    limited: Any = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+    return TypeAdapter(limited)
+
+
+def _fields(key: str) -> dict[str, FieldInfo]:
+    """Fields of the table that a dotted key is in; none where no scene has that table."""
+    models: list[type[BaseModel]] = [Scene]
+    for part in key.split(".")[:-1]:
+        fields = [model.model_fields[part] for model in models if part in model.model_fields]
+        models = [inner for field in fields for inner in _models(field.annotation)]
+    return {name: field for model in models for name, field in model.model_fields.items()}
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Tables that an annotation allows."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for each in get_args(annotation) for model in _models(each)]
+
 
 # Share of input sets that may be impossible or fail.
 HOLES = 0.05
