@@ -28,7 +28,7 @@ def chain(
     with guarded(as_json):
         from doe.dimension_chain import is_several, read_chains, solve
         from doe.report.sections.parts import chain_blocks
-        from doe.report.steps.chain import chains_record
+        from doe.report.steps.fit import chains_record
 
         several = is_several(path)
         results, faults = {}, []

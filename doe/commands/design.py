@@ -20,7 +20,7 @@ def design(
 ) -> None:
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
-        from doe.report.steps.design import blocks, design_record, print_csv
+        from doe.report.steps.fit import blocks, design_record, print_csv
         from doe.study_file import Study
         from doe.workflow.runs import design_of, evaluation
         from doe.workflow.whole import check_study

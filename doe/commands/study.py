@@ -42,8 +42,8 @@ def study(
                 print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
             _leave_by(record, as_json)
             return
-        from doe.report.study.answer import blocks
         from doe.report.study.files import write
+        from doe.report.study.summary import blocks
         from doe.workflow.whole import run_study
 
         options = {"adaptive": adaptive, "robust": robust}

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.dimension_chain import read_chains
-from doe.report.steps.design import design_record
+from doe.report.steps.fit import design_record
 from doe.report.study.summary import design_record as summary_design
 from doe.study_file import Study
 from doe.study_file.table import read_table

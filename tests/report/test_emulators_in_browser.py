@@ -16,7 +16,7 @@ from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.html import html_report
-from doe.report.steps.adaptive import emulators_record
+from doe.report.steps.front import emulators_record
 from doe.study_file import Study
 from doe.study_file.sections import Category
 

@@ -11,7 +11,7 @@ from synthetic_study import RESPONSES, motion, summary
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.sections import sections
-from doe.report.study.answer import answer_text, blocks
+from doe.report.study.summary import answer_text, blocks
 from rbdyn.base.blocks import Bullets, Detail, Heading, Note, Paragraph, Section, Table, Tile, Tiles
 from rbdyn.base.render import html as page
 from rbdyn.base.render import markdown, terminal

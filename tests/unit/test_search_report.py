@@ -18,7 +18,7 @@ from doe.adaptive.acquisition import Region
 from doe.adaptive.emulators import Face
 from doe.pareto.search import REFERENCE
 from doe.report.sections.searches import in_few_runs
-from doe.report.steps.search_words import SURE, held_sentence
+from doe.report.steps.front import SURE, held_sentence
 from doe.report.study.files import write
 from doe.study_file import Study
 from doe.workflow.adaptive import pulls

@@ -16,8 +16,7 @@ from short_studies import SHORT, short_study, silent
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.steps.adaptive import adaptive_record
-from doe.report.steps.search_words import spent_sentence
+from doe.report.steps.front import adaptive_record, spent_sentence
 from doe.report.study.files import write
 from doe.running.store import Store
 from doe.study_file import Study

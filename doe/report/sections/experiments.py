@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.report.sections.plots_of_fits import evaluation_plots
+from doe.report.sections.fits import evaluation_plots
 from doe.report.sections.record import Record, factors, part, record_table, responses
 from rbdyn.base.blocks import Block, Figures, Paragraph, Section, Table
 from rbdyn.base.words import label, shown, with_error

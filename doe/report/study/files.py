@@ -7,10 +7,9 @@ from doe import clearance
 from doe.dimension_chain.solution import ALLOCATED
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
-from doe.report.steps.adaptive import archive_table
 from doe.report.steps.fit import fit_tables
-from doe.report.study.answer import answer_text
-from doe.report.study.summary import summary
+from doe.report.steps.front import archive_table
+from doe.report.study.summary import answer_text, summary
 from doe.workflow.runs import RUNS_TABLE
 from doe.workflow.whole import StudyResult
 from rbdyn.records.cells import save_table

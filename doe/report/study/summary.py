@@ -1,15 +1,26 @@
-"""summary.json: what a study asked for, and everything that it found, as plain numbers."""
+"""The answer of a study and its summary."""
 
+from dataclasses import replace
 from typing import Any
 
 from doe import clearance
-from doe.report.steps.adaptive import adaptive_record, compared_record
+from doe.report.sections.answer import advice, changes, verdict
+from doe.report.sections.contents import notes, readable, reference
+from doe.report.sections.experiments import failure_table
+from doe.report.sections.fits import diagnostics
+from doe.report.sections.record import known, part
 from doe.report.steps.confirmation import confirmation_record, gains_record, judged_limits_record
-from doe.report.steps.design import runs_record
-from doe.report.steps.fit import fit_record
-from doe.report.steps.front import asked_record, front_record, predicted_record
+from doe.report.steps.fit import fit_record, runs_record
+from doe.report.steps.front import (
+    adaptive_record,
+    asked_record,
+    compared_record,
+    front_record,
+    held_sentence,
+    predicted_record,
+    search_sentences,
+)
 from doe.report.steps.robust import robust_record
-from doe.report.steps.search_words import held_sentence, search_sentences
 from doe.running.store import grouped
 from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
@@ -17,8 +28,30 @@ from doe.workflow.confirmation import statement
 from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import evaluation
 from doe.workflow.whole import StudyResult
+from rbdyn.base.blocks import Block, Detail, Heading
+from rbdyn.base.render import terminal
 from rbdyn.records.record import finite
 from rbdyn.result import versions
+
+
+def answer_text(record: dict[str, Any]) -> str:
+    """answer.txt, of the record of ``doe study --json``."""
+    clean = known(record)
+    failures = failure_table(part(clean, "failures") or [])
+    return terminal.text(readable([*verdict(clean), *advice(clean), failures], clean))
+
+
+def blocks(record: dict[str, Any]) -> list[Block]:
+    """What the terminal shows of the record of ``doe study --json``: the verdict first, the fits only to who asks for all."""
+    clean = known(record)
+    fits = [replace(block, detail=Detail.ALL) for block in diagnostics(clean, {}).blocks]
+    published = reference(clean, {})
+    context = readable([*published.blocks, changes(clean)], clean)
+    titles = (published.title if part(clean, "beside_reference") else "", "The answer" if context else "")
+    before, after = (Heading(title, detail=Detail.USUAL) for title in titles)
+    answer = [*advice(clean), *notes(clean, {}).blocks]
+    return readable([*verdict(clean), *fits, before, *context, after, *answer], clean)
+
 
 FORMAT = "doe.study/1"
 
