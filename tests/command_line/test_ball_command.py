@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
-from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
+from rbdyn.cli.ball import optimum_study, race_limits, runout_record
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.sweep.points import parsed

@@ -15,8 +15,7 @@ from manual_parts import ROOT, declared, parts, whole_page
 
 import rbdyn
 from rbdyn.cli.keys import keys, lines
-from rbdyn.cli.manual.docstrings import markdown
-from rbdyn.cli.manual.page import rendered
+from rbdyn.cli.manual.page import markdown, rendered
 
 # A command with its options, as prose and code write it.
 CALL = re.compile(r"\b(rbdyn|doe) (?!=)([a-z]+)\b((?: [^\s`|]+)*)")

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene
-from rbdyn.cli.ball_studies import optimum_study
+from rbdyn.cli.ball import optimum_study
 from rbdyn.faults import InputError
 from rbdyn.life import balls as life
 from rbdyn.life import turning_rings
