@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from doe.arrays import Array, Whole
 from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
 from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
-from rbdyn.faults import InputError, RunError, read_toml, refuse
-from rbdyn.records.kept import code_version, run_key
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError, RunError, read_toml, refuse
+from rbdyn.base.storage import code_version, run_key
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import plain_values

@@ -1,6 +1,6 @@
 """The command ``doe``."""
 
-from rbdyn.cli.loading import Loading
+from rbdyn.base.loading import Loading
 
 with Loading():
     import typer
@@ -15,8 +15,8 @@ with Loading():
     from doe.commands.status import status
     from doe.commands.study import study
     from doe.commands.uncertainty import uncertainty
-    from rbdyn.cli import streams
-    from rbdyn.cli.options import Version, refusing
+    from rbdyn.base import streams
+    from rbdyn.base.options import Version, refusing
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 

@@ -17,7 +17,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 Array = NDArray[np.float64]
 EXAMPLE = Path(__file__).parent / "cylindrical_roller.toml"
@@ -211,7 +211,7 @@ def main(
     turns: Annotated[float, typer.Option(help="Shaft turns to integrate, at most 1.")] = 0.25,
 ) -> None:
     """Print error and time of SciPy's RK45 on the numpy right-hand side, and how many times faster rbdyn is."""
-    from rbdyn.cli.terminal import guarded
+    from rbdyn.base.terminal import guarded
 
     with guarded(as_json=False):
         compare(scene, turns)
@@ -231,7 +231,7 @@ def compare(scene: Path, turns: float) -> None:
         times_faster,
     )
     from rbdyn.accuracy.report import processor
-    from rbdyn.cli.terminal import print_table
+    from rbdyn.base.terminal import print_table
 
     stretches = starts_after_transient(Scene.load(scene), turns)
     ready = by_scipy("RK45", lambda stretch: NumpyRightHandSide(stretch.bearing))

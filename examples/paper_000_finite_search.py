@@ -28,7 +28,7 @@ import typer
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.ball_solvers import Problem, problem_of, timed
-from rbdyn.cli.terminal import print_table
+from rbdyn.base.terminal import print_table
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of
 from rbdyn.quasistatic.rivals import double_decker_search, finite_search, plain_newton

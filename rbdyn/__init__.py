@@ -6,9 +6,9 @@ Names are fetched when first used: importing the package loads neither numba nor
 
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
+    from rbdyn.base.faults import InputError, RunError
     from rbdyn.dynamics.motion.history import History, history
     from rbdyn.dynamics.simulate import simulate
-    from rbdyn.faults import InputError, RunError
     from rbdyn.quasistatic.bearing import equilibrium
     from rbdyn.quasistatic.result import BallResult
     from rbdyn.result import SimulationResult
@@ -28,8 +28,8 @@ _HOMES = {
     "history": "rbdyn.dynamics.motion.history",
     "History": "rbdyn.dynamics.motion.history",
     "SimulationResult": "rbdyn.result",
-    "InputError": "rbdyn.faults",
-    "RunError": "rbdyn.faults",
+    "InputError": "rbdyn.base.faults",
+    "RunError": "rbdyn.base.faults",
 }
 
 

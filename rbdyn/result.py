@@ -11,9 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
+from rbdyn.base.faults import InputError, bounded, path_of, read_text
+from rbdyn.base.records import Record, derived, json_fields, keyed
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
-from rbdyn.faults import InputError, bounded, path_of, read_text
-from rbdyn.records.record import Record, derived, json_fields, keyed
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rbdyn.base.faults import read_toml
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.state import layout_of
-from rbdyn.faults import read_toml
 from rbdyn.scene import Scene
 
 ROOT = Path(__file__).parent.parent

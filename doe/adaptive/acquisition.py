@@ -20,8 +20,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from doe.adaptive.emulators import Emulators, Inactive, settled
-from doe.arrays import Array, Mask, Rows
 from doe.pareto.search import REFERENCE, non_dominated
+from rbdyn.base.arrays import Array, Mask, Rows
 
 EVERYWHERE = 9  # 2^9 points all over the region
 PAST = 1.3  # times the region: what lies beyond is moved to its faces, where fronts like to end

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Mask, Whole
 from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.pareto.goals import Goals
+from rbdyn.base.arrays import Array, Mask, Whole
 
 
 class Runs(NamedTuple):

@@ -20,13 +20,13 @@ from scipy.stats import qmc
 
 from doe.adaptive.acquisition import DRAWS, WORTH, Levels, Region, batch, candidates, front_rows, known_of, levels_of
 from doe.adaptive.emulators import Border, Emulators, Evaluate, Face, Runs, fit_emulators, shares_of
-from doe.arrays import Array, Rows, Whole
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, hypervolume, spread
 from doe.pareto.simulated import Samples, SimulatedFront
 from doe.threads import one_thread
+from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 NEAR = 0.05  # of the range of a factor: as near to a face a pick lies at it
 AHEAD, BETTER = 0.1, 0.9  # of the range beyond a face; chance there of what no point of the front dominates

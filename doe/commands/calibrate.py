@@ -8,9 +8,9 @@ import typer
 from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
 from rbdyn.base.blocks import Detail
+from rbdyn.base.options import Json, Set, Workers, folder_option, valued
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
-from rbdyn.cli.terminal import guarded, hand_over, output_folder
+from rbdyn.base.terminal import guarded, hand_over, output_folder
 
 
 def calibrate(

@@ -9,10 +9,10 @@ import typer
 from doe.commands.options import Save
 from doe.commands.steps import save
 from rbdyn.base.blocks import Detail
+from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.options import Json, flag
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import BAD_INPUT, guarded, hand_over
-from rbdyn.faults import InputError, refuse
+from rbdyn.base.terminal import BAD_INPUT, guarded, hand_over
 
 
 def chain(

@@ -5,9 +5,9 @@ from typing import Annotated
 from doe.commands.options import Save, StudyPath
 from doe.commands.steps import save
 from rbdyn.base.blocks import Detail
+from rbdyn.base.options import Json, flag
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import guarded, hand_over
+from rbdyn.base.terminal import guarded, hand_over
 
 
 def design(

@@ -10,10 +10,10 @@ import typer
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler
 from doe.commands.steps import Effort, fitted, keeping_runs, save
 from rbdyn.base.blocks import Block, Detail, Note, Paragraph
+from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.options import Json, Workers, flag, valued
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, Workers, flag, valued
-from rbdyn.cli.terminal import guarded, hand_over
-from rbdyn.faults import InputError, refuse
+from rbdyn.base.terminal import guarded, hand_over
 
 if TYPE_CHECKING:
     from doe.study_file import Study
@@ -59,7 +59,7 @@ def fit(
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         save(out, loaded.path, "fit.json", record)
         if out is not None:
-            from rbdyn.records.cells import save_table
+            from rbdyn.base.records import save_table
 
             for name, rows in fit_tables(surfaces).items():
                 save_table(rows, out / name)

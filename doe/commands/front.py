@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath
 from doe.commands.steps import Effort, fitted, keeping_runs, save
 from rbdyn.base.blocks import Block, Detail
+from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.options import Json, Workers, flag, valued
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, Workers, flag, valued
-from rbdyn.cli.terminal import guarded, hand_over
-from rbdyn.faults import InputError, refuse
+from rbdyn.base.terminal import guarded, hand_over
 
 if TYPE_CHECKING:
     from doe.study_file import Study

@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING
 
+from rbdyn.base.options import Json
+from rbdyn.base.terminal import guarded
 from rbdyn.cli.keys import AsSchema, Word, run
-from rbdyn.cli.options import Json
-from rbdyn.cli.terminal import guarded
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rbdyn.cli.options import Json
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.base.options import Json
+from rbdyn.base.terminal import guarded, print_json
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
 # design lie 1.7 steps out, and none may touch zero.
@@ -37,8 +37,8 @@ def new(
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
         from doe.workflow.whole import check_study
-        from rbdyn.cli.template import filled
-        from rbdyn.faults import read_toml, validated
+        from rbdyn.base.faults import read_toml, validated
+        from rbdyn.base.options import filled
         from rbdyn.scene import Scene, rollers_only
 
         rollers_only(Scene.load(path))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rbdyn.cli.options import flag, folder_option, valued
+from rbdyn.base.options import flag, folder_option, valued
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
 Data = Annotated[Path | None, valued("TABLE.csv", "Table of runs made elsewhere.", "runs are simulated")]

@@ -6,11 +6,11 @@ from typing import Annotated, Any
 import typer
 
 from doe.commands.options import Quiet
+from rbdyn.base.faults import InputError
+from rbdyn.base.forecast import duration, span
+from rbdyn.base.options import Json, folder_option
+from rbdyn.base.terminal import guarded, hand_over, print_table
 from rbdyn.base.words import counted
-from rbdyn.cli.options import Json, folder_option
-from rbdyn.cli.terminal import guarded, hand_over, print_table
-from rbdyn.faults import InputError
-from rbdyn.records.forecast import duration, span
 
 
 def status(

@@ -7,8 +7,8 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rbdyn.cli.terminal import keeping, notice, output_folder, progress_bar
-from rbdyn.faults import RunError
+from rbdyn.base.faults import RunError
+from rbdyn.base.terminal import keeping, notice, output_folder, progress_bar
 
 if TYPE_CHECKING:
     from doe.clearance import Simulations
@@ -91,7 +91,7 @@ def noted_agenda(
 
 def print_predicted(agenda: "AgendaKeeper | None", as_json: bool) -> None:
     """How long a command took compared with what was predicted; nothing where nothing was."""
-    from rbdyn.records.forecast import duration, span
+    from rbdyn.base.forecast import duration, span
 
     noted = None if agenda is None or as_json else agenda.agenda
     if noted is not None and noted.predicted is not None and noted.took_s is not None:

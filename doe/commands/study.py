@@ -9,9 +9,9 @@ import typer
 from doe.commands.options import Adaptive, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, stages
 from rbdyn.base.blocks import Detail
+from rbdyn.base.options import Json, Workers
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, Workers
-from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
+from rbdyn.base.terminal import FAILED, guarded, output_folder, print_json
 
 
 def study(

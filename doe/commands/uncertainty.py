@@ -8,11 +8,11 @@ import typer
 from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
 from rbdyn.base.blocks import Detail
+from rbdyn.base.faults import refuse
+from rbdyn.base.fields import no_power_of_two
+from rbdyn.base.options import Json, Set, Workers, folder_option, valued
 from rbdyn.base.render.terminal import show
-from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
-from rbdyn.cli.terminal import guarded, hand_over, output_folder
-from rbdyn.faults import refuse
-from rbdyn.fields import no_power_of_two
+from rbdyn.base.terminal import guarded, hand_over, output_folder
 
 
 def uncertainty(

@@ -18,9 +18,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Rows, Whole
+from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 Region = Literal["ball", "box"]
 SAME_POINT = 1e-9  # coded units within which two runs are replicates

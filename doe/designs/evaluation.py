@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from doe.arrays import Array, Rows
 from doe.designs.design import Region, replicate_groups
 from doe.designs.model import model_matrix, term_powers
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import MethodError
 
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph

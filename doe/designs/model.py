@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Rows
+from rbdyn.base.arrays import Array, Rows
 
 Model = Literal["linear", "interaction", "pure_quadratic", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)

@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array
 from doe.designs.design import Design, assembled
 from doe.designs.model import Terms, model_matrix, model_terms
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 Criterion = Literal["d", "i"]
 FEWEST, MOST = 4, 40  # random designs that exchanges start from; the best is kept

@@ -22,7 +22,7 @@ import numpy as np
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part, allocated_part, given_part
 from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties.tolerances import grade_tolerances, tolerance_unit
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can

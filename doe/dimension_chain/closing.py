@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.dimension_chain.links import DIGITS, Interval, Link, Mode, Part, PressFit
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 

@@ -13,8 +13,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, Positive
+from rbdyn.base.faults import Strict
+from rbdyn.base.fields import NonNegative, Positive
 from rbdyn.properties.tolerances import SURFACES, fit_limits, positioned, ring_limits
 
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]

@@ -13,7 +13,7 @@ from pydantic import Field
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, shown, used_links
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link, coded_limits
-from rbdyn.faults import MethodError, Strict, read_toml, refuse, validated
+from rbdyn.base.faults import MethodError, Strict, read_toml, refuse, validated
 from rbdyn.properties.tolerances import LARGEST, positioned
 
 

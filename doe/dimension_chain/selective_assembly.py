@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from doe.arrays import Array, Rows
 from doe.dimension_chain.closing import ClosingFunction, interval, middle
 from doe.dimension_chain.links import DIGITS, SLACK, ClosingLink, Interval, Part, Selective
 from doe.dimension_chain.yields import quantile, standard_error
-from rbdyn.records.record import Record, derived, keyed
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.records import Record, derived, keyed
 
 MOST_CLASSES = 100
 

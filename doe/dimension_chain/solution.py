@@ -21,8 +21,8 @@ from doe.dimension_chain.yields import (
     sampled_ppm,
     standard_error,
 )
-from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.base.faults import InputError
+from rbdyn.base.records import Record, derived, keyed, outside_json
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from doe.arrays import Array
 from doe.dimension_chain.closing import ClosingFunction, middle
 from doe.dimension_chain.links import SLACK, ClosingLink, Distribution, Interval, Part
+from rbdyn.base.arrays import Array
 
 FILLING = ("uniform", "triangular")  # the tolerance from end to end
 NORMAL_REACH = 9.0  # standard deviations beyond which a normal part has a share below 1e-18

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doe.arrays import Array
+from rbdyn.base.arrays import Array
 
 FREEDOM = 5  # of Student's distribution that is the spectral density of the Matern correlation 5/2
 

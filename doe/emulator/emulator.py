@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize
 
-from doe.arrays import Array
 from doe.designs.model import model_matrix, model_terms
 from doe.emulator.covariance import Features, correlation, random_features, squares
 from doe.emulator.likelihood import (
@@ -29,7 +28,8 @@ from doe.emulator.likelihood import (
     solved,
 )
 from doe.threads import one_thread
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 
 Trend = Literal["none", "constant", "linear", "quadratic"]
 

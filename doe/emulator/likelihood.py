@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import lapack
 
-from doe.arrays import Array
 from doe.emulator.covariance import correlation, with_falls
+from rbdyn.base.arrays import Array
 
 JITTER = 1e-10  # of the process's variance: keeps the matrix of runs invertible where runs repeat without scatter
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
 
 
 def pooled_variances(points: Array, variances: Array, freedom: Whole, new: Array | None = None) -> Array:

@@ -16,11 +16,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Mask
 from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinned
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, hypervolume, search
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.faults import MethodError
 
 SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
 

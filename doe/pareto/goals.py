@@ -13,9 +13,9 @@ from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 
-from doe.arrays import Array, Rows
 from doe.pareto.search import dominates, normalised, spread
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import MethodError
 
 Kind = Literal["min", "max", "target", "none"]
 # What stands for a wish that a response does not have.

@@ -28,9 +28,9 @@ import numpy as np
 from scipy import special
 from scipy.stats import norm, qmc
 
-from doe.arrays import Array
 from doe.pareto.goals import NAMES, Goals, Rule, thinned
 from doe.pareto.search import Archive, Doubt, Judged, check_search, dominates, hypervolume, search
+from rbdyn.base.arrays import Array
 
 EXACT_FACTORS = 4  # up to here every face of a box is searched; beyond, its corners and lines along the factors
 

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm, qmc
 
-from doe.arrays import Array, Mask, Rows
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array, Mask, Rows
+from rbdyn.base.faults import MethodError
 
 REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of each range beyond it
 LEVELS = 13  # 2^13 levels of the costs by which sets of points are compared

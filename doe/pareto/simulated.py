@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Mask
 from doe.pareto.goals import Goals
 from doe.pareto.search import hypervolume
+from rbdyn.base.arrays import Array, Mask
 
 DRAWS = 200  # of the noise of a front
 

@@ -13,10 +13,10 @@ from typing import Self
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.manufacture import SURVIVAL_PARTS, Quadratic, ToleranceBox, even_offsets
 from doe.pareto.search import dominates, non_dominated
+from rbdyn.base.arrays import Array
 
 NEIGHBOURS = 10  # runs a coefficient of a local line: with tricube weights the half of them counts
 HARDLY_VARIED = 0.1  # of the largest spread of the neighbours: along directions with less they tell no slope

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
-from doe.arrays import Array, Mask, Rows
 from doe.pareto.manufacture import Distribution, Interval, error_of_share, interval_of_share, percent, random_offsets
-from rbdyn.faults import MethodError
+from rbdyn.base.arrays import Array, Mask, Rows
+from rbdyn.base.faults import MethodError
 
 Costs = Callable[[Array], Array]
 # Parts (n, k) to the number of them that keep all limits on each draw (d,) of what judges them.

@@ -15,11 +15,11 @@ from typing import Any, TypedDict, cast
 import numpy as np
 from scipy import stats
 
-from doe.arrays import Array, Whole
 from doe.designs.design import replicate_groups
 from doe.designs.model import Terms, needed
 from doe.response_surface.least_squares import LeastSquares
-from rbdyn.records.record import finite
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import finite
 
 EXACT = 1e-12  # 1 - leverage below which a run is met exactly, whatever its value
 INFLUENTIAL = 1.0  # Cook's distance above which leaving a run out moves the surface beyond its own error

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
-from doe.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)

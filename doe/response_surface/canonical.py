@@ -10,10 +10,10 @@ from typing import Literal, TypedDict
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array
 from doe.designs import to_actual
 from doe.designs.model import Terms, model_matrix, second_order
 from doe.response_surface.least_squares import Data
+from rbdyn.base.arrays import Array
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 Nature = Literal["minimum", "maximum", "saddle"]

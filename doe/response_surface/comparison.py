@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from doe.arrays import Array, Rows, Whole
 from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.response_surface.surface import Surface
 from doe.threads import one_thread
+from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
 
-from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.designs.model import Terms
+from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import are, counted
-from rbdyn.faults import MethodError
 
 DEPENDENT = 1e-9  # share of a column's length left over by the others below which it depends on them
 SPLIT = 2.0**27 + 1.0  # divides the digits of a double into halves

@@ -25,10 +25,10 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, find, p_text, ratio, sum_within
 from doe.response_surface.least_squares import LeastSquares
-from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import Record, derived, keyed, outside_json
 
 Source = Literal["repeats", "known variance"]
 

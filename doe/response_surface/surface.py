@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from doe.arrays import Array, Rows
 from doe.designs.design import replicate_groups
 from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
 from doe.response_surface.anova import (
@@ -36,8 +35,9 @@ from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
 from doe.response_surface.least_squares import Data, check_errors, check_matrix, check_size, checked, solve
 from doe.response_surface.model_error import KnownVariance, ModelError, compare, describe_known_variance, model_error
 from doe.threads import one_thread
-from rbdyn.faults import MethodError
-from rbdyn.records.record import Record, derived, outside_json
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
 # Range of values over the largest of them, below which too few digits are left for their sums of squares.

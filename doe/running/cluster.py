@@ -12,7 +12,7 @@ from typing import Any
 
 from doe.running.runner import Ran
 from doe.running.store import StoppedError
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 # A scheduler that does not shake hands, take up a client or have a worker within so long [s] is not there.
 KNOCK_S, CONNECT_S, WORKERS_S = 2.0, 4.0, 10.0

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from doe.running.runner import NOTE, Agenda, Engine, Ledger, Progress, Ran, Stage, agendas_of, forecast_of
 from doe.running.store import Point, Store
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.forecast import Measured, Notice
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.forecast import Measured, Notice
 
 # What is left is stated once so many runs have ended, or after this time [s] by those under way.
 ENOUGH, LOOK_S = 2, 5.0

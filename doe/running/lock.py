@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from rbdyn.records.user_cache import user_cache
+from rbdyn.base.cache import user_cache
 from rbdyn.result import read_json
 
 # How long to wait for one who looks whether the lock is free, or is just ending [s].

@@ -10,7 +10,7 @@ from typing import Any, Self
 from pydantic import TypeAdapter
 
 from doe.running.store import Failure, Point, RunResult, Sound, Store
-from rbdyn.records.forecast import Forecast, Measured
+from rbdyn.base.forecast import Forecast, Measured
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from doe.running import lock
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.kept import digest_of
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.storage import digest_of
 
 T = TypeVar("T")
 

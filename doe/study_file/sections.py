@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Consistent, InputError, Strict, read_toml
-from rbdyn.fields import Figure, Number, Positive, no_power_of_two
+from rbdyn.base.faults import Consistent, InputError, Strict, read_toml
+from rbdyn.base.fields import Figure, Number, Positive, no_power_of_two
 
 # A name that heads a column of a table: one field whoever writes or reads it.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]

@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from doe.arrays import Array
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.study_file.sections import (
@@ -29,8 +28,9 @@ from doe.study_file.sections import (
     Tolerances,
 )
 from doe.study_file.table import COUNT, LABELS, Column, Sheet, is_number, listed, quoted, read_sheet, table_of
-from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, one_line, read_toml, refuse, validated
-from rbdyn.fields import Number
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import Consistent, InputError, Strict, assignment_faults, one_line, read_toml, refuse, validated
+from rbdyn.base.fields import Number
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 FORMER_TABLE = (

@@ -16,10 +16,10 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from doe.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
 from rbdyn.base.words import counted
-from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
-from rbdyn.records.cells import NUMBER, plain_cell, quoted_cell
 
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 # Characters of a number: every double has a shorter form, and Python converts no integer of thousands of digits.

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Mask, Whole
 from doe.unknown.inputs import nested
 from doe.unknown.likelihood import BY_ROW, Cells, Errors, Joint, Measured, fit_cells, joint
 from doe.unknown.posterior import PARTICLES, Sampled, sampled
+from rbdyn.base.arrays import Array, Mask, Whole
 
 RULED_OUT = 3.0
 # Emulators are good enough whose variance is below this share of the rest, and volumes steady that change by less than this.

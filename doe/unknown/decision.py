@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special, stats
 
-from doe.arrays import Array, Whole
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
+from rbdyn.base.arrays import Array, Whole
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
 DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95

@@ -18,8 +18,8 @@ from scipy.linalg import hadamard
 from scipy.spatial import KDTree
 from scipy.stats import qmc
 
-from doe.arrays import Array
-from rbdyn.faults import InputError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError
 from rbdyn.scene.uncertain import Correlation, Law, Sampled
 
 # Numbers nearer to 0 and 1 than this are as good as at the ends.

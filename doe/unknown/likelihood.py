@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Mask, Whole
 from doe.emulator import Emulator, fit_emulator, pooled_variances
+from rbdyn.base.arrays import Array, Mask, Whole
 
 # Signal that may be left out, as a share of the variance that a cell is compared with; components at most.
 LEFT_OUT, MOST = 0.05, 12

@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from doe.arrays import Array
 from doe.threads import one_thread
-from rbdyn.faults import RunError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
 
 PARTICLES = 4000
 # Share of particles that still count at the next power; accepted moves of each particle there, and at the last; sweeps at most.

@@ -34,10 +34,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
-from doe.arrays import Array, Whole
 from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.threads import one_thread
 from doe.unknown.inputs import Joint, nested, strongest
+from rbdyn.base.arrays import Array, Whole
 
 # An emulator is trusted that predicts this share of what noise leaves to predict.
 TRUSTED = 0.8

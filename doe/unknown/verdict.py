@@ -28,10 +28,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Mask, Whole
 from doe.unknown.calibration import Matched
 from doe.unknown.likelihood import BEYOND, Joint, Measured
 from doe.unknown.posterior import Level, Sampled, effective
+from rbdyn.base.arrays import Array, Mask, Whole
 
 # Chance of a rejection, of either side, where predictions are right.
 LEVEL = 0.05

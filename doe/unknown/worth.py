@@ -28,13 +28,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy import sparse, special
 
-from doe.arrays import Array, Whole
 from doe.designs.model import model_matrix
 from doe.emulator import Emulator, fit_emulator
 from doe.emulator.covariance import correlation
 from doe.emulator.likelihood import covariance_of, solved
 from doe.threads import one_thread
 from doe.unknown.decision import CONFIDENCE
+from rbdyn.base.arrays import Array, Whole
 
 # Slices of an input's range in which the probability is taken; of a pair of inputs, along each.
 BINS, PAIR_BINS = 64, 8

@@ -15,7 +15,6 @@ from doe.adaptive import Runs as Known
 from doe.adaptive.acquisition import Region
 from doe.adaptive.emulators import Face
 from doe.adaptive.search import NEAR, check_budget
-from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.pareto.simulated import DRAWS, Samples, SimulatedFront, noisy_hypervolume
@@ -28,7 +27,8 @@ from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
 from doe.workflow.runs import Runs, design_of, goals_of, ordered_runs, region_of, runs_of
 from doe.workflow.surfaces import independent_values, standard_errors
-from rbdyn.faults import InputError, MethodError, RunError, check_all, refuse
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError, MethodError, RunError, check_all, refuse
 from rbdyn.scene import Scene
 
 SIGNIFICANT = 0.05

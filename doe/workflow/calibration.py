@@ -12,7 +12,6 @@ import numpy as np
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -35,9 +34,10 @@ from doe.workflow.input_sets import (
     tables_of,
 )
 from doe.workflow.rig import Rig, read_rig
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
+from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import quantity
-from rbdyn.faults import Claims, InputError, RunError, key_path, refuse
-from rbdyn.records.kept import code_version, digest_of
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.store import Failure
 from doe.study_file import Study
@@ -21,9 +20,10 @@ from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from doe.workflow.runs import goals_of
 from doe.workflow.surfaces import gain_verdict
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
+from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
-from rbdyn.faults import RunError
-from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.result import SimulationResult
 
 LEVEL = 0.95  # that a stated interval holds the truth

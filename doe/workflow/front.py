@@ -11,7 +11,6 @@ from typing import Self, TypeVar
 import numpy as np
 from scipy import special
 
-from doe.arrays import Array, Rows
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.pareto.front import FrontUncertainty, front_uncertainty
 from doe.pareto.manufacture import (
@@ -32,7 +31,8 @@ from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.runs import check_goals, goals_of, region_of, tolerance_box
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
-from rbdyn.faults import InputError, MethodError
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import InputError, MethodError
 
 SCALES = np.geomspace(1.0, 100.0, 81)  # of the standard errors, tried against the misses
 MOST_RUNS = 300  # design runs whose misses count; of more, evenly spread ones

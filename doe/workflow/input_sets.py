@@ -20,15 +20,14 @@ from pydantic.fields import FieldInfo
 from scipy.stats import t as student
 
 from doe import clearance
-from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.store import Failure, sentence
 from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, read_sheet
 from doe.study_file.table import is_number as is_numeral
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
-from rbdyn.base.words import shown
-from rbdyn.faults import (
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import (
     LONGEST_NAME,
     MOST_FAULTS,
     Claims,
@@ -41,7 +40,8 @@ from rbdyn.faults import (
     refuse,
     set_key,
 )
-from rbdyn.records.kept import digest_of
+from rbdyn.base.storage import digest_of
+from rbdyn.base.words import shown
 from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain

@@ -10,7 +10,6 @@ import numpy as np
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.simulated_tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware
@@ -45,9 +44,10 @@ from doe.workflow.front import (
 )
 from doe.workflow.runs import beyond_runs, goals_of, known_tolerances, region_of, rigid, rounded_within, tolerance_box
 from doe.workflow.surfaces import CHUNK, draw_all, jacobian, predict_all, predict_paired, quadratics
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError
+from rbdyn.base.records import Record, derived, finite, keyed, outside_json
 from rbdyn.base.words import improvement, quantity, shown
-from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, finite, keyed, outside_json
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from doe.workflow.input_sets import key_values, unknown_keys
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.words import counted
-from rbdyn.faults import InputError, refuse
 
 # What a signal holds: its columns, of which some may have another unit.
 KINDS = {

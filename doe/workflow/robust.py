@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.emulator import pooled_variances
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
@@ -27,7 +26,8 @@ from doe.unknown.propagation import Emulated, Runs, Share, emulated
 from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
 from doe.workflow.input_sets import ROUND_SEEDS, Case, Sets, case_of, declared, run, run_notes, strongest
 from doe.workflow.runs import goals_of, region_of, rounded_within
-from rbdyn.faults import set_key
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import set_key
 from rbdyn.scene.unknown import Input, is_number
 
 

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from doe import clearance, designs
-from doe.arrays import Array, Mask, Whole
 from doe.designs import Design
 from doe.designs.design import replicate_groups
 from doe.designs.model import Model, Terms, model_terms
@@ -25,8 +24,9 @@ from doe.study_file import Study
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
 from doe.study_file.table import Table, read_table
+from rbdyn.base.arrays import Array, Mask, Whole
+from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.words import are, counted
-from rbdyn.faults import InputError, MethodError, RunError, refuse
 from rbdyn.scene import Scene
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}

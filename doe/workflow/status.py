@@ -20,9 +20,9 @@ from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, S
 from doe.study_file import Study
 from doe.study_file.sections import Front
 from doe.workflow.runs import STORE, ordered_runs
-from rbdyn.faults import InputError, read_toml
-from rbdyn.records.kept import code_version, digest_of, intact
-from rbdyn.records.sources import source_digest
+from rbdyn.base.faults import InputError, read_toml
+from rbdyn.base.sources import source_digest
+from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.result import read_json, versions
 
 # Wall time [s] that surfaces with their front take about, and the pick's tolerances with the chains.

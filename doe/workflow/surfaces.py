@@ -14,7 +14,6 @@ import numpy as np
 from scipy import special, stats
 from scipy.stats import spearmanr
 
-from doe.arrays import Array, Whole
 from doe.designs.model import second_order
 from doe.pareto.front import contrast_error, draw_coefficients
 from doe.pareto.manufacture import Quadratic, identity
@@ -25,9 +24,10 @@ from doe.study_file import Study
 from doe.study_file.study import Fitted
 from doe.threads import one_thread
 from doe.workflow.runs import Runs, design_of, goals_of, read_runs
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError, MethodError, refuse
+from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import error_alone, improvement
-from rbdyn.faults import InputError, MethodError, refuse
-from rbdyn.records.record import Record, derived, keyed, outside_json
 
 # Runs of which a Gaussian process takes some 10 s; of 1000 it took 3 s, of 3000 45 s and 0.9 GB.
 MOST_RIVALLED = 1500

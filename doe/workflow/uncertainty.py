@@ -4,7 +4,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -22,8 +21,9 @@ from doe.unknown.propagation import (
     spread_of,
 )
 from doe.workflow.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
 from rbdyn.base.words import are, counted
-from rbdyn.faults import RunError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array
 from doe.clearance import Simulations, declares_unknowns
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
@@ -51,10 +50,11 @@ from doe.workflow.runs import (
 )
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import Beside, beside, fit_surfaces, reference_runs, with_rivals
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, MethodError, check_all
+from rbdyn.base.records import Record
 from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
-from rbdyn.faults import InputError, MethodError, check_all
 from rbdyn.properties.catalogue import classes_at
-from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogued
 

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from direct_search import SurrogateLoss, compare_with_surrogate, direct_front, relative_hypervolumes, repeated
 
-from doe.arrays import Array
 from doe.clearance import Simulations, read_scene, scene_at
 from doe.pareto import ParetoFront
 from doe.pareto.search import spread
@@ -32,9 +31,10 @@ from doe.workflow.adaptive import Evaluator
 from doe.workflow.front import find_front
 from doe.workflow.runs import STORE, goals_of, region_of, run_design
 from doe.workflow.surfaces import fit_surfaces, standard_errors
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, MethodError, RunError
+from rbdyn.base.terminal import progress_bar
 from rbdyn.base.words import counted, with_error
-from rbdyn.cli.terminal import progress_bar
-from rbdyn.faults import InputError, MethodError, RunError
 from rbdyn.result import read_json, write_json
 from rbdyn.scene import Scene
 

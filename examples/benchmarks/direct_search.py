@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Rows
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import check_search, dominance, error_aware_dominance, non_dominated, order, ranks, spread
 from doe.pareto.simulated import DRAWS, Samples, SimulatedFront, noisy_hypervolume
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import signed_with_error
-from rbdyn.faults import MethodError
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 

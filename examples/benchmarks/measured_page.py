@@ -23,7 +23,7 @@ from typing import Any
 
 from rbdyn.accuracy import study
 from rbdyn.accuracy.report import Report, Reporter, processor
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.result import versions, whole_file
 from rbdyn.scene import Scene
 
@@ -124,7 +124,7 @@ def _markdown(report: Report) -> str:
 
 def main() -> int:
     """Write the page; returns the exit code."""
-    from rbdyn.cli.terminal import progress_bar
+    from rbdyn.base.terminal import progress_bar
 
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("page", type=Path, metavar="FILE", help="the page, Markdown")

@@ -24,13 +24,13 @@ from rbdyn.accuracy.tolerances import (
     percent,
     undecided,
 )
+from rbdyn.base.faults import RunError
+from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import RunError
-from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 REFERENCE_RTOL = 1e-4

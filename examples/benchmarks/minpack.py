@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival
 from rbdyn.quasistatic.rivals.plain_newton import unloaded
 from rbdyn.quasistatic.row.ball import Control

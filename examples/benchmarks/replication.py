@@ -18,14 +18,14 @@ from studies import main
 
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.tolerances import NORMAL, OUTPUTS, SOUGHT, about, percent
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record, shown
 from rbdyn.base.words import with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
-from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 POOL = 32

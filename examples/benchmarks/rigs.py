@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from doe.arrays import Array
+from rbdyn.base.arrays import Array
 
 EXAMPLES = Path(__file__).resolve().parents[1]
 SOUND, ENDS, SENSOR, LAW = KINDS = ("sound", "ends", "sensor", "law")
@@ -226,7 +226,7 @@ def table(answers: Sequence[Answer]) -> Iterator[str]:
 def answer(what: str, folder: Path, kind: str, number: int) -> Answer:
     """What becomes of a rig, from the folder where the same code has answered before."""
     from doe.clearance import SIMULATION
-    from rbdyn.records.kept import code_version
+    from rbdyn.base.storage import code_version
 
     path = folder / f"{what}_{kind}_{number}.json"
     version = code_version(SIMULATION, "doe.workflow.calibration")

@@ -20,13 +20,13 @@ from studies import main, printed
 
 from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
+from rbdyn.base.faults import InputError
+from rbdyn.base.records import Record
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError
-from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
 ROLLERS = (10, 20, 30, 50, 70, 100)

@@ -26,14 +26,14 @@ from rbdyn.accuracy.tolerances import (
     percent,
     undecided,
 )
+from rbdyn.base.faults import InputError
+from rbdyn.base.records import shown
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError
-from rbdyn.records.record import shown
 from rbdyn.scene import Scene
 
 COUNTS = (5, 9, 15, 21, 31, 61, 121, 241)

@@ -27,8 +27,8 @@ def main(study: "Callable[..., Report]", about: str, scene: str = "cylindrical_r
     are options of their own, with their defaults.
     """
     from rbdyn import Scene, accuracy
-    from rbdyn.cli.terminal import progress_bar
-    from rbdyn.faults import InputError, RunError
+    from rbdyn.base.faults import InputError, RunError
+    from rbdyn.base.terminal import progress_bar
 
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", nargs="?", type=Path, default=EXAMPLES / scene, help=f"scene, {scene} unless named")
@@ -59,7 +59,7 @@ def printed(function: Callable[[], None], data: Any, fault: str, **environment: 
 
     Raises RunError, which begins with ``fault``, where that interpreter fails.
     """
-    from rbdyn.faults import RunError
+    from rbdyn.base.faults import RunError
 
     name, file = function.__name__, Path(inspect.getfile(function))
     path = os.pathsep.join((str(file.parent), *filter(None, [os.environ.get("PYTHONPATH")])))

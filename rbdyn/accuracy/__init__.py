@@ -26,7 +26,7 @@ Names are fetched when first used: importing the package loads neither numba nor
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.scene import BallScene, Scene
 
 if TYPE_CHECKING:

@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
-from rbdyn.arrays import Array
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.records import Record, shown
 from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
-from rbdyn.records.record import Record, shown
 from rbdyn.scene.ball import BallScene, SingleRowScene
 
 # Below, a residual is rounding.

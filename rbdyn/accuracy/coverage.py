@@ -10,11 +10,11 @@ import math
 from typing import Any
 
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.base.records import Record, shown
 from rbdyn.base.words import error_alone, value_alone, with_error
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
-from rbdyn.records.record import Record, shown
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 

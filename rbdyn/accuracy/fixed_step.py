@@ -18,7 +18,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing, derivative, derivative_once

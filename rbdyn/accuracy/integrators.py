@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of, velocity_verlet
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
 from rbdyn.dynamics.parameters.state import scales
 from rbdyn.dynamics.run import Run, with_numerics
-from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
 # Right-hand sides a turn past which a method counts as failed.

@@ -14,13 +14,13 @@ import numpy as np
 
 from rbdyn.accuracy.integrators import DOP853, METHODS, OURS, Method, NotInstalledError, Stretch, compiled
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of
 from rbdyn.dynamics.run import Run, prepare
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 DEFAULT_TURNS, LONGEST_TURNS = 0.25, 1.0

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.base.faults import InputError, read_toml, set_key
+from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
-from rbdyn.faults import InputError, read_toml, set_key
-from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 TURNS, DISCARDED = 10, 2

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from rbdyn.base.records import save_table
 from rbdyn.dynamics.ensemble import Reporter
-from rbdyn.records.cells import save_table
 from rbdyn.result import versions, write_json
 
 T = TypeVar("T")
@@ -127,7 +127,7 @@ def write(report: Report, folder: Path) -> list[str]:
 
 def show(report: Report, verbose: bool = False) -> None:
     """Print tables, conclusions and the machine."""
-    from rbdyn.cli.terminal import print_table
+    from rbdyn.base.terminal import print_table
 
     for table in report.tables:
         print_table(*table)

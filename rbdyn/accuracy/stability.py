@@ -12,13 +12,13 @@ from typing import Any
 
 from rbdyn.accuracy.options import VARIANTS, with_options
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.base.faults import InputError, RunError, read_toml
+from rbdyn.base.records import Record, finite, shown
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
-from rbdyn.faults import InputError, RunError, read_toml
-from rbdyn.records.record import Record, finite, shown
 from rbdyn.scene import Scene
 
 LARGEST_GAP = 0.01

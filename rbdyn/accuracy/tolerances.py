@@ -20,6 +20,8 @@ import numpy as np
 from rbdyn.accuracy import methods
 from rbdyn.accuracy.integrators import COMPILED
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.records import Record, shown
 from rbdyn.base.words import signed_with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -27,8 +29,6 @@ from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 Verdict = Literal["within", "beyond", "undecided"]

@@ -1,7 +1,7 @@
-"""The ground floor of both packages: what a result says, and how it is written. Knows no physics and no command.
+"""Ground floor of both packages; knows no bearing.
 
-- ``words``: names and numbers for people, a value with its error
-- ``ranges``: lists of numbers as they are typed
-- ``blocks``: the tree that a result becomes
-- ``render``: the tree on a terminal, as Markdown and as HTML
+- ``faults``: errors that say how to fix them; ``fields``: keys with units; ``arrays``
+- ``records``: results as JSON, tables and CSV; ``storage``: finished parts on disk; ``cache``: digests and the user's folder; ``sources``: the code they depend on
+- ``words``: how values, errors and counts are written; ``blocks``, ``render``: what is said, and its renderings
+- ``loading``, ``streams``, ``terminal``, ``options``, ``ranges``: what commands share; ``forecast``: how long runs take
 """

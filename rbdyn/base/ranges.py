@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 # Each value of an axis is a point that is run and kept whole.
 MOST_VALUES = 10_000

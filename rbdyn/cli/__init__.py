@@ -9,12 +9,12 @@
   close and Ctrl-C, at any moment
 """
 
-from rbdyn.cli.loading import Loading
+from rbdyn.base.loading import Loading
 
 
 def run() -> None:
     """Entry point of the command."""
     with Loading():
-        from rbdyn.cli import streams
+        from rbdyn.base import streams
         from rbdyn.cli.app import app
     streams.run(app)

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rbdyn.base import options as given
+from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
+from rbdyn.base.records import save_table
 from rbdyn.base.render.terminal import show as show_blocks
 from rbdyn.base.words import counted
-from rbdyn.cli import options as given
-from rbdyn.cli import terminal
 from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
-from rbdyn.records.cells import save_table
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -192,8 +192,8 @@ def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | Non
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     """Relative error that ``--target`` asks for. Raises InputError."""
+    from rbdyn.base.faults import InputError
     from rbdyn.dynamics.target import target_of
-    from rbdyn.faults import InputError
 
     if turns is not None or replicates is not None:
         raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])

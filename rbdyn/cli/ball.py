@@ -10,12 +10,13 @@ import numpy as np
 import typer
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
 from rbdyn.base.ranges import axis_values
+from rbdyn.base.records import save_table
 from rbdyn.base.render.terminal import show
+from rbdyn.base.terminal import FAILED, guarded, hand_over, keeping, output_folder, progress_bar
 from rbdyn.base.words import counted, label, with_error
-from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
-from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, progress_bar
-from rbdyn.faults import InputError, MethodError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, remarks, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
@@ -26,7 +27,6 @@ from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped
-from rbdyn.records.cells import save_table
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene

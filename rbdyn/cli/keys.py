@@ -17,10 +17,10 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from pydantic import BaseModel
 
+from rbdyn.base.faults import InputError
+from rbdyn.base.options import Json, flag
+from rbdyn.base.terminal import guarded, print_json
 from rbdyn.base.words import quantity
-from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import guarded, print_json
-from rbdyn.faults import InputError
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WIDTH = 100

@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.cli.options import Json, valued
-from rbdyn.cli.terminal import guarded, print_json
-from rbdyn.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
+from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
+from rbdyn.base.options import Json, valued
+from rbdyn.base.terminal import guarded, print_json
 from rbdyn.life.rollers import REFERENCE_SPEED_FACTOR
 from rbdyn.properties.catalogue import (
     CAGES,
@@ -271,7 +271,7 @@ def new(
 ) -> None:
     """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""
     with guarded(as_json):
-        from rbdyn.cli.template import filled
+        from rbdyn.base.options import filled
         from rbdyn.properties.catalogue import read_designation
         from rbdyn.properties.oils import oil_named
         from rbdyn.scene import Scene

@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.base.blocks import Block, Detail, Table, notes
+from rbdyn.base.faults import refuse
+from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, quantity, with_error
-from rbdyn.faults import refuse
-from rbdyn.records.cells import save_table
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
+    from rbdyn.base.forecast import Notice
     from rbdyn.dynamics.motion.history import History
     from rbdyn.dynamics.motion.orbit import Largest, Race, Spectrum
-    from rbdyn.records.forecast import Notice
 
 FORMAT = "rbdyn.orbit/1"
 SHOWN_TURNS = 20.0

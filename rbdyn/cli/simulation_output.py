@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.forecast import span
+from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label
-from rbdyn.records.cells import save_table
-from rbdyn.records.forecast import span
 
 if TYPE_CHECKING:
     from rbdyn.result import Quantity, SimulationResult

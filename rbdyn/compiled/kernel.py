@@ -38,9 +38,8 @@ import numba.extending
 from llvmlite.binding import get_host_cpu_features
 from numba import njit, types
 
-from rbdyn.records.digest import content_of, with_digest
-from rbdyn.records.sources import compiled_digest
-from rbdyn.records.user_cache import user_cache
+from rbdyn.base.cache import content_of, user_cache, with_digest
+from rbdyn.base.sources import compiled_digest
 
 # Set to anything in the environment, numba's own njit compiles.
 STOCK = "RBDYN_STOCK_NUMBA"

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 
 # Share of a rectangle that bears shear.
 SHEAR_SHARE = 5.0 / 6.0

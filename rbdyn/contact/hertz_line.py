@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, fma, reordered_sum, rough_power
 from rbdyn.compiled.kernel import VECTOR, kernel, law, settled_kernel
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 
 
 def slice_centres(slices: int, length: float) -> Array:

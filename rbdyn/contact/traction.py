@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.elementary import fast_exp, fast_log, fast_tanh, fma
 from rbdyn.compiled.kernel import kernel, law
 

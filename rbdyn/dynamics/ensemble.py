@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Generic, TypeVar
 
-from rbdyn.faults import LONGEST_NAME, InputError, RunError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
 
 T = TypeVar("T")
 # Told (done, total) as something goes on, where anybody asks.

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.companions import Companions
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
@@ -41,7 +42,6 @@ from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scale
 from rbdyn.dynamics.run import Pace, Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.records.forecast import Notice
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 

@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
+from rbdyn.base.forecast import LONG_S, Forecast, Measured, Notice, duration
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
@@ -19,8 +21,6 @@ from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.method import EXPLICIT, cheaper_method, explicit_method, method_of
 from rbdyn.dynamics.integrators.records import Control, Status, carry_from, empty_tally
 from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales, start_state
-from rbdyn.faults import RunError
-from rbdyn.records.forecast import LONG_S, Forecast, Measured, Notice, duration
 from rbdyn.scene import Scene
 
 # Runs are looked at once they have been under way for this time [s], then at every doubling of it; the budget of steps of

@@ -14,12 +14,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from rbdyn.base.faults import RunError
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Relaxation, batches_of, slowest
 from rbdyn.dynamics.statistics.error_bars import start_of_counting, worth_lengthening
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.companions import TIGHT
 from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
@@ -28,7 +29,6 @@ from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import orbit_radius_share, whirl_notes, work_done
 from rbdyn.mounting.cage import OperatingClearance
-from rbdyn.records.forecast import Notice
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
 

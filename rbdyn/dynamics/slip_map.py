@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from rbdyn.base.faults import InputError
+from rbdyn.base.forecast import Notice
 from rbdyn.base.ranges import MOST_VALUES
+from rbdyn.base.records import Record, derived, keyed, spread
+from rbdyn.base.storage import Kept, code_version, run_key
 from rbdyn.base.words import counted
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
@@ -22,10 +26,6 @@ from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import UNLIKE, Pace, log, prepare
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError
-from rbdyn.records.forecast import Notice
-from rbdyn.records.kept import Kept, code_version, run_key
-from rbdyn.records.record import Record, derived, keyed, spread
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 

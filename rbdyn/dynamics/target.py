@@ -17,7 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -25,8 +27,6 @@ from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
 from rbdyn.dynamics.statistics.metrics import Replicate, bias_scale, companion_tolerance, mean_gap, work_done
-from rbdyn.faults import LONGEST_NAME, InputError, one_line
-from rbdyn.records.forecast import Notice
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from rbdyn.records.record import finite
+from rbdyn.base.records import finite
 
 # The rings that turn against the load.
 Turning = Literal["inner", "outer", "both"]

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.faults import MethodError
 from rbdyn.life import Life, Turning
 
 # lambda of a single row: what practice falls short of the theory (ISO/TR 1281-1), and the theory's constant [N, mm].

@@ -9,7 +9,7 @@ They are a maker's model, not measurements: at the reference speed they are 0.94
 import math
 from typing import NamedTuple
 
-from rbdyn.fields import RPM
+from rbdyn.base.fields import RPM
 from rbdyn.properties.catalogue import Envelope
 
 

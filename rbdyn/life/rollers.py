@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rbdyn.arrays import Array
-from rbdyn.faults import MethodError
-from rbdyn.fields import RPM
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
+from rbdyn.base.fields import RPM
 from rbdyn.life import Life, Turning
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.

@@ -2,7 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from rbdyn.fields import RPM
+from rbdyn.base.fields import RPM
+from rbdyn.base.records import finite
 from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
 from rbdyn.mounting.rings import (
     UNCHANGED,
@@ -15,7 +16,6 @@ from rbdyn.mounting.rings import (
     printed_growth,
 )
 from rbdyn.properties.materials import Material
-from rbdyn.records.record import finite
 from rbdyn.scene.ball import BallRow, BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials, material_of
 from rbdyn.scene.mounting import Mounting, Raceways, raceway_radii

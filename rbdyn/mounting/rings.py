@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties.materials import Material
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.dynamics.motion.orbit import largest
 
 if TYPE_CHECKING:

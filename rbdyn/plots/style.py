@@ -8,7 +8,7 @@ from typing import Literal
 import matplotlib
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

@@ -29,7 +29,7 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties import table
 
 SHAPE = re.compile(r"(NUP|NU|NJ|NF|N)?[ -]*(\d{2,5})?(.*)", re.IGNORECASE | re.ASCII)

@@ -10,7 +10,7 @@ import math
 import re
 from typing import NamedTuple, Self
 
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties import table
 from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
 

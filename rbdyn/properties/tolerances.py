@@ -19,7 +19,7 @@ from bisect import bisect_left
 from math import cbrt
 from typing import NamedTuple
 
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties import FOLDER
 
 TABLES = tomllib.loads((FOLDER / "iso286.toml").read_text(encoding="utf-8"))

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.words import counted
-from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record

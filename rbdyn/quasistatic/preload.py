@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from rbdyn.arrays import Array
-from rbdyn.faults import MethodError, validated
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError, validated
 from rbdyn.life import turning_rings
 from rbdyn.quasistatic.result import Rating, overloads, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.arrays import Array, Mask
+from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record, outside_json, spread
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_line import BALLS, dent_sentence
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.faults import MethodError
 from rbdyn.life import Life, Turning, turning_rings
 from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
-from rbdyn.records.record import Record, outside_json, spread
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallRow, BallScene
 

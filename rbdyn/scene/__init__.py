@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 from pydantic import BaseModel, Field, model_validator
 
-from rbdyn.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import (

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
+from rbdyn.base.faults import Consistent, Strict
+from rbdyn.base.fields import SI, NonNegative, NotVanishing, OptionalSI, Positive
 from rbdyn.base.words import counted
-from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, Positive
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
 from rbdyn.scene.lubricant import Lubricant
@@ -18,7 +18,7 @@ from rbdyn.scene.operation import Speed
 from rbdyn.scene.reading import SceneFile
 
 if TYPE_CHECKING:
-    from rbdyn.arrays import Array
+    from rbdyn.base.arrays import Array
 
 
 # How far a contact angle and a clearance that are both given may differ before they contradict each other.

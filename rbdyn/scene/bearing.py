@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
+from rbdyn.base.faults import Consistent, Strict
+from rbdyn.base.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
 from rbdyn.base.words import counted
-from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
 from rbdyn.properties.catalogue import ROLLERS, envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, Material
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.scene import Scene
 
 

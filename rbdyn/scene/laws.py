@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Consistent
-from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, Share
+from rbdyn.base.faults import Consistent
+from rbdyn.base.fields import SI, NonNegative, NotVanishing, Positive, Share
 from rbdyn.properties.materials import MATERIALS, SOFTEST_METAL
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from rbdyn.faults import Consistent
-from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
+from rbdyn.base.faults import Consistent
+from rbdyn.base.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
 from rbdyn.properties.lubricants import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 

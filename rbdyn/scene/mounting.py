@@ -5,8 +5,8 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from rbdyn.faults import Consistent
-from rbdyn.fields import SI, NonNegative, Positive
+from rbdyn.base.faults import Consistent
+from rbdyn.base.fields import SI, NonNegative, Positive
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
 Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from rbdyn.base.faults import Consistent, Strict
+from rbdyn.base.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive
 from rbdyn.base.words import counted
-from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]

@@ -5,9 +5,9 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
+from rbdyn.base.faults import LONGEST_NAME, Consistent, InputError, one_line, put_key, read_toml, set_key, validated
+from rbdyn.base.records import plain
 from rbdyn.base.words import html_table
-from rbdyn.faults import LONGEST_NAME, Consistent, InputError, one_line, put_key, read_toml, set_key, validated
-from rbdyn.records.record import plain
 
 T = TypeVar("T")
 

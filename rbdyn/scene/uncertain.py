@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from rbdyn.faults import LONGEST_NAME, Claims, Strict, assignment_faults, key_path, one_line
-from rbdyn.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
+from rbdyn.base.faults import LONGEST_NAME, Claims, Strict, assignment_faults, key_path, one_line
+from rbdyn.base.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
 
 # What each law needs beside its name, and what it may have.
 NEEDS = {

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 from pydantic import BaseModel
 
-from rbdyn.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, one_line, refuse
+from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, one_line, refuse
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 

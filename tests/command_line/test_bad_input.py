@@ -19,7 +19,7 @@ from doe.report.study.summary import design_record as summary_design
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from doe.workflow.runs import design_of, evaluation
-from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
+from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.sweep.points import parsed
 from rbdyn.result import SimulationResult

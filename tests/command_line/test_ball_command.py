@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.cli.ball import optimum_study, race_limits, runout_record
-from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.sweep.points import parsed
 from rbdyn.quasistatic.sweep.run import sweep

@@ -11,8 +11,8 @@ from doe.dimension_chain import read_chains, solve
 from doe.report.sections.parts import chain_blocks
 from doe.study_file.sections import StudyChain, chain_table
 from rbdyn.base.blocks import Detail
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.base.render import terminal
-from rbdyn.faults import InputError, read_toml
 from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
 

@@ -22,10 +22,10 @@ from doe.running.store import Point
 from doe.study_file import Study
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import inputs_digest, study_stages, study_status
-from rbdyn.cli.terminal import notice
+from rbdyn.base import forecast
+from rbdyn.base.terminal import notice
 from rbdyn.dynamics import run
 from rbdyn.dynamics import simulate as module
-from rbdyn.records import forecast
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = [

@@ -13,8 +13,8 @@ from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front
 from doe.workflow.pick import widest_of
 from doe.workflow.runs import known_tolerances
+from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
-from rbdyn.faults import InputError
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
 POWER = 'name = "power_loss_W"\nmodel = "quadratic"\ngoal = "min"'

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from doe_command import doe
 
-from rbdyn.cli.terminal import keeping, output_folder
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
+from rbdyn.base.terminal import keeping, output_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, SHORT
 
+from rbdyn.base.faults import InputError
 from rbdyn.cli.show import request_of
-from rbdyn.faults import InputError
 from rbdyn.plots import roller
 
 QUICK = [part for assignment in SHORT for part in ("--set", assignment)]

@@ -151,7 +151,7 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
     """Command line: an interrupt at any time from the first import on; what had ended by then ended as usual."""
     name, *arguments = shlex.split(os.path.expandvars(line))
     # Its first line tells that Python itself is up.
-    program = f"import {name}, rbdyn.cli.loading; print(flush=True); from {name}.cli import run; run()"
+    program = f"import {name}, rbdyn.base.loading; print(flush=True); from {name}.cli import run; run()"
     codes = set()
     for delay in (0.05, 0.1, 0.2, 0.4, 1.0):
         process = subprocess.Popen(
@@ -171,7 +171,7 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
 def test_an_interrupt_in_the_making_of_a_class_is_one_too():
     """Unit: Python 3.11 wraps what is raised while a class names its fields in a RuntimeError; no traceback of it is shown."""
     program = (
-        "from rbdyn.cli.streams import run\n"
+        "from rbdyn.base.streams import run\n"
         "class Field:\n    def __set_name__(self, owner, name):\n        raise KeyboardInterrupt\n"
         "def app():\n    type('Table', (), {'field': Field()})\n"
         "run(app)"
@@ -183,7 +183,7 @@ def test_an_interrupt_in_the_making_of_a_class_is_one_too():
 def test_an_interrupt_that_a_callback_swallows_comes_again():
     """Unit: Ctrl-C inside a callback from compiled code, where nothing can be raised, ends the command all the same."""
     program = (
-        "import ctypes, signal, sys, time\nfrom rbdyn.cli.streams import run\n"
+        "import ctypes, signal, sys, time\nfrom rbdyn.base.streams import run\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\nkind = ctypes.CFUNCTYPE(None)\n"
         "swallowing = kind(lambda: signal.raise_signal(signal.SIGINT))\n"
         "def app():\n    swallowing()\n    time.sleep(600)\n"
@@ -195,7 +195,7 @@ def test_an_interrupt_that_a_callback_swallows_comes_again():
 
 def test_the_guard_loads_nothing_heavy():
     """Unit: what meets streams and interrupts stands before anything else is loaded."""
-    program = "import sys, rbdyn.cli.loading; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"
+    program = "import sys, rbdyn.base.loading; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"
     bare = "import sys; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"
     loaded, before = (
         subprocess.run([sys.executable, "-I", "-S", "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r}); {each}"],

@@ -36,9 +36,9 @@ from doe.workflow.status import (
     study_stages,
     study_status,
 )
+from rbdyn.base.faults import read_toml
+from rbdyn.base.storage import digest_of, sign
 from rbdyn.dynamics import simulate as module
-from rbdyn.faults import read_toml
-from rbdyn.records.kept import digest_of, sign
 
 
 def files(folder: Path) -> dict[str, tuple[int, float]]:

@@ -23,9 +23,9 @@ from doe.workflow.input_sets import ROUND_SEEDS, overriding, read_case, replicat
 from doe.workflow.robust import Decision, check_robust, fresh_rows, judge
 from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
-from rbdyn.faults import InputError
-from rbdyn.records.kept import digest_of
-from rbdyn.records.sources import code_behind
+from rbdyn.base.faults import InputError
+from rbdyn.base.sources import code_behind
+from rbdyn.base.storage import digest_of
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 

@@ -222,8 +222,8 @@ def test_literature_whirl(effort):
 
 def test_oracle_numpy_right_hand_side(outer, evaluate, random_state):
     """Oracle: the page of numpy gives the derivative of the compiled code; other laws are refused by name."""
+    from rbdyn.base.faults import InputError
     from rbdyn.dynamics.parameters.model import roller_bearing
-    from rbdyn.faults import InputError
 
     module = script("numpy_right_hand_side")
     bearing = roller_bearing(outer)

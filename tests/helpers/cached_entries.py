@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rbdyn.base.cache import with_digest
 from rbdyn.compiled.kernel import entry, keep_code
-from rbdyn.records.digest import with_digest
 
 
 def line(x: Any) -> Any:

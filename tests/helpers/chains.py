@@ -1,7 +1,7 @@
 """Dimension chains in short, for the tests."""
 
 from doe.dimension_chain import Chain, chain_from
-from rbdyn.faults import read_toml
+from rbdyn.base.faults import read_toml
 
 
 def chain(links, limits=(0.0, 1.0), **allocate):

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from doe.arrays import Array
 from doe.emulator import pooled_variances
 from doe.unknown.inputs import nested
 from doe.unknown.worth import Decides, decides
+from rbdyn.base.arrays import Array
 
 FRESH = 8192
 

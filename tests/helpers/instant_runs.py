@@ -13,7 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from rbdyn.faults import RunError
+from rbdyn.base.faults import RunError
 from rbdyn.result import Quantity, SimulationResult, versions
 from rbdyn.scene import Scene
 
@@ -75,7 +75,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     from doe.commands.study import study as doe_study
     from doe.study_file import Study
     from doe.workflow.runs import run_design
-    from rbdyn.cli.terminal import guarded, output_folder, print_json
+    from rbdyn.base.terminal import guarded, output_folder, print_json
 
     ran = instantly(setattr, seconds)
     if whole:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
+from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
 
 SECONDS = 2.0
 TOKEN = re.compile(rb"\"[^\"\n]*\"|[\w.+-]+|[^\w\s]|\n")

@@ -4,7 +4,7 @@ import copy
 
 import pytest
 
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 
 TABLE = {

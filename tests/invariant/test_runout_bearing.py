@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.quasistatic.row.equilibrium import solve
 from rbdyn.quasistatic.runout.lots import (
     CHANGES,

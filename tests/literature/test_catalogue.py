@@ -83,7 +83,7 @@ def test_literature_every_roller_bearing_of_the_catalogue(size):
 def data_of(template, values):
     import tomllib
 
-    from rbdyn.cli.template import filled
+    from rbdyn.base.options import filled
 
     return tomllib.loads(filled((ROOT / "rbdyn" / "cli" / template).read_text(encoding="utf-8"), values))
 

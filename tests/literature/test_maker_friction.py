@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from doe.report.sections.bearing import power
 from rbdyn import Scene
+from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.validity import friction_check, friction_notes, light_load_notes
-from rbdyn.faults import InputError
 from rbdyn.life import maker_friction
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.catalogue import Envelope, envelope, read_designation

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rbdyn.faults import MethodError
+from rbdyn.base.faults import MethodError
 from rbdyn.properties.tolerances import (
     HOUSING_SMOOTHING,
     SHAFT_SMOOTHING,

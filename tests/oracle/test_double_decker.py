@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
-from rbdyn.faults import InputError
-from rbdyn.fields import RPM
+from rbdyn.base.faults import InputError
+from rbdyn.base.fields import RPM
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.quasistatic.double_decker import equilibrium as double_decker
 from rbdyn.quasistatic.double_decker.equilibrium import Layer, load_on_middle_ring, solve_double_decker

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy import coverage
+from rbdyn.base.faults import InputError
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate
 from rbdyn.dynamics.statistics.error_bars import error_notes, find_transient
 from rbdyn.dynamics.statistics.metrics import bias_scale, companion_error, companion_tolerance
 from rbdyn.dynamics.target import Model, checked, choose, learned, predicted_error, target_of, total_error
-from rbdyn.faults import InputError
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 

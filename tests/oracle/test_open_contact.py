@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from line_film_oracle import rigid
 
+from rbdyn.base.faults import InputError
 from rbdyn.contact.rolling_resistance import film_forces, inlet, open_film, touching_gap
 from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.faults import InputError
 
 OIL, RADIUS, LENGTH, SPEED = 0.01, 4.6e-3, 0.01, 5.0
 

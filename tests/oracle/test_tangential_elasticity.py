@@ -10,6 +10,7 @@ import pytest
 from conftest import ROOT
 from numpy_twin import twin
 
+from rbdyn.base.faults import InputError
 from rbdyn.contact.tangential_elasticity import ElasticContact, acting_coefficient, coefficient_rate
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.ensemble import Stop
@@ -19,7 +20,6 @@ from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.recording import Linearised
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
 ELASTIC = "traction.elasticity=true"
@@ -157,7 +157,7 @@ def test_oracle_stiff_bearing_with_and_without(tmp_path):
     """Oracle: a catalogue bearing with steep traction runs as with rigid contacts, within the noise of both, with less than
     half of the right-hand sides.
     """
-    from rbdyn.faults import read_toml
+    from rbdyn.base.faults import read_toml
 
     data = read_toml(ROOT / "tests" / "helpers" / "stiff_catalogue_bearing.toml")
     numbers = ("numerics.turns=10", "numerics.discard_turns=6", "numerics.replicates=6", "numerics.companion=false")

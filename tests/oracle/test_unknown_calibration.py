@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from doe.arrays import Array
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
 from doe.unknown.likelihood import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured, fit_cells
 from doe.unknown.posterior import contraction, densest_intervals, learnt, sampled, seen
@@ -29,6 +28,7 @@ from doe.unknown.verdict import (
     scores_of,
     width,
 )
+from rbdyn.base.arrays import Array
 
 ROWS, OUTPUTS, INPUTS = 8, 2, 3
 ACROSS = np.linspace(-1.0, 1.0, ROWS)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.arrays import Array
 from doe.unknown.inputs import Joint, effect_shares, main_effects, nested, ranks, retained, screening_design, strongest
 from doe.unknown.propagation import Runs, emulated, explained, residual_variance, shapley, sobol, spread_of
+from rbdyn.base.arrays import Array
 
 ISHIGAMI = 0.5 + 49.0 / 8.0 + 0.1 * np.pi**4 / 5.0 + 0.01 * np.pi**8 / 18.0
 

@@ -9,13 +9,13 @@ import pytest
 from smooth_runs import run_of, vibrating
 from test_runge_kutta import one_step, orders_of, slope_of
 
+from rbdyn.base.faults import RunError
 from rbdyn.dynamics.forces.equations import SHAFT, mechanical_energy
 from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import kutta_pair as pair
 from rbdyn.dynamics.integrators.method_laws import interpolate
 from rbdyn.dynamics.integrators.records import DERIVATIVES
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.faults import RunError
 
 KUTTA = pair.Kutta()
 RK43 = "numerics.method=rk43"

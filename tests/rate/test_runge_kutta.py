@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from smooth_runs import fixed_step, run_of, vibrating
 
+from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import CancelledError
 from rbdyn.dynamics.forces.equations import POWERS, SHAFT, mechanical_energy
 from rbdyn.dynamics.integrators import dormand_prince as dp
@@ -17,7 +18,6 @@ from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance, refine_peak
 from rbdyn.dynamics.integrators.method_laws import interpolate
 from rbdyn.dynamics.parameters.state import scales
-from rbdyn.faults import RunError
 
 PAIR = dp.DormandPrince()
 

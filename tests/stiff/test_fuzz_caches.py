@@ -17,10 +17,10 @@ from conftest import ROOT
 
 from doe.running.lock import at_work, folders_of
 from doe.running.store import Point, Store
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.storage import Kept
 from rbdyn.quasistatic.sweep import run as sweeps
 from rbdyn.quasistatic.sweep.run import sweep
-from rbdyn.records.kept import Kept
 from rbdyn.scene import BallScene
 
 # One process of several that use a folder of compiled code at once, and spoil files that the others read and write.

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rbdyn.base.faults import LONGEST_SENTENCE
 from rbdyn.cli.app import app
-from rbdyn.faults import LONGEST_SENTENCE
 from rbdyn.properties import table
 from rbdyn.scene import Scene
 

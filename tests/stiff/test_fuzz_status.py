@@ -20,8 +20,8 @@ from doe.running.store import Store
 from doe.study_file import Study
 from doe.workflow.runs import STORE, ordered_runs
 from doe.workflow.status import inputs_digest, study_stages, study_status
-from rbdyn.faults import InputError
-from rbdyn.records.kept import digest_of, sign
+from rbdyn.base.faults import InputError
+from rbdyn.base.storage import digest_of, sign
 
 OPTIONS = ({}, {"adaptive": True}, {"robust": True})
 SPOILT = ("", "{}", "[]", "null", "{", '{"stages": 5}', "\x00", '{"command": 1, "stages": []}')

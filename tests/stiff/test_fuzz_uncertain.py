@@ -21,7 +21,7 @@ from doe.study_file.study import StudyFile
 from doe.unknown import inputs
 from doe.workflow.input_sets import Case, case_of
 from doe.workflow.robust import case_of_study
-from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
+from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import FOLLOWING, value_of
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy.options import OPTIONS
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.faults import InputError, RunError
 from rbdyn.scene import Scene
 
 EXAMPLE = "examples/cylindrical_roller.toml"

@@ -10,7 +10,7 @@ import pytest
 from rbdyn.accuracy import stability, write
 from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 
 EXAMPLE = "examples/cylindrical_roller.toml"

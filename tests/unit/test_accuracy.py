@@ -12,9 +12,9 @@ from conftest import ROOT, lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy import methods, tolerances
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.cli.app import FORMER
 from rbdyn.dynamics.statistics.batch_means import student_half_width
-from rbdyn.faults import InputError, RunError
 from rbdyn.plots.error_against_time import SMALLEST_BIAS
 
 EXAMPLE = "examples/cylindrical_roller.toml"

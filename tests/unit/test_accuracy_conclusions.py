@@ -21,8 +21,8 @@ from rbdyn.accuracy.tolerances import (
     replicates_needed,
     turns_needed,
 )
+from rbdyn.base.faults import InputError
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
-from rbdyn.faults import InputError
 
 RTOLS = (0.1, 0.02, 0.01, 1e-4)
 

@@ -12,8 +12,8 @@ from ball_scenes import DEEP, SMALL, changed, scene
 from typer.testing import CliRunner
 
 from rbdyn import BallScene, Scene, equilibrium
+from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
-from rbdyn.faults import InputError
 from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of

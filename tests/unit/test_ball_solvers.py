@@ -17,7 +17,7 @@ from rbdyn import Scene
 from rbdyn.accuracy import ball_solvers
 from rbdyn.accuracy.ball_solvers import problem_of
 from rbdyn.accuracy.report import Progress
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
 from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
 from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
@@ -282,7 +282,7 @@ def test_unit_an_equilibrium_elsewhere_is_counted(problem, ours):
 
 
 def test_unit_progress_and_failed_references(problem):
-    from rbdyn.faults import RunError
+    from rbdyn.base.faults import RunError
 
     impossible = problem._replace(load=np.array([np.inf, 0.0, 0.0, 0.0, 0.0]))
     with pytest.raises(RunError, match="nothing to compare"):

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import equilibrium
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.quasistatic.result import reference_capacities, solution_life

@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from doe.workflow.input_sets import case_of
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.cli.app import app
 from rbdyn.contact.cage_bar import CageSection, Elastic, bar_stiffness
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.faults import InputError, read_toml
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import STIFFNESS_ERROR
 from rbdyn.scene.unknown import documented_of

@@ -15,7 +15,7 @@ from short_studies import short_study, silent
 from doe.study_file import Study
 from doe.study_file.table import read_sheet
 from doe.workflow.runs import read_runs, run_design
-from rbdyn.records.cells import NUMBER, plain_cell, quoted_cell, save_table
+from rbdyn.base.records import NUMBER, plain_cell, quoted_cell, save_table
 
 DANGEROUS = tuple("=+-@\t\r\n")
 

@@ -16,8 +16,8 @@ from doe.dimension_chain.closing import total
 from doe.dimension_chain.links import Cost
 from doe.report.markdown import markdown_report
 from doe.report.sections.parts import chain_blocks
+from rbdyn.base.faults import InputError
 from rbdyn.base.render.terminal import text
-from rbdyn.faults import InputError
 
 
 def costly(coefficient, nominal, b, k=1.0, **limits):

@@ -11,7 +11,7 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import closing_function, evaluate, interval, names_in, press_fit_factor
 from doe.dimension_chain.links import PressFit, given_parts
 from doe.dimension_chain.yields import draw
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 # Raceways and the seats of an inner ring: a, b raceways, c shaft seat, d ring bore.
 FITTED = [(1, 34.7, 0.0, -0.01), (-1, 34.5, 0.005, -0.005), (0, 27.0, 0.012, -0.004), (0, 27.0, 0.0, -0.006)]

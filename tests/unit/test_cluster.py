@@ -25,7 +25,7 @@ from doe.running.runner import Ran
 from doe.running.store import Store
 from doe.study_file import Study
 from doe.workflow.runs import STORE, run_design
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError
 
 HERE = Path(__file__).parent
 
@@ -174,7 +174,7 @@ def test_point_that_kills_its_workers_is_told_as_lost_and_the_others_are_kept(tm
 @pytest.mark.slow
 def test_worker_with_other_sources_is_refused(tmp_path, monkeypatch):
     study = Study.load(short_study(tmp_path))
-    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
     with started(tmp_path, 1) as there, pytest.raises(InputError, match="runs another version of rbdyn"):
         run_design(study, tmp_path, None, silent, there.address)
     with Store(tmp_path / STORE, read_only=True) as store:

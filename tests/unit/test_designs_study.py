@@ -14,7 +14,7 @@ from doe.cli import app
 from doe.designs import central_composite
 from doe.study_file import Study
 from doe.workflow.runs import check_runs, design_of, evaluation
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 EXAMPLE = EXAMPLES / "clearance_study.toml"

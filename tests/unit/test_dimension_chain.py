@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from doe.dimension_chain import chain_from, grade_tolerances, solve, tolerance_unit
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 POCKET = """
 [closing_link]

@@ -24,7 +24,7 @@ from doe.study_file import Study
 from doe.workflow.front import find_front
 from doe.workflow.runs import STORE, read_runs
 from doe.workflow.surfaces import fit_surfaces
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 BRIEF = direct_front.Settings(60, 8, 2, turns=3.0, discard_turns=1.0, set=["numerics.impact_window_turns=1"])
 

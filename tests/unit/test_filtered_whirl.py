@@ -11,6 +11,7 @@ from scipy.special import ellipe
 from doe.workflow.calibration import cases_of
 from doe.workflow.input_sets import case_of
 from doe.workflow.rig import read_rig, whirl
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion.history import history
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -18,7 +19,6 @@ from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError, read_toml
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"

@@ -6,7 +6,7 @@ from functools import reduce
 import pytest
 
 from doe.running.runner import BESIDES, Agenda, Stage, forecast_of
-from rbdyn.records.forecast import Forecast, Measured, duration, span
+from rbdyn.base.forecast import Forecast, Measured, duration, span
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from doe.report.study.files import write
 from doe.study_file import Study
 from doe.workflow.runs import actual_of, check_given, design_of, evaluation, ordered_runs, run_design
 from doe.workflow.whole import run_study
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 CCD = 'kind = "central_composite"'
 NAMES = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from rbdyn.base.faults import InputError
 from rbdyn.contact.film_thickness import half_width
 from rbdyn.dynamics.parameters.model import rolling_contacts
 from rbdyn.dynamics.parameters.validity import heat_notes, race_notes, race_report
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

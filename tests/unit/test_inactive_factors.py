@@ -22,7 +22,7 @@ from doe.workflow.pick import widest_of
 from doe.workflow.runs import Runs, check_runs, design_of, tolerances_of
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import run_study
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 GUIDANCE = """[design]
 [[factor]]

@@ -13,7 +13,7 @@ from doe.study_file import Study
 from doe.unknown.inputs import values_of
 from doe.workflow.input_sets import Case, case_of, check_overrides, read_case
 from doe.workflow.robust import case_of_study
-from rbdyn.faults import InputError, read_toml, validated
+from rbdyn.base.faults import InputError, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Law, Uncertain
 from rbdyn.scene.unknown import value_keys, value_of

@@ -16,10 +16,10 @@ from conftest import lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy.options import OPTIONS, option_costs, study, with_options
+from rbdyn.base.faults import InputError
 from rbdyn.base.ranges import axis_values
 from rbdyn.cli.app import _write_map as write
 from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
-from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
@@ -135,7 +135,7 @@ def test_unit_map_of_another_scene_or_code_runs_again(make_scene, tmp_path, monk
     assert "step budget" in first.failed[0].status
     slip_map(make_scene(*budget, "numerics.seed=2"), *place)
     assert len(ran) == 4
-    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
     slip_map(make_scene(*budget), *place)
     assert len(ran) == 6
 

@@ -13,7 +13,7 @@ import measured_page as page
 import pytest
 
 from rbdyn.accuracy.report import Report, Table
-from rbdyn.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError
 
 ROOT = Path(__file__).parents[2]
 WHOLE = tomllib.loads(Path(page.__file__).with_name("measured.toml").read_text(encoding="utf-8"))

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
+from rbdyn.base.faults import InputError
 from rbdyn.contact.rheology import LimitingShear
 from rbdyn.dynamics.parameters.model import _rheology, roller_bearing
 from rbdyn.dynamics.parameters.state import start_state
 from rbdyn.dynamics.parameters.validity import light_load_notes
-from rbdyn.faults import InputError
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.properties.oils import (
@@ -245,7 +245,7 @@ def deep_groove():
     """Tables of the example of a deep groove ball bearing."""
     from conftest import ROOT
 
-    from rbdyn.faults import read_toml
+    from rbdyn.base.faults import read_toml
 
     return read_toml(ROOT / "examples" / "deep_groove_ball.toml")
 

@@ -12,11 +12,11 @@ import pytest
 from instant_runs import instant_result
 from typer.testing import CliRunner
 
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.cli.app import app
 from rbdyn.dynamics.forces.guide_land import OuterGuide
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.simulate import clearance_report
-from rbdyn.faults import InputError, read_toml
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Uncertain
 from rbdyn.scene.unknown import inputs_of, value_of, with_values

@@ -6,10 +6,10 @@ import re
 import pytest
 
 import rbdyn
+from rbdyn.base import forecast
 from rbdyn.dynamics import run as pace
 from rbdyn.dynamics.run import Pace
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.records import forecast
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")
 

@@ -10,8 +10,8 @@ import pytest
 from doe.report.steps.calibrate import write_sample
 from doe.unknown.inputs import values_of
 from doe.workflow.input_sets import read_case, read_sample
-from rbdyn.faults import InputError
-from rbdyn.records.kept import digest_of
+from rbdyn.base.faults import InputError
+from rbdyn.base.storage import digest_of
 from rbdyn.scene.uncertain import Law
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"

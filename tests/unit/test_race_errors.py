@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbdyn.faults import InputError, validated
+from rbdyn.base.faults import InputError, validated
 from rbdyn.quasistatic.runout.model import errors_of
 from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, random_waviness, rolling, waviness
 from rbdyn.scene.ball import FormErrors, misfits

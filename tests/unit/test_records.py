@@ -12,8 +12,8 @@ from chains import read_chain
 
 from doe.dimension_chain import solve
 from rbdyn import BallResult, BallScene, InputError, SimulationResult, equilibrium
+from rbdyn.base.records import Record, derived, keyed, outside_json, spread
 from rbdyn.dynamics.slip_map import Point
-from rbdyn.records.record import Record, derived, keyed, outside_json, spread
 from rbdyn.result import Quantity
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -6,7 +6,7 @@ import heapq
 
 import pytest
 
-from rbdyn.cli.remaining import Remaining, clock_words
+from rbdyn.base.terminal import Remaining, clock_words
 
 
 def ends_of(runs: int, seconds: float, workers: int, compile_s: float) -> list[float]:
@@ -77,7 +77,7 @@ def test_unit_bar_shows_the_time_left_of_runs_longer_than_half_a_minute(monkeypa
     import io
     import sys
 
-    from rbdyn.cli import remaining, terminal
+    from rbdyn.base import terminal as remaining
 
     class Screen(io.StringIO):
         def isatty(self) -> bool:
@@ -86,8 +86,8 @@ def test_unit_bar_shows_the_time_left_of_runs_longer_than_half_a_minute(monkeypa
     now, screen = [0.0], Screen()
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(terminal, "Remaining", lambda workers: remaining.Remaining(workers, lambda: now[0]))
-    with terminal.progress_bar("simulating", quiet=False) as progress:
+    monkeypatch.setattr(remaining, "Remaining", lambda workers: remaining.Remaining(workers, lambda: now[0]))
+    with remaining.progress_bar("simulating", quiet=False) as progress:
         for done in range(4):
             now[0] = 60.0 * done
             progress(done, 10)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_bvp
 
-from rbdyn.faults import InputError, validated
+from rbdyn.base.faults import InputError, validated
 from rbdyn.mounting.fits import operating_clearance
 from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted_clearance
 from rbdyn.properties.materials import MATERIALS, Material

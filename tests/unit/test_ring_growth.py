@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.mounting.fits import layer_changes, mounted_of, row_change
 from rbdyn.mounting.rings import Ring, groove_change, interface_pressure, loosening_speed, printed_growth
 from rbdyn.properties.materials import MATERIALS

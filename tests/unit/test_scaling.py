@@ -12,9 +12,9 @@ from conftest import ROOT, lacking
 from scaling import Memory, Point, Scaling, fit, peak_memory, report, scaling, with_rollers, with_slices
 
 from rbdyn.accuracy import write
+from rbdyn.base.faults import InputError
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import prepare
-from rbdyn.faults import InputError
 
 SOME = (10, 20)
 

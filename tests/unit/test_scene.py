@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_scene import TABLE, faults_of
 
-from rbdyn.faults import InputError, read_toml
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.scene import BallScene, Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -14,7 +14,7 @@ from doe.dimension_chain import solve
 from doe.dimension_chain.links import given_parts
 from doe.dimension_chain.selective_assembly import class_edges
 from doe.dimension_chain.yields import share_below
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 EQUAL = [(1, 9.3, 0.0, -0.012), (-1, 9.0, 0.012, 0.0)]
 SAMPLES = 200_000

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy import coverage
+from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
@@ -31,7 +32,6 @@ from rbdyn.dynamics.statistics.error_bars import (
     worth_lengthening,
 )
 from rbdyn.dynamics.statistics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
-from rbdyn.faults import RunError
 from rbdyn.result import Quantity
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import (
     INNER_LOAD,
@@ -27,7 +28,6 @@ from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_chance, student_factor, student_half_width
 from rbdyn.dynamics.statistics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
-from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
 
 # The contract of `rbdyn simulate --json`; more keys may be added.

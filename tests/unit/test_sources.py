@@ -8,8 +8,8 @@ import tokenize
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from rbdyn.records import sources
-from rbdyn.records.sources import SITE, code_behind, compiled_digest, source_digest, what_runs
+from rbdyn.base import sources
+from rbdyn.base.sources import SITE, code_behind, compiled_digest, source_digest, what_runs
 
 MODULES = sorted(path for name in ("rbdyn", "doe") for path in (SITE / name).rglob("*.py"))
 SKIPPED = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)

@@ -16,8 +16,8 @@ import pytest
 
 from doe.running import lock
 from doe.running.store import Failure, Point, Store, grouped
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.kept import digest_of
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.storage import digest_of
 
 POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
 
@@ -331,7 +331,7 @@ def test_reading_leaves_the_folder_as_it_was(path, tmp_path):
 
 def test_of_many_openings_at_once_one_makes_the_store_and_the_others_wait_or_are_refused(path):
     code = (
-        "import sys; from pathlib import Path; from doe.running.store import Store; from rbdyn.faults import InputError\n"
+        "import sys; from pathlib import Path; from doe.running.store import Store; from rbdyn.base.faults import InputError\n"
         "try:\n"
         "    with Store(Path(sys.argv[1])) as store:\n"
         "        store.put('k' + sys.argv[2], {})\n"

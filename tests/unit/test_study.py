@@ -27,8 +27,8 @@ from doe.workflow.status import finished as is_finished
 from doe.workflow.status import inputs_digest
 from doe.workflow.surfaces import fit_surfaces, reference_runs
 from doe.workflow.whole import run_study
-from rbdyn.faults import InputError, RunError
-from rbdyn.records.kept import run_key
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.storage import run_key
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

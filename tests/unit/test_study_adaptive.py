@@ -24,7 +24,7 @@ from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adapti
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import run_study
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
 

@@ -17,7 +17,7 @@ from doe.workflow.pick import choices
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import check_chains, solve_chains
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 
 def fitted(folder, *replace):

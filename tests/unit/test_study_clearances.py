@@ -13,7 +13,7 @@ from doe import clearance
 from doe.report.study.summary import answer_text, summary
 from doe.study_file import Study
 from doe.workflow.whole import check_study, operating_clearances, run_study, scenes_of
-from rbdyn.faults import InputError, MethodError
+from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.catalogue import classes_at
 
 MOUNTING = """

@@ -20,7 +20,7 @@ from doe.workflow.front import Conditioned, Missed
 from doe.workflow.pick import edge_of, place_of, share_at_edge
 from doe.workflow.runs import region_of, rounded_within
 from doe.workflow.whole import run_study
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
 

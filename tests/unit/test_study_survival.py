@@ -29,8 +29,8 @@ from doe.workflow.confirmation import Choice, confirm
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import study_status
 from doe.workflow.surfaces import reference_runs
-from rbdyn.faults import RunError
-from rbdyn.records.kept import digest_of
+from rbdyn.base.faults import RunError
+from rbdyn.base.storage import digest_of
 
 CENTRES = range(15, 21)
 
@@ -148,7 +148,7 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
-    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
     ran = instantly(monkeypatch.setattr)
     assert not run_design(study, tmp_path, 2, silent).failures
     assert sorted(ran) == list(range(1, 21))

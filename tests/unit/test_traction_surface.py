@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numba import njit
 from plain_scene import TABLE
 
+from rbdyn.base.faults import InputError
 from rbdyn.contact import film_thickness as films
 from rbdyn.contact import rheology
 from rbdyn.contact.traction import (
@@ -26,7 +27,6 @@ from rbdyn.contact.traction import (
     traction_surface,
 )
 from rbdyn.dynamics.parameters.model import film_report, race_traction
-from rbdyn.faults import InputError
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES, smallest_traction

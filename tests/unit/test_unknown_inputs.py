@@ -8,9 +8,9 @@ import pytest
 from scipy import stats
 
 from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
+from rbdyn.base.faults import InputError, read_toml, validated
 from rbdyn.cli.keys import keys
 from rbdyn.dynamics.parameters.state import light_contact
-from rbdyn.faults import InputError, read_toml, validated
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import SingleRowScene

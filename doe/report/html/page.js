@@ -47,7 +47,7 @@ const page = (() => {
     return Math.abs(text) >= 1e7 || (text !== 0 && Math.abs(text) < 1e-4) ? value.toPrecision(digits) : String(text);
   }
 
-  // The error to two significant digits, the value to the same place; the rule of `rounded` in rbdyn.records.words.
+  // The error to two significant digits, the value to the same place; the rule of `rounded` in rbdyn.base.words.
   function rounded(value, error) {
     if (!(error > 0) || !Number.isFinite(error) || !Number.isFinite(value)) return [shown(value, 5), ""];
     const power = number => Number(number.toExponential(1).split("e")[1]), places = 1 - power(error);

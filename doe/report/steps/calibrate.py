@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.study_file.table import text_of
 from doe.unknown import inputs
 from doe.unknown.posterior import seen
 from doe.workflow.calibration import Calibration
 from doe.workflow.input_sets import NORMAL
+from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
-from rbdyn.records.kept import digest_of, intact, sign
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.arrays import Array
 from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Gain, Limit, every_limit, limits_of, statement
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
-from rbdyn.records.record import finite
+from rbdyn.base.arrays import Array
+from rbdyn.base.records import finite
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from doe.response_surface import Surface, describe
 from doe.study_file import Study
 from doe.workflow.runs import actual_of
 from rbdyn.base.blocks import Block, Detail, Table
+from rbdyn.base.records import quoted_cell
 from rbdyn.base.words import counted, label
-from rbdyn.records.cells import quoted_cell
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:

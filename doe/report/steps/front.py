@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from doe.adaptive.emulators import LEAST_DEVIATION
-from doe.arrays import Array, Rows
 from doe.emulator.likelihood import JITTER
 from doe.pareto import ParetoFront
 from doe.pareto.manufacture import ToleranceAware
@@ -23,8 +22,9 @@ from doe.workflow.pick import place_of
 from doe.workflow.runs import goals_of, known_tolerances, region_of
 from doe.workflow.surfaces import PredictedGain, half_widths, predict_all, predicted_gains, statement
 from doe.workflow.whole import StudyResult
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.records import finite
 from rbdyn.base.words import counted, improvement, quantity, with_error
-from rbdyn.records.record import finite
 
 SURE = 1.5  # root mean square miss in standard deviations up to which emulators knew how little they know
 HELD = {

@@ -12,8 +12,8 @@ from doe.report.steps.front import archive_table
 from doe.report.study.summary import answer_text, summary
 from doe.workflow.runs import RUNS_TABLE
 from doe.workflow.whole import StudyResult
-from rbdyn.records.cells import save_table
-from rbdyn.records.kept import digest_of, sign
+from rbdyn.base.records import save_table
+from rbdyn.base.storage import digest_of, sign
 from rbdyn.result import write_json
 
 # Shaft turns of the motion that is drawn.

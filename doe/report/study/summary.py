@@ -29,8 +29,8 @@ from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base.blocks import Block, Detail, Heading
+from rbdyn.base.records import finite
 from rbdyn.base.render import terminal
-from rbdyn.records.record import finite
 from rbdyn.result import versions
 
 

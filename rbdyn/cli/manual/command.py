@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rbdyn.cli.options import Json, folder_option
-from rbdyn.cli.terminal import guarded, hand_over
+from rbdyn.base.options import Json, folder_option
+from rbdyn.base.terminal import guarded, hand_over
 
 # Entry points by which packages that stand on this one add their part: functions that return a ``Part``.
 GROUP = "rbdyn.manual"

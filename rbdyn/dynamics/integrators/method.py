@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.base.faults import MethodError
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.records import FINISHED, STEP_BUDGET, Carry, Control, Tally
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import MethodError
 from rbdyn.scene import Scene
 
 EXPLICIT = ("rk45", "rk43")

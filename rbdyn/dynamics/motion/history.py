@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
+from rbdyn.base.forecast import Notice
 from rbdyn.base.words import Brief, Figure
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Pace, Run, log
-from rbdyn.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.life import turning_rings
 from rbdyn.life.rollers import ReferenceLife, reference_life
-from rbdyn.records.forecast import Notice
 from rbdyn.scene import Scene, rollers_only
 
 if TYPE_CHECKING:

@@ -9,14 +9,14 @@ import time
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.records import DERIVATIVES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
-from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.scene import Scene
 
 RENORMALISE_TURNS = 0.1

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.parameters.model import rolling_contacts
 

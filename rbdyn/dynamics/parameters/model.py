@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError
 from rbdyn.contact import film_thickness, traction
 from rbdyn.contact.cage_film import short_journal_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
@@ -33,7 +34,6 @@ from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
 from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
 from rbdyn.dynamics.forces.surroundings import Gravity, NoDrag, NoGravity, cylinder_drag
 from rbdyn.dynamics.parameters.state import contact_approach, layout_of
-from rbdyn.faults import InputError
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.drive import action

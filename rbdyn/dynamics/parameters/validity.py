@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rbdyn.base.fields import RPM
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, dent_sentence, palmgren
 from rbdyn.dynamics.forces.surroundings import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_report, race_contact_law, rolling_contacts
-from rbdyn.fields import RPM
 from rbdyn.life.maker_friction import SERIES, iso_15312_heat, skf_moments
 from rbdyn.life.rollers import REFERENCE_SPEED, minimum_loads, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 
 # Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches stay as they are.
 MEMORIES = 8.0

@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_chance, student_factor

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
 
 ORDER = 4
 # Centre over width of a notch: takes out what goes round within 5 % of the frequency, as far as cages wander.

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate
 from rbdyn.result import JITTER, Quantity

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array, Mask
+from rbdyn.base.arrays import Array, Mask
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.ring import Row, component_lengths

@@ -15,17 +15,17 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
+from rbdyn.base.fields import RPM
+from rbdyn.base.records import finite
 from rbdyn.contact.hertz_point import PointContact
-from rbdyn.faults import MethodError
-from rbdyn.fields import RPM
 from rbdyn.life import balls
 from rbdyn.mounting.fits import layer_changes
 from rbdyn.mounting.rings import GrooveChange
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, Layer, Stack
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
-from rbdyn.records.record import finite
 from rbdyn.scene.ball import BallRow, DoubleDeckerScene
 
 OIL_BATH = 3.3

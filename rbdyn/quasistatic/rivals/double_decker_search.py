@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.double_decker.equilibrium import Stack
 from rbdyn.quasistatic.rivals.finite_search import DAMPING, SEARCH, Search, search_points

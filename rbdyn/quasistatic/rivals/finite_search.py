@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, move, rival
 from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED, EXHAUSTED, SENTENCES, Damping, levenberg_marquardt

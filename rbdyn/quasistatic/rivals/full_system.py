@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import Control, ball_forces, deflection
 from rbdyn.quasistatic.row.equilibrium import FIGURES, Solution, fill_figures, solution_of

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, move, rival, unknowns
 from rbdyn.quasistatic.row.ball import Control

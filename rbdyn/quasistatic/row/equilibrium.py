@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import Control, ball_forces, spring
 from rbdyn.quasistatic.row.newton import CONVERGED, NOT_CONVEX_MINIMUM, STEPS, STRIDES, Space, Task, find, posed, space

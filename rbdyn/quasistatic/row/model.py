@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
 from rbdyn.mounting.fits import row_change
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange

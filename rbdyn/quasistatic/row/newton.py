@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.quasistatic.row.ball import Control, rules
 from rbdyn.quasistatic.row.ring import (

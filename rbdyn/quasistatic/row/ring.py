@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.quasistatic.row.ball import ball_forces, deflection, line, spring, tangent
 

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array, Whole
-from rbdyn.faults import MethodError, RunError
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import MethodError, RunError
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.ring import Row

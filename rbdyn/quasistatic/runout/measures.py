@@ -18,9 +18,9 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from scipy.optimize import linprog
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 from rbdyn.properties import table
 
 ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]

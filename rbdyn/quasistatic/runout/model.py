@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.quasistatic.runout import race_errors
 from rbdyn.quasistatic.runout.lots import Bench

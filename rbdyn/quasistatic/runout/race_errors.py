@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
-from rbdyn.faults import MethodError
 
 
 @dataclass(frozen=True)

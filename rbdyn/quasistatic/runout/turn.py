@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbdyn.arrays import Array
-from rbdyn.faults import RunError
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RunError
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.newton import Task, posed, space
 from rbdyn.quasistatic.row.ring import RING, Row, component_lengths

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rbdyn.arrays import Array
+from rbdyn.base.arrays import Array
 from rbdyn.life import turning_rings
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL
 from rbdyn.quasistatic.result import Rating, pressures

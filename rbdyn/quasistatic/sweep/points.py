@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
+from rbdyn.base.faults import InputError, refuse, validated
 from rbdyn.base.ranges import listed
-from rbdyn.faults import InputError, refuse, validated
 from rbdyn.scene.ball import BallScene
 
 MOST_POINTS = 100_000

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.result import ball_columns, ball_records
-from rbdyn.records.cells import save_table
-from rbdyn.records.record import finite, plain
 from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:

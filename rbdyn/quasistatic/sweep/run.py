@@ -14,14 +14,14 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.storage import Kept, code_version, run_key
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, Remark, remarks, tipping
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.points import axes_of, scenes, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
-from rbdyn.records.kept import Kept, code_version, run_key
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
 

@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from rbdyn.cli.loading import INTERRUPTED
+from rbdyn.base.loading import INTERRUPTED
 
 FAILED = 1
 # What tables and sentences hold beyond ASCII, for streams that have no more.

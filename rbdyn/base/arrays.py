@@ -1,4 +1,4 @@
-"""The arrays that most of this program works on."""
+"""Arrays by what they hold: the types that most of both packages works on."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,3 +6,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+
+Rows = NDArray[np.intp]

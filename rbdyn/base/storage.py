@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from rbdyn.records.sources import source_digest
+from rbdyn.base.sources import source_digest
 from rbdyn.result import versions
 
 

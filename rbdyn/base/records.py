@@ -2,17 +2,25 @@
 
 A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` or ``outside_json``; ``derived`` ones follow from
 the others; one whose default is None is left out where it is None.
+
+Cells of CSV files are written so that no program takes them for formulas and numbers keep their digits.
 """
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
+from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
 from rbdyn.base.words import Brief
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 # What fields are declared to be, of a class.
 _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
@@ -128,3 +136,33 @@ def restored(kind: Any, value: Any) -> Any:
     elif type(value) is kind or (kind is float and type(value) is int):
         return value
     raise TypeError(f"{value!r} is not of {kind}")
+
+
+# As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# What a formula begins with, also behind quotes: these are text of their own.
+FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+
+
+def quoted_cell(value: Any) -> Any:
+    """A cell as it is written: text that is no number and looks like a formula with one quote more in front."""
+    formula = isinstance(value, str) and FORMULA.match(value) and not NUMBER.fullmatch(value)
+    return f"'{value}" if formula else value
+
+
+def plain_cell(text: str) -> str:
+    """The text of a cell as it was before it was written."""
+    return text[1:] if text.startswith("'") and FORMULA.match(text) else text
+
+
+def save_table(
+    table: "pd.DataFrame | Iterable[Mapping[str, Any]]", path: Path | str, float_format: str | None = None
+) -> None:
+    """Write a table, or its rows by column, as CSV without its index. Raises OSError."""
+    import pandas as pd
+
+    frame = table.copy() if isinstance(table, pd.DataFrame) else pd.DataFrame(list(table))
+    for name, kind in frame.dtypes.items():
+        if not pd.api.types.is_numeric_dtype(kind):
+            frame[name] = frame[name].map(quoted_cell)
+    frame.rename(columns=quoted_cell).to_csv(path, index=False, float_format=float_format)

@@ -1,14 +1,16 @@
-"""Arguments and options that several commands share. Help tells the default of each: ``show_default`` where it is None."""
+"""Options and templates that several commands share."""
 
+import string
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-from rbdyn.cli.terminal import guarded
-from rbdyn.faults import InputError
+from rbdyn.base.faults import InputError
+from rbdyn.base.terminal import guarded
 
 
 def flag(*names: str, says: str, **more: Any) -> Any:
@@ -67,3 +69,26 @@ Out = Annotated[Path | None, folder_option("Write result.json, history.csv and p
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
+
+
+# Where a comment starts beside a key.
+COLUMN = 35
+
+
+def filled(template: str, values: Mapping[str, Any]) -> str:
+    """The template with its ``{names}`` filled in, comments in a column.
+
+    A line that asks for a value of None is left out, so is a table without keys, so is an empty comment.
+    """
+    lines = [_filled(line, values) for line in template.splitlines() if _known(line, values)]
+    full = (line for line, after in pairwise([*lines, ""]) if not (line.startswith("[") and not after))
+    return "\n".join(full).replace("\n\n\n", "\n\n")
+
+
+def _known(line: str, values: Mapping[str, Any]) -> bool:
+    return all(values[name] is not None for _, name, _, _ in string.Formatter().parse(line) if name)
+
+
+def _filled(line: str, values: Mapping[str, Any]) -> str:
+    given, _, why = (part.format_map(values) for part in line.partition(" # "))
+    return f"{given:<{COLUMN}} # {why}" if why else given

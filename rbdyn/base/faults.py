@@ -12,7 +12,7 @@ from typing import Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from rbdyn.fields import InSI, or_refuse
+from rbdyn.base.fields import InSI, or_refuse
 
 Model = TypeVar("Model", bound=BaseModel)
 
