@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from rbdyn.base.options import Json
 from rbdyn.base.terminal import guarded
-from rbdyn.cli.keys import AsSchema, Word, run
+from rbdyn.scene.keys import AsSchema, Word, run
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

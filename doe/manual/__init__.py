@@ -6,7 +6,7 @@ from typer.main import get_command
 
 from doe.cli import app
 from doe.commands.keys import kinds
-from rbdyn.cli.manual.page import Part
+from rbdyn.scene.keys import Part
 
 
 def part() -> Part:

@@ -1,12 +1,11 @@
 """The command ``rbdyn``. Physics is imported inside the commands, so that help comes at once.
 
-- ``app``: simulate, map, accuracy, show; ``ball``: the command of ball bearings, its output (``ball_output``), studies
-  (``ball_studies``) and sweeps (``ball_sweep``); ``keys``: what every key of an input file means
+- ``app``: simulate, map, accuracy; ``simulation_output``: what the first of them says and writes; ``show``: a run as pictures
+- ``ball``: the command of ball bearings, its studies and sweeps; ``keys``: what every key of a scene means
 - ``manual``: keys, commands, equations and the prose between them as one page
-- ``new``: a scene of a catalogue bearing, from ``new_scene`` and a ``template``
-- ``options``, ``ranges``: arguments that several commands share, lists of numbers as they are typed
-- ``terminal``: exit codes, messages, output folders, progress (``remaining``: time left), for ``doe`` too; ``streams``, ``loading``: streams that
-  close and Ctrl-C, at any moment
+- ``new``: a scene of a catalogue bearing, from a template
+
+What the commands of both packages share stands in ``rbdyn.base``.
 """
 
 from rbdyn.base.loading import Loading

@@ -15,10 +15,10 @@ from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
 from rbdyn.base.words import label, quantity
 from rbdyn.cli.app import app as rbdyn_app
-from rbdyn.cli.keys import _models, descriptions, keys, schema
 from rbdyn.plots.ball import label as axis_label
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.keys import _models, descriptions, keys, schema
 
 EXAMPLES = next(parent for parent in Path(__file__).parents if (parent / "pyproject.toml").exists()) / "examples"
 SCENES = {"roller bearing": Scene, "ball bearing": SingleRowScene, "double-decker": DoubleDeckerScene}

@@ -12,7 +12,8 @@ from typer.main import get_command
 from rbdyn.cli.app import app
 from rbdyn.cli.keys import kinds
 from rbdyn.cli.manual import command
-from rbdyn.cli.manual.page import Part, page
+from rbdyn.cli.manual.page import page
+from rbdyn.scene.keys import Part
 
 ROOT = Path(__file__).parents[2]
 

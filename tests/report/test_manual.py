@@ -14,8 +14,8 @@ import pytest
 from manual_parts import ROOT, declared, parts, whole_page
 
 import rbdyn
-from rbdyn.cli.keys import keys, lines
 from rbdyn.cli.manual.page import markdown, rendered
+from rbdyn.scene.keys import keys, lines
 
 # A command with its options, as prose and code write it.
 CALL = re.compile(r"\b(rbdyn|doe) (?!=)([a-z]+)\b((?: [^\s`|]+)*)")

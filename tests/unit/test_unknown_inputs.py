@@ -9,12 +9,12 @@ from scipy import stats
 
 from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.base.faults import InputError, read_toml, validated
-from rbdyn.cli.keys import keys
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.bearing import Materials
+from rbdyn.scene.keys import keys
 from rbdyn.scene.uncertain import RUNS, Law, Uncertain, documented, exact
 from rbdyn.scene.unknown import documented_of, inputs_of, plain_values, value_of, with_values
 

@@ -2,7 +2,7 @@
 
 - ``record``: reading of summary.json, any part of which may be missing
 - ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``contents``: the sections, in this order
-- ``plot``: static pictures as SVG; ``plots_of_fits``, ``plots_of_fronts`` draw most of them
+- ``plot``: static pictures as SVG
 """
 
 from doe.report.sections.contents import sections

@@ -1,1 +1,1 @@
-"""JSON and tables of each step: ``design``, ``fit``, ``front``, ``confirmation``, ``chain``."""
+"""JSON and tables of each step: ``fit`` (with design and chain), ``front``, ``confirmation``, ``robust``, ``uncertainty``, ``calibrate``."""

@@ -1,1 +1,1 @@
-"""A whole study: ``answer`` (its text on the terminal), ``summary`` (summary.json, with what was ``asked``), ``files``, ``plots``."""
+"""A whole study: ``summary`` (its text on the terminal; summary.json, with what was asked), ``files``, ``plots``."""

@@ -22,8 +22,9 @@ def manual(
         from importlib.metadata import entry_points
 
         from rbdyn.cli.keys import kinds
-        from rbdyn.cli.manual.page import Part, page
+        from rbdyn.cli.manual.page import page
         from rbdyn.result import whole_file
+        from rbdyn.scene.keys import Part
 
         out.mkdir(parents=True, exist_ok=True)  # before the page, which takes seconds
         own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())

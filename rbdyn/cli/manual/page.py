@@ -13,10 +13,9 @@ import typer
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
-from pydantic import BaseModel
 
 from rbdyn.base.words import filled_page
-from rbdyn.cli.keys import Key, keys, lines
+from rbdyn.scene.keys import Key, Part, keys, lines
 
 Named = ast.ClassDef | ast.FunctionDef
 # An equation, its number, or the year of what it is from.
@@ -157,15 +156,6 @@ def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
 # Headings deeper than this stand on the page and in the search, not in the contents.
 DEEPEST = 3
-
-
-class Part(NamedTuple):
-    """A package with its chapters, its command and the kinds of its input files."""
-
-    package: str
-    prose: Path  # folder of chapters, NN_name.md
-    commands: Any  # group of commands, as typer makes it
-    kinds: Mapping[str, type[BaseModel]]
 
 
 class Heading(NamedTuple):
