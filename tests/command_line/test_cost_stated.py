@@ -40,7 +40,7 @@ points = 16
 "cage.mass_g" = { law = "normal", mean = 45.0, sd = 3.0 }
 """
 LEFT = re.compile(r"^note: (?:(\d+) to )?(\d+) runs? of [\d. to]+ shaft turns in all (?:is|are) left: \d+ at once, ", re.MULTILINE)  # fmt: skip
-OPTIONS = {"direct": False, "adaptive": False, "robust": False}
+OPTIONS = {"adaptive": False, "robust": False}
 
 
 def left(said: str) -> list[tuple[int, int]]:
@@ -141,8 +141,8 @@ def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
-    """The first process counts from its second run on, the next at once, from the store; one that finds all design runs and
-    two of the confirmation, which needs two at least and five at most, has at most three left."""
+    """The first process counts from its second run on, the next at once, from the store. A confirmation, which needs two runs at
+    least and five at most, found four points to run and was stopped after two: two or three are left, or none for a new process."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
     first = stated(study, out, 8, monkeypatch)
     assert left(f"note: {first[0]}") == [(18 + 2, 18 + 5)] and len(first) == 1
@@ -151,7 +151,7 @@ def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
     killed_in(monkeypatch, clearance.CONFIRMATION_SEEDS, after=2)
     with pytest.raises(Killed):
         study_command(study.path, out)
-    assert study_status(study, out)["runs_left"] == [3, 3]
+    assert study_status(study, out)["runs_left"] == [2, 3]
     assert left(f"note: {stated(study, out, 0, monkeypatch)[0]}") == [(0, 3)]
 
 
@@ -189,7 +189,7 @@ def test_a_run_under_way_states_what_is_left_before_it_ends(tmp_path, monkeypatc
         def engine(points, ledger):
             keeper.hear("a", 0.25, 20.0)
 
-        works, nowhere = {"a": 80.0, "b": 80.0}, Ledger(list, list, print, print, print)
+        works, nowhere = {"a": 80.0, "b": 80.0}, Ledger(print, print, print)
         keeper.timed(engine, works, growth=8.0)([Point("a", "a"), Point("b", "b")], nowhere)
     (sentence,) = sentences
     # A second a shaft turn: 20 runs of 80 turns on two threads are 800 s, in the range.
