@@ -21,7 +21,7 @@ from rbdyn.base.loading import INTERRUPTED
 FAILED = 1
 # What tables and sentences hold beyond ASCII, for streams that have no more.
 PLAIN = {
-    "±": "+-", "×": "x", "−": "-", "–": "-", "µ": "u", "°": " deg", "²": "^2", "³": "^3", "≤": "<=", "≥": ">=", "█": "#",
+    "±": "+-", "×": "x", "─": "-", "−": "-", "–": "-", "µ": "u", "°": " deg", "²": "^2", "³": "^3", "≤": "<=", "≥": ">=", "█": "#",
 }  # fmt: skip
 # Time [s] after which a swallowed Ctrl-C is raised again.
 AGAIN_S = 0.05
