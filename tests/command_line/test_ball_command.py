@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
-from rbdyn.cli.ball import optimum_study, race_limits, runout_record
+from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.sweep.points import parsed
 from rbdyn.quasistatic.sweep.run import sweep

@@ -10,7 +10,7 @@ from rich.text import Text
 from typer.testing import CliRunner
 
 from doe.cli import app as doe_app
-from rbdyn.cli import ball
+from rbdyn.cli import ball_studies
 from rbdyn.cli.app import app as rbdyn_app
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -60,7 +60,7 @@ def test_defaults_stand_in_the_help_as_printed(monkeypatch):
     [((), 2, "--seed 3: no random numbers are used here"), (("--race-limits", "P4"), 0, '"seed": 3')],
 )
 def test_balls_are_drawn_by_a_seed_of_the_command(monkeypatch, options, code, words):
-    monkeypatch.setattr(ball, "SOLVED", 5)  # bearings in place of 100
+    monkeypatch.setattr(ball_studies, "SOLVED", 5)  # bearings in place of 100
     scene = str(EXAMPLES / "angular_contact_ball.toml")
     axial = [each for key in ("bearing.bore_mm=40.0", "operation.radial_load_N=0.0") for each in ("--set", key)]
     shown = CliRunner().invoke(rbdyn_app, ["ball", scene, *axial, *options, "--seed", "3", "--json"])

@@ -8,7 +8,7 @@ import math
 import pytest
 from conftest import ROOT
 
-from rbdyn.cli.new import OperatingPoint, ball_values, roller_values
+from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import (

@@ -300,7 +300,7 @@ def test_command_line_sweeps(command, tmp_path):
 
 def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     """Command line: a long table is cut; failures are grouped on standard error and the exit code is 1."""
-    from rbdyn.cli import ball as sweep_command
+    from rbdyn.cli import ball_studies as sweep_command
 
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: broken)
     assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], None, Path("scene.toml"), False, True) == 1

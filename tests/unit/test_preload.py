@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene
 from rbdyn.base.faults import InputError
-from rbdyn.cli.ball import optimum_study
+from rbdyn.cli.ball_studies import optimum_study
 from rbdyn.life import balls as life
 from rbdyn.life import turning_rings
 from rbdyn.quasistatic import preload, result

@@ -1,0 +1,134 @@
+"""What ``rbdyn ball`` says and writes of an equilibrium."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.records import save_table
+from rbdyn.base.words import counted
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
+from rbdyn.scene import BallScene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def blocks(result: BallResult) -> list[Block]:
+    """Balls, places, contacts, life and stiffness of each row, what the rings do, notes; nothing without an equilibrium."""
+    if not result.found:
+        return []
+    found = [
+        block
+        for name, row in result.row_reports.items()
+        for block in (*_row_tables(f"{name} row" if name else "", row), *map(Paragraph, _row_sentences(row)))
+    ]
+    sentences = []
+    report = result.reached
+    if isinstance(report, DoubleDeckerReport):
+        sentences += _middle_ring(report)
+    moment = report.reaction["moment_Nm"] if report.reaction else {}
+    if any(moment.values()):
+        sentences.append(
+            "moment on the inner ring: " + ", ".join(f"about {axis} {moment[axis]:.4g} N m" for axis in "xy")
+        )
+    if result.fits is not None:
+        sentences.append(_fits(result.fits))
+    if result.runout is not None:
+        sentences.append(_runout(result.runout))
+    from rbdyn.compiled.kernel import compiler_notes
+
+    return [*found, *map(Paragraph, sentences), *notes(result.notes or ()), *notes(compiler_notes(), Detail.ALL)]
+
+
+def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
+    """The result with the runout of its ring and the path it takes, where the scene has form errors."""
+    if scene.errors is None or not result.found:
+        return result, None
+    from rbdyn.cli.ball_studies import runout_record
+
+    record, followed = runout_record(scene)
+    return replace(result, runout=record), followed.table()
+
+
+def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) -> list[str]:
+    """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
+    result.save(folder / "result.json")
+    if not result.found:
+        return ["result.json"]
+    from rbdyn.plots.ball import pictures
+
+    save_table(result.table(), folder / "balls.csv", "%.8g")
+    files = ["result.json", "balls.csv", *pictures(result, folder)]
+    if path is not None:
+        save_table(path, folder / "runout.csv", "%.8g")
+        files.append("runout.csv")
+    return files
+
+
+def _row_tables(title: str, row: RowReport) -> list[Block]:
+    """The balls; for who asks for all also the stiffness matrix and what the search cost."""
+    header = ("azimuth [deg]", "inner angle [deg]", "outer angle", "inner load [N]", "outer load", "centrifugal [N]")
+    keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
+    balls = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
+    names = ("x", "y", "z", "tilt x", "tilt y")
+    matrix = [
+        (name, *(f"{value:.4g}" for value in values))
+        for name, values in zip(names, row.stiffness["matrix_SI"], strict=True)
+    ]
+    searches = "" if row.searches is None else f"{row.searches} searches, "
+    spent = f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over"
+    return [
+        Table(title, header, balls),
+        Table("Stiffness [N/m, N, N m]", ("", *names), matrix, detail=Detail.ALL),
+        Paragraph(spent, detail=Detail.ALL),
+    ]
+
+
+def _row_sentences(row: RowReport) -> list[str]:
+    tilts = ", ".join(f"tilt {axis} {row.tilt_mrad[axis]:.4g} mrad" for axis in "xy")
+    sentences = [f"ring (x along the radial load, z along the axis): {_place(row.displacement_mm)}, {tilts}"]
+    for race, contact in row.contacts.items():
+        film = ""
+        if "central_film_um" in contact:
+            film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
+        ellipse = f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} µm"
+        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
+        sentences.append(f"{race} race: {pressed} over {ellipse}{film}")
+    life = row.life
+    if life["L10_Mrev"] is not None:
+        hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
+        sentences.append(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
+    return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
+
+
+def _place(place: dict[str, float]) -> str:
+    return ", ".join(f"{axis} {1e3 * place[axis]:.4g} µm" for axis in "xyz")
+
+
+def _diagonal(stiffness: dict[str, Any]) -> str:
+    return ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/µm" for axis in "xyz")
+
+
+def _middle_ring(report: DoubleDeckerReport) -> list[str]:
+    middle = report.middle_ring
+    share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
+    return [
+        f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})",
+        f"both rows: {_place(report.displacement_mm)}; stiffness {_diagonal(report.stiffness)}",
+    ]
+
+
+def _fits(fits: dict[str, Any]) -> str:
+    loosens = fits["inner_ring_loosens_rpm"]
+    state = "loose" if fits["inner_ring_loose"] else "tight"
+    when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
+    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
+    return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
+
+
+def _runout(runout: dict[str, Any]) -> str:
+    radial = f"{runout['indicator_um']:.3g} µm by an indicator, {runout['minimum_zone_um']:.3g} µm between circles"
+    axial = f"axial {runout['axial_um']:.3g} µm, face {runout['face_um']:.3g} µm"
+    asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} µm"
+    return f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}"

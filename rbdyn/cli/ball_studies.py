@@ -1,0 +1,261 @@
+"""Studies of ``rbdyn ball``: sweeps over keys, runout, preload, clearance, wear, race limits; what they say and write."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.ranges import axis_values
+from rbdyn.base.render.terminal import show
+from rbdyn.base.terminal import FAILED, hand_over, keeping, output_folder, progress_bar
+from rbdyn.base.words import counted, label, with_error
+from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
+from rbdyn.quasistatic.result import remarks, tipping
+from rbdyn.quasistatic.row.equilibrium import OK
+from rbdyn.quasistatic.runout.lots import Lot, design
+from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
+from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
+from rbdyn.quasistatic.runout.turn import Followed
+from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
+from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.quasistatic.sweep.run import grouped
+from rbdyn.result import write_json
+from rbdyn.scene import BallScene
+from rbdyn.scene.ball import SingleRowScene
+
+# Points of a long table that are shown from its start, and from its end.
+SHOWN = 8
+# Header and columns of the table: the larger of two columns; of a double-decker, those of both rows.
+HEADER = {
+    "x [µm]": ("x_mm",),
+    "axial, z [µm]": ("z_mm",),
+    "inner angle": ("inner_angle_max_deg",),
+    "outer angle": ("outer_angle_max_deg",),
+    "largest load [N]": ("inner_load_max_N", "outer_load_max_N"),
+    "pressure [MPa]": ("inner_pressure_MPa", "outer_pressure_MPa"),
+    "stiffness x [N/µm]": ("stiffness_x_N_per_um",),
+    "axial, z": ("stiffness_z_N_per_um",),
+    "L10 [Mrev]": ("L10_Mrev",),
+}
+
+
+def run_sweep(
+    scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool
+) -> int:
+    """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
+    from rbdyn.quasistatic.sweep.points import parsed
+
+    keys = parsed(texts)
+    folder = output_folder(out, "rbdyn ball", source) if out else None
+    from rbdyn.quasistatic.sweep.run import sweep
+
+    kept_in = folder / "sweep.part" if folder else None
+    with keeping(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
+        result = sweep(scene, keys, progress, kept_in)
+    files = write_sweep(result, folder) if folder else []
+    hand_over(result.as_dict, as_json, lambda: show(sweep_blocks(result), Detail.of(quiet)), folder, files)
+    for places in result.failures.values():
+        print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
+    return FAILED if result.failures else 0
+
+
+def sweep_blocks(result: "SweepResult") -> list[Block]:
+    """The points, what they cost and the notes."""
+    points = counted(len(result.statuses), "point")
+    spent = f"{points} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
+    remarks = (f"{result.where(note['points'])}: {note['note']}" for note in result.notes)
+    return [points_table(result), Paragraph(spent), *notes(remarks)]
+
+
+def points_table(result: "SweepResult") -> Table:
+    """The points, of a long sweep the first and the last ones."""
+    count = len(result.statuses)
+    ends = (*range(SHOWN), *range(count - SHOWN, count)) if count > 2 * SHOWN else range(count)
+    rows = [_row(result, place) for place in ends]
+    if len(ends) < count:
+        rows.insert(SHOWN, ["..."] * len(rows[0]))
+    units = [label(key.rpartition(".")[2]) for key in result.keys]
+    return Table("", [*units, *HEADER], rows)
+
+
+def write_sweep(result: "SweepResult", folder: Path) -> list[str]:
+    """Write sweep.json, sweep.csv and pictures; returns the names of the files."""
+    from rbdyn.plots.ball import sweep_pictures
+
+    write_json(folder / "sweep.json", result.as_dict())
+    result.save(folder / "sweep.csv")
+    return ["sweep.json", "sweep.csv", *sweep_pictures(result, folder)]
+
+
+def _row(result: "SweepResult", place: int) -> list[str]:
+    keys = [f"{value:.6g}" for value in result.at(place).values()]
+    if result.statuses[place] != "ok":
+        return keys + ["failed"] * len(HEADER)
+    return keys + [_cell(result, names, place) for names in HEADER.values()]
+
+
+def _cell(result: "SweepResult", names: Sequence[str], place: int) -> str:
+    columns: dict[str, Any] = result.columns
+    rows = ("",) if names[0] in columns else ("inner_row_", "outer_row_")
+    values = [max(float(columns[f"{row}{name}"][place]) for name in names) for row in rows]
+    unit = 1e3 if names[0].endswith("_mm") else 1.0
+    return " / ".join(f"{unit * value:.4g}" for value in values)
+
+
+# What a study sweeps: function, unit of the values and that unit in SI.
+SWEPT = {
+    "preload": (over_preload, "N", 1.0),
+    "clearance": (over_clearance, "um", 1e-6),
+    "wear": (over_wear, "um", 1e-6),
+}
+# What its record tells of a point, by column of the table.
+SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
+# Bearings of a lot that are solved in full to size the limits of race errors.
+SOLVED = 100
+
+
+def runout_record(scene: BallScene) -> tuple[dict[str, Any], Followed]:
+    """Runout of the turning ring over the form errors of its scene [um], and the path. Raises InputError, RunError."""
+    followed = follow_ring(scene)
+    told = asdict(followed.runout(bench_of(scene).face_radius))
+    turns = told.pop("turns")
+    return {**{f"{name}_um": 1e6 * value for name, value in told.items()}, "turns": turns}, followed
+
+
+def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
+    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; and the points
+    as a sweep tells them. Raises InputError for a double-decker, or where the sweep is refused.
+    """
+    run, unit, si = SWEPT[swept]
+    try:
+        scan = run(_single(scene, swept), [si * value for value in values])
+    except MethodError as error:
+        raise InputError([f"--{swept}: {error}"]) from None
+    table = _table(scene, f"{swept}_{unit}", values, scan)
+    names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
+    points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
+    return {
+        "swept": f"{swept}_{unit}",
+        "points": points,
+        "least_stress": _best(scan, "least_stress", si),
+        "longest_life": _best(scan, "longest_life", si),
+        "notes": [*scan.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+    }, table
+
+
+def _table(scene: BallScene, key: str, values: Sequence[float], scan: Sweep) -> SweepResult:
+    """Figures, balls and notes of the points scanned."""
+    points, places = scan.points, np.arange(len(values))
+    solutions, ratings = [point.solution for point in points], [point.rating for point in points]
+    told_of = ("figures", "displacement", "reaction", "stiffness")
+    balls, displacement, reaction, stiffness = (np.array([getattr(s, of) for s in solutions]) for of in told_of)
+    statuses = tuple(solution.status for solution in solutions)
+    columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
+    for column in columns.values():
+        column[[status != OK for status in statuses]] = np.nan
+    told = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
+    notes, rows = grouped(told, places, statuses), {"row": [(places, balls)]}
+    return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
+
+
+def _best(scan: Sweep, which: str, si: float) -> dict[str, float]:
+    point = getattr(scan, which)
+    return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
+
+
+def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int = 1) -> dict[str, Any]:
+    """Limits of roundness and side-sway of both races with which bearings meet a class with a wanted yield.
+
+    The lot has amplitudes that fall as 1/order from order 1 to 40 (``runout_lots.Lot``). Raises InputError.
+    """
+    row = _single(scene, "race-limits")
+    if tolerance_class not in get_args(ToleranceClass):
+        known = ", ".join(get_args(ToleranceClass))
+        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {known}"])
+    if row.bearing.bore_mm is None:
+        raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
+    try:
+        allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
+        if allowed.axial is None:
+            raise MethodError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
+        asked: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
+        limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
+    except MethodError as error:
+        raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
+    lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
+    return {
+        "class": tolerance_class,
+        "wanted": wanted,
+        **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
+        "yield": limits.yielded,
+        "standard_error": limits.standard_error,
+        "yield_in_proportion": limits.proportional,
+        "homogenisation": {"radial": limits.homogenisation[0], "axial": limits.homogenisation[1]},
+        "bearings": limits.bearings,
+        "solved_in_full": SOLVED,
+        "seed": limits.seed,
+    }
+
+
+def _single(scene: BallScene, option: str) -> SingleRowScene:
+    try:
+        return single_row(scene)
+    except InputError:
+        raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
+
+
+def run(
+    scene: BallScene,
+    name: str,
+    value: str,
+    wanted: float,
+    seed: int,
+    out: Path | None,
+    source: Path,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
+    folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
+    table: SweepResult | None = None
+    if name == "race_limits":
+        record = race_limits(scene, value, wanted, seed)
+    else:
+        record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
+    if folder:
+        write_json(folder / files[0], record)
+        if table is not None:
+            from rbdyn.plots.ball import sweep_pictures
+
+            table.save(folder / f"{name}.csv")
+            files += [f"{name}.csv", *sweep_pictures(table, folder)]
+    hand_over(lambda: record, as_json, lambda: show(blocks(record, table), Detail.of(quiet)), folder, files)
+    return 0
+
+
+def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
+    """The limits of race errors; or the points of a study, where they are best, and notes."""
+    if table is None:
+        return _limits(record)
+    best = [
+        Paragraph(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
+        for title, at in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
+    ]
+    return [points_table(table), *best, *notes(record["notes"])]
+
+
+def _limits(record: dict[str, Any]) -> list[Block]:
+    of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
+    rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
+    title = f"class {record['class']}: {record['radial_limit_um']:g} µm radial, {record['axial_limit_um']:g} µm axial runout"
+    good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
+    solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
+    return [
+        Table(title, ("race", "roundness up to [µm]", "side-sway up to [µm]"), rows),
+        Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
+    ]
