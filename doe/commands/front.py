@@ -40,7 +40,7 @@ def front(
         from doe.report.steps.front import asked_record, front_record, given_point_record
         from doe.study_file import Study
         from doe.workflow.front import find_front, with_survival
-        from doe.workflow.runs import check_goals
+        from doe.workflow.goals import check_goals
 
         loaded = Study.load(path)
         check_goals(loaded)

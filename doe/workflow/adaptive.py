@@ -25,7 +25,8 @@ from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
-from doe.workflow.runs import Runs, design_of, goals_of, ordered_runs, region_of, runs_of
+from doe.workflow.goals import goals_of, region_of
+from doe.workflow.runs import Runs, design_of, ordered_runs, runs_of
 from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, check_all, refuse

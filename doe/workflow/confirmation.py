@@ -18,7 +18,7 @@ from doe.running.store import Failure
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
-from doe.workflow.runs import goals_of
+from doe.workflow.goals import goals_of
 from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError

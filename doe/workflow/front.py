@@ -29,7 +29,7 @@ from doe.response_surface.model_error import correlation
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed
-from doe.workflow.runs import check_goals, goals_of, region_of, tolerance_box
+from doe.workflow.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import InputError, MethodError

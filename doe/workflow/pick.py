@@ -42,7 +42,7 @@ from doe.workflow.front import (
     open_errors,
     standard_errors_of,
 )
-from doe.workflow.runs import beyond_runs, goals_of, known_tolerances, region_of, rigid, rounded_within, tolerance_box
+from doe.workflow.goals import beyond_runs, goals_of, known_tolerances, region_of, rigid, rounded_within, tolerance_box
 from doe.workflow.surfaces import CHUNK, draw_all, jacobian, predict_all, predict_paired, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError

@@ -24,8 +24,8 @@ from doe.unknown.decision import Better, better, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
 from doe.unknown.propagation import Emulated, Runs, Share, emulated
 from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
+from doe.workflow.goals import goals_of, region_of, rounded_within
 from doe.workflow.input_sets import ROUND_SEEDS, Case, Sets, case_of, declared, run, run_notes, strongest
-from doe.workflow.runs import goals_of, region_of, rounded_within
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import set_key
 from rbdyn.scene.unknown import Input, is_number

@@ -23,7 +23,8 @@ from doe.response_surface.model_error import correlation, draw_fields
 from doe.study_file import Study
 from doe.study_file.study import Fitted
 from doe.threads import one_thread
-from doe.workflow.runs import Runs, design_of, goals_of, read_runs
+from doe.workflow.goals import goals_of
+from doe.workflow.runs import Runs, design_of, read_runs
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.records import Record, derived, keyed, outside_json

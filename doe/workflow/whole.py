@@ -35,19 +35,10 @@ from doe.workflow.confirmation import (
     whirl_sentence,
 )
 from doe.workflow.front import find_front, with_survival
+from doe.workflow.goals import check_goals, region_of
 from doe.workflow.pick import Chosen, Edge, SearchedPick, choose, draws_about, edge_of, neighbourhood, widest_of
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
-from doe.workflow.runs import (
-    STORE,
-    Runs,
-    check_given,
-    check_goals,
-    check_runs,
-    design_of,
-    ordered_runs,
-    region_of,
-    run_design,
-)
+from doe.workflow.runs import STORE, Runs, check_given, check_runs, design_of, ordered_runs, run_design
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import Beside, beside, fit_surfaces, reference_runs, with_rivals
 from rbdyn.base.arrays import Array

@@ -29,7 +29,8 @@ from doe.running.store import Failure, Store, grouped
 from doe.study_file import Study
 from doe.workflow.adaptive import Evaluator
 from doe.workflow.front import find_front
-from doe.workflow.runs import STORE, goals_of, region_of, run_design
+from doe.workflow.goals import goals_of, region_of
+from doe.workflow.runs import STORE, run_design
 from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, RunError

@@ -11,8 +11,8 @@ from doe.cli import app
 from doe.report.steps.front import front_record
 from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front
+from doe.workflow.goals import known_tolerances
 from doe.workflow.pick import widest_of
-from doe.workflow.runs import known_tolerances
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
 

@@ -208,7 +208,7 @@ def test_the_guard_loads_nothing_heavy():
 def test_a_warning_of_a_library_is_one_sentence_without_its_path():
     """Command line: numpy's overflow, three times, is said once, and no place in a library; -W shows it whole."""
     program = (
-        "import warnings, numpy\nfrom rbdyn.cli import streams\n"
+        "import warnings, numpy\nfrom rbdyn.base import streams\n"
         "def app():\n    for _ in range(3):\n        numpy.array([1e308]) * 10.0\n"
         "    warnings.warn('File \"/usr/lib/python3/site-packages/numba/x.py\", line 3', stacklevel=1)\n"
         "streams.run(app)\n"

@@ -83,10 +83,10 @@ def test_unit_bar_shows_the_time_left_of_runs_longer_than_half_a_minute(monkeypa
         def isatty(self) -> bool:
             return True
 
-    now, screen = [0.0], Screen()
+    now, screen, clocked = [0.0], Screen(), remaining.Remaining
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(remaining, "Remaining", lambda workers: remaining.Remaining(workers, lambda: now[0]))
+    monkeypatch.setattr(remaining, "Remaining", lambda workers: clocked(workers, lambda: now[0]))
     with remaining.progress_bar("simulating", quiet=False) as progress:
         for done in range(4):
             now[0] = 60.0 * done

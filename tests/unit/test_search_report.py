@@ -23,7 +23,7 @@ from doe.report.study.files import write
 from doe.study_file import Study
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
-from doe.workflow.runs import goals_of
+from doe.workflow.goals import goals_of
 from doe.workflow.whole import run_study
 from rbdyn.base.blocks import Figures
 

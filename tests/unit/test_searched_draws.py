@@ -15,8 +15,8 @@ from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.front import DRAWS
+from doe.workflow.goals import goals_of, region_of
 from doe.workflow.pick import draws_about
-from doe.workflow.runs import goals_of, region_of
 
 
 def bent(coded):

@@ -17,8 +17,8 @@ from doe.report.study.files import write
 from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Limit, every_limit, limits_of, sentence, verdict_of
 from doe.workflow.front import Conditioned, Missed
+from doe.workflow.goals import region_of, rounded_within
 from doe.workflow.pick import edge_of, place_of, share_at_edge
-from doe.workflow.runs import region_of, rounded_within
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 

@@ -18,8 +18,8 @@ from doe.response_surface import Surface
 from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive, Compared, Pull, levels_at, near_limits, pulls
 from doe.workflow.front import SurfaceDoubt, open_errors
+from doe.workflow.goals import goals_of, known_tolerances, region_of
 from doe.workflow.pick import place_of
-from doe.workflow.runs import goals_of, known_tolerances, region_of
 from doe.workflow.surfaces import PredictedGain, half_widths, predict_all, predicted_gains, statement
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array, Rows
