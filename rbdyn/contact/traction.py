@@ -340,7 +340,7 @@ class _Grid:
         """Value, slopes and twist of L at each node, (i, j, 4), with a row and two columns of landing."""
         i, j, d = self.i, self.j, DIFFERENCE
         low, high = np.maximum(i - d, 0.0), i + d  # no slip is smaller than rest
-        nodes = np.empty((i.size + 1, j.size + 2, 4))
+        nodes = np.zeros((i.size + 1, j.size + 2, 4))
         inside = nodes[:-1, 1:-1]
         inside[..., 0] = self.exponent(i, j)
         inside[..., 1] = (self.exponent(high, j) - self.exponent(low, j)) / (high - low)
