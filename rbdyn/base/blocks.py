@@ -1,6 +1,6 @@
 """What a result says, as one tree of blocks that terminal, Markdown and HTML render. Text is plain: a renderer escapes it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Literal, Self
@@ -115,9 +115,12 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Figures:
-    """Still pictures (SVG) next to each other with one caption; left out where pictures cannot be shown."""
+    """Still pictures next to each other with one caption; left out where pictures cannot be shown.
 
-    pictures: Sequence[str]
+    pictures : SVG, or what draws it; only a page calls for it
+    """
+
+    pictures: Sequence[str | Callable[[], str]]
     caption: str = ""
     key: str = ""
     detail: Detail = Detail.LEAST

@@ -22,6 +22,7 @@ from doe.report.sections.answer import CLEARANCES
 from doe.report.sections.fits import _coefficient
 from doe.report.sections.plot import Plot
 from doe.report.sections.record import scalars
+from doe.report.still import Still
 from doe.report.study.plots import response_surface
 from doe.report.words import change, rounded_down
 from doe.study_file import Study
@@ -71,6 +72,15 @@ class Outline(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] not in ("script", "style"):
             self.words.append(data.replace("\xa0", " "))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def stills():
+    """Pictures of the same marks are drawn once for all the pages of these tests."""
+    drawn, draw = {}, Still.svg
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Still, "svg", lambda still: drawn.get(repr(still)) or drawn.setdefault(repr(still), draw(still)))
+        yield drawn
 
 
 @pytest.fixture(scope="module")

@@ -82,23 +82,26 @@ def test_the_page_draws_the_fronts_and_the_scale_is_that_of_the_history(studied)
     _, _, record, folder = studied
     page = (folder / "report.html").read_text(encoding="utf-8")
     (picture,) = re.findall(r'<svg[^>]*aria-label="Hypervolume of the search.*?</svg>', page, re.DOTALL)
-    assert picture.count('class="line surrogate"') == 1 and "found in few runs, simulated" in page
+    assert picture.count('<g class="surrogate">') == 1 and "found in few runs, simulated" in page
     history = [each["hypervolume"] for each in record["adaptive"]["history"]]
     assert record["adaptive"]["compared"]["search"] == pytest.approx(history, rel=1e-12)
 
 
 def test_the_picture_has_every_run_by_its_reason(studied):
     _, _, record, _ = studied
-    drawn = [block for block in in_few_runs(record) if isinstance(block, Figures)]
-    assert len(drawn) == 2
+    progress, places = (
+        [picture() for picture in block.pictures] for block in in_few_runs(record) if isinstance(block, Figures)
+    )
     adaptive = record["adaptive"]
     reasons = [each["why"] for each in adaptive["points"]]
-    for picture in drawn[1].pictures[:2]:
+    assert len(places) == len(record["pick"]) - 1
+    for picture in places:
         for why in {*reasons, "fresh"}:
             count = len(adaptive["front"]) if why == "fresh" else reasons.count(why)
-            assert picture.count(f'class="symbol {why}"') == count, why
-        assert picture.count('class="symbol pick"') == 1
-    dots = re.findall(r"<title>(\d+) runs: ([\d.]+)</title>", drawn[0].pictures[0])
+            (marks,) = re.findall(f'<g class="{why}">(.*?)</g>', picture)
+            assert len(re.findall("<(?:use|path) [^>]*><title>", marks)) == count, why
+        assert picture.count('<g class="pick">') == 1
+    dots = re.findall(r"<title>(\d+) runs: ([\d.]+)</title>", progress[0].partition('<g class="fresh">')[0])
     assert [int(runs) for runs, _ in dots] == [each["runs"] for each in adaptive["history"]]
     assert [float(y) for _, y in dots] == pytest.approx(adaptive["compared"]["search"], abs=6e-4)
 

@@ -2,12 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from html import escape
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.plot import Plot, span, ticks, wide_svg
 from doe.report.sections.record import Record, part
+from doe.report.still import COLOURS, FONT, GUIDE, SMALL, Still, name_marks
 from rbdyn.base.blocks import Block, Figures, Section, Table, Widget
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ROW = 34.0  # height of the bars of a term [pt]
 
 
 def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -30,7 +35,7 @@ def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks: list[Block] = []
     compared = {name: found[name] for name in ("baseline", "pick") if name in found}
     if compared:
-        blocks.append(Figures([power_bars(terms, compared)], "Power loss by where it arises."))
+        blocks.append(Figures([power_bars(terms, compared).svg], "Power loss by where it arises."))
     blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows, " ".join(notes)))
     return Section("power", "Power by term", blocks)
 
@@ -56,59 +61,54 @@ def motion(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if orbits:
         path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
         caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
-        drawn = [orbit(name, each, whole) for whole in (True, False) for name, each in orbits.items()]
+        drawn = [orbit(name, each, whole).svg for whole in (True, False) for name, each in orbits.items()]
         blocks.append(Figures(drawn, caption))
     if any(part(each, "moving") for each in motion.values()):
         blocks.append(Widget("bearing"))
     return Section("motion", "Motion of the bearing", blocks)
 
 
-WIDE, ROW, LEFT, RIGHT = 640.0, 34.0, 150.0, 62.0
-
-
-def orbit(name: str, motion: Record, whole: bool) -> str:
+def orbit(name: str, motion: Record, whole: bool) -> Still:
     """Cage centre along and across the load: in the whole guide clearance, or enlarged."""
     x, y = (part(motion, "cage_orbit_um", axis) for axis in "xy")
-    radius = motion.get("guide_radius_um") or 0.0
-    reach = 1.08 * max(radius, max(math.hypot(*place) for place in zip(x, y, strict=True)))
-    labels = (f"{name}{'' if whole else ', enlarged'}: along the load [µm]", "across [µm]")
-    ranges = ((-reach, reach), (-reach, reach)) if whole else (span(x), span(y))
-    plot = Plot(*ranges, labels, height=326.0, equal=True)
-    if radius and whole:
+    title = f"{name}{'' if whole else ', enlarged'}"
+    radius = motion.get("guide_radius_um") if whole else None
+    return Still(f"Cage orbit at the {title}", partial(_orbit, title, x, y, radius), height=326.0)
+
+
+def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | None, axis: "Axes") -> None:
+    if radius:
         angles = [math.radians(step) for step in range(0, 361, 3)]
-        plot.line([(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles], "guide")
-    plot.line(zip(x, y, strict=True), "orbit")
-    plot.symbol((x[0], y[0]), "triangle", "knee", "start", 4.5)
-    plot.symbol((x[-1], y[-1]), "square", "pick", "end", 4.5)
-    return plot.svg(f"Cage orbit at the {name}{'' if whole else ', enlarged'}")
+        axis.plot([radius * math.cos(each) for each in angles], [radius * math.sin(each) for each in angles], **GUIDE)
+    axis.plot(x, y, linewidth=0.5)
+    for place, mark, colour, words in ((0, "^", "orange", "start"), (-1, "s", "vermilion", "end")):
+        (point,) = axis.plot(
+            x[place], y[place], mark, color=COLOURS[colour], markeredgecolor=COLOURS["paper"], markersize=9
+        )
+        name_marks(point, words, [words])
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set(xlabel=f"{title}: along the load [µm]", ylabel="across [µm]")
 
 
-def power_bars(terms: Sequence[str], found: Mapping[str, Record]) -> str:
+def power_bars(terms: Sequence[str], found: Mapping[str, Record]) -> Still:
     """A row of bars a term, one for each point."""
-    values = [each.get(term) or 0.0 for each in found.values() for term in terms]
-    low, high = min(0.0, *values), max(0.0, *values) or 1.0
-    bottom = ROW * len(terms) + 4.0
+    words = f"Power loss by term, {' and '.join(found)}"
+    return Still(
+        words, partial(_power_bars, terms, found), width=640.0, height=56.0 + ROW * len(terms), left=110.0
+    )  # fmt: skip
 
-    def across(value: float) -> float:
-        return LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low)
 
-    drawn = []
-    for value in ticks(low, high):
-        u = across(value)
-        drawn.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="0" y2="{bottom:g}"/>')
-        drawn.append(f'<text x="{u:.1f}" y="{bottom + 14:g}" text-anchor="middle">{value:g}</text>')
-    thick = (ROW - 8.0) / len(found)
-    for row, term in enumerate(terms):
-        drawn.append(f'<text x="{LEFT - 8}" y="{ROW * row + 0.5 * ROW + 4:g}" text-anchor="end">{escape(term.replace("_", " "))}</text>')  # fmt: skip
-        for place, (name, each) in enumerate(found.items()):
-            value = each.get(term) or 0.0
-            u, v = across(min(value, 0.0)), ROW * row + 4.0 + thick * place
-            width = abs(across(value) - across(0.0))
-            drawn.append(f'<rect class="bar {escape(name)}" x="{u:.1f}" y="{v:.1f}" width="{width:.1f}" height="{thick - 1:.1f}"/>')  # fmt: skip
-            drawn.append(f'<text class="small" x="{u + width + 4:.1f}" y="{v + thick - 3:.1f}">{value:.4g}</text>')
-    drawn.append(f'<text class="axis" x="{across(0.5 * (low + high)):.0f}" y="{bottom + 30:g}" text-anchor="middle">power loss [W]</text>')  # fmt: skip
-    for place, name in enumerate(found):
-        u = WIDE - RIGHT - 150.0 + 80.0 * place
-        drawn.append(f'<rect class="bar {escape(name)}" x="{u:g}" y="{bottom + 21:g}" width="11" height="11"/>')
-        drawn.append(f'<text x="{u + 15:g}" y="{bottom + 31:g}">{escape(name)}</text>')
-    return wide_svg(WIDE, bottom + 38, f"Power loss by term, {' and '.join(found)}", drawn)
+def _power_bars(terms: Sequence[str], found: Mapping[str, Record], axis: "Axes") -> None:
+    thick = 0.8 / len(found)
+    looks = (("steel", "edge"), ("blue", "blue"))
+    for place, ((name, each), (fill, edge)) in enumerate(zip(found.items(), looks, strict=False)):
+        values = [each.get(term) or 0.0 for term in terms]
+        rows = [row + thick * (place - 0.5 * (len(found) - 1)) for row in range(len(terms))]
+        bars = axis.barh(rows, values, thick, color=COLOURS[fill], edgecolor=COLOURS[edge], linewidth=0.8, label=name)
+        axis.bar_label(bars, [f"{value:.4g}" for value in values], padding=3, fontsize=SMALL, color=COLOURS["quiet"])
+    axis.set_yticks(range(len(terms)), [term.replace("_", " ") for term in terms])
+    axis.margins(x=0.12)
+    axis.set(ylim=(len(terms) - 0.5, -0.5), xlabel="power loss [W]")
+    axis.grid(axis="y", visible=False)
+    axis.spines[:].set_visible(False)
+    axis.legend(loc="lower right", fontsize=FONT)

@@ -61,7 +61,7 @@ def _evaluation(evaluation: Record) -> list[Block]:
     if pictures := evaluation_plots(evaluation):
         what = "Scaled prediction variance: least, mean and largest by radius"
         caption = f"{what}; and what a share of the region stays below."
-        blocks.append(Figures(pictures, caption))
+        blocks.append(Figures([each.svg for each in pictures], caption))
     return blocks
 
 

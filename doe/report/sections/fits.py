@@ -2,91 +2,108 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from statistics import NormalDist
 from string import ascii_uppercase
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.plot import Plot, Point, span
 from doe.report.sections.record import Record, factors, fits, part, record_table
+from doe.report.still import GUIDE, Point, Still, name_marks
 from doe.report.words import probability
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
 from rbdyn.base.words import counted, label, quantity, shown, with_error
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Draw = Callable[[str, Sequence[Point], Sequence[str], "Axes"], None]
 # Studentized residuals beyond these are looked at; Cook's distances beyond 1 move the fit.
 SUSPECT, INFLUENTIAL = 3.0, 1.0
 
 
-def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[str]:
-    """Four pictures as SVG; a picture whose numbers are undefined is left out."""
-    drawn = [_plotted(_predicted, name, runs, "observed", "predicted")]
-    drawn += [_plotted(_residuals, name, runs, "predicted", "studentized"), _normal(name, runs)]
-    drawn.append(_plotted(_influence, name, runs, "leverage", "cook"))
-    return [svg for svg in drawn if svg]
+def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[Still]:
+    """Four pictures; a picture whose numbers are undefined is left out."""
+    drawn = [
+        _plotted(_predicted, f"Predicted on observed {label(name)}", name, runs, "observed", "predicted"),
+        _plotted(_residuals, f"Studentized residuals of {label(name)} on predicted values", name, runs, "predicted", "studentized"),
+        _normal_plot(name, runs),
+        _plotted(_influence, f"Cook's distance of {label(name)} on leverage", name, runs, "leverage", "cook"),
+    ]  # fmt: skip
+    return [still for still in drawn if still]
 
 
-def _plotted(plot: Callable[..., str], name: str, runs: Sequence[Record], across: str, up: str) -> str:
-    kept = [run for run in runs if run.get(across) is not None and run.get(up) is not None]
-    points = [(float(run[across]), float(run[up])) for run in kept]
-    titles = [f"run {run.get('run')}: {shown(p[0])}, {shown(p[1])}" for run, p in zip(kept, points, strict=True)]
-    return plot(name, points, titles) if points else ""
+def _plotted(draw: Draw, words: str, name: str, runs: Sequence[Record], across: str, up: str) -> Still | None:
+    defined = [run for run in runs if run.get(across) is not None and run.get(up) is not None]
+    points = [(float(run[across]), float(run[up])) for run in defined]
+    titles = [f"run {run.get('run')}: {shown(x)}, {shown(y)}" for run, (x, y) in zip(defined, points, strict=True)]
+    return Still(f"{words}, {len(points)} runs", partial(draw, name, points, titles)) if points else None
 
 
-def _predicted(name: str, points: list[Point], titles: list[str]) -> str:
-    both = span([x for point in points for x in point])
-    plot = Plot(both, both, (f"observed {label(name)}", "predicted"))
-    plot.line([(both[0], both[0]), (both[1], both[1])], "guide")
-    plot.dots(points, "front", radius=3.4, titles=titles)
-    return plot.svg(f"Predicted on observed {label(name)}, {len(points)} runs")
+def _mark_runs(axis: "Axes", points: Sequence[Point], titles: Sequence[str]) -> None:
+    name_marks(axis.plot(*zip(*points, strict=True), "o")[0], "run", titles)
 
 
-def _residuals(name: str, points: list[Point], titles: list[str]) -> str:
+def _predicted(name: str, points: Sequence[Point], titles: Sequence[str], axis: "Axes") -> None:
+    _mark_runs(axis, points, titles)
+    both = min(axis.get_xlim()[0], axis.get_ylim()[0]), max(axis.get_xlim()[1], axis.get_ylim()[1])
+    axis.plot(both, both, **GUIDE)
+    axis.set(xlim=both, ylim=both, xlabel=f"observed {label(name)}", ylabel="predicted")
+
+
+def _residuals(name: str, points: Sequence[Point], titles: Sequence[str], axis: "Axes") -> None:
+    _mark_runs(axis, points, titles)
     reach = max(SUSPECT * 1.1, *(abs(y) * 1.06 for _, y in points))
-    plot = Plot(span(x for x, _ in points), (-reach, reach), (f"predicted {label(name)}", "studentized residual"))
     for level in (-SUSPECT, 0.0, SUSPECT):
-        plot.line([(plot.x[0], level), (plot.x[1], level)], "guide")
-    plot.dots(points, "front", radius=3.4, titles=titles)
-    return plot.svg(f"Studentized residuals of {label(name)} on predicted values, {len(points)} runs")
+        axis.axhline(level, **GUIDE)
+    axis.set(ylim=(-reach, reach), xlabel=f"predicted {label(name)}", ylabel="studentized residual")
 
 
-def _normal(name: str, runs: Sequence[Record]) -> str:
-    kept = sorted((float(run["studentized"]), run.get("run")) for run in runs if run.get("studentized") is not None)
-    if len(kept) < 3:
-        return ""
+def _normal_plot(name: str, runs: Sequence[Record]) -> Still | None:
+    defined = sorted((float(run["studentized"]), run.get("run")) for run in runs if run.get("studentized") is not None)
+    if len(defined) < 3:
+        return None
     # Blom's plotting positions.
-    scores = [NormalDist().inv_cdf((rank + 0.625) / (len(kept) + 0.25)) for rank in range(len(kept))]
-    points = [(value, score) for (value, _), score in zip(kept, scores, strict=True)]
-    plot = Plot(span(x for x, _ in points), span(scores), ("studentized residual", "normal score"))
-    low, high = max(plot.x[0], plot.y[0]), min(plot.x[1], plot.y[1])
-    plot.line([(low, low), (high, high)], "guide")
-    plot.dots(points, "front", radius=3.4, titles=[f"run {run}: {shown(value)}" for value, run in kept])
-    return plot.svg(f"Normal plot of the residuals of {label(name)}, {len(points)} runs")
+    scores = [NormalDist().inv_cdf((rank + 0.625) / (len(defined) + 0.25)) for rank in range(len(defined))]
+    points = [(value, score) for (value, _), score in zip(defined, scores, strict=True)]
+    titles = [f"run {run}: {shown(value)}" for value, run in defined]
+    words = f"Normal plot of the residuals of {label(name)}, {len(points)} runs"
+    return Still(words, partial(_normal, points, titles))
 
 
-def _influence(name: str, points: list[Point], titles: list[str]) -> str:
+def _normal(points: Sequence[Point], titles: Sequence[str], axis: "Axes") -> None:
+    _mark_runs(axis, points, titles)
+    (left, right), (low, high) = limits = axis.get_xlim(), axis.get_ylim()
+    ends = max(left, low), min(right, high)
+    axis.plot(ends, ends, **GUIDE)
+    axis.set(xlim=limits[0], ylim=limits[1], xlabel="studentized residual", ylabel="normal score")
+
+
+def _influence(name: str, points: Sequence[Point], titles: Sequence[str], axis: "Axes") -> None:
+    _mark_runs(axis, points, titles)
     top = max(INFLUENTIAL * 1.05, *(1.08 * y for _, y in points))
-    plot = Plot((0.0, 1.05), (0.0, top), ("leverage", "Cook's distance"))
-    plot.line([(0.0, INFLUENTIAL), (1.05, INFLUENTIAL)], "guide")
-    plot.dots(points, "front", radius=3.4, titles=titles)
-    return plot.svg(f"Cook's distance of {label(name)} on leverage, {len(points)} runs")
+    axis.axhline(INFLUENTIAL, **GUIDE)
+    axis.set(xlim=(0.0, 1.05), ylim=(0.0, top), xlabel="leverage", ylabel="Cook's distance")
 
 
-def evaluation_plots(evaluation: Record) -> list[str]:
+def evaluation_plots(evaluation: Record) -> list[Still]:
     """Variance dispersion graph and fraction of design space, as far as they are there."""
     drawn = []
     if shells := evaluation.get("by_radius"):
         curves = {key: [(float(each["radius"]), float(each[key])) for each in shells] for key in ("min", "mean", "max")}
-        top = span([0.0, *(y for curve in curves.values() for _, y in curve)])
-        plot = Plot(span(x for x, _ in curves["mean"]), (0.0, top[1]), ("coded radius", "scaled prediction variance"))
-        for key, curve in curves.items():
-            plot.line(curve, "front" if key == "mean" else "guide")
-        drawn.append(plot.svg("Scaled prediction variance by radius: least, mean, largest"))
+        words = "Scaled prediction variance by radius: least, mean, largest"
+        drawn.append(Still(words, partial(_variance, "coded radius", curves)))
     if shares := evaluation.get("fraction_of_design_space"):
         points = [(float(each["percent"]), float(each["variance"])) for each in shares]
-        top = span([0.0, *(y for _, y in points)])
-        plot = Plot((0.0, 100.0), (0.0, top[1]), ("share of the region [%]", "scaled prediction variance"))
-        plot.line(points, "front")
-        drawn.append(plot.svg("Scaled prediction variance that a share of the region stays below"))
+        words = "Scaled prediction variance that a share of the region stays below"
+        drawn.append(Still(words, partial(_variance, "share of the region [%]", {"mean": points})))
     return drawn
+
+
+def _variance(across: str, curves: Mapping[str, Sequence[Point]], axis: "Axes") -> None:
+    for key, curve in curves.items():
+        axis.plot(*zip(*curve, strict=True), **({} if key == "mean" else GUIDE))
+    axis.set(xlabel=across, ylabel="scaled prediction variance")
+    axis.set_ylim(bottom=0.0)
 
 
 STATISTICS = (
@@ -176,7 +193,7 @@ def fit_blocks(name: str, fitted: Record, names: Sequence[str] = ()) -> list[Blo
         _coefficients(name, fitted),
         *(Paragraph(text, detail=Detail.USUAL) for text in (*_equations(name, fitted, names), _quality(fitted))),
         Bullets([text[:1].upper() + text[1:] for text in said]),
-        Figures(diagnostic_plots(name, runs) if runs else (), caption),
+        Figures([each.svg for each in diagnostic_plots(name, runs)], caption),
         _runs(name, runs),
         replace(record_table(f"Further figures of {label(name)}", further, folded=True), detail=Detail.ALL),
     ]

@@ -2,17 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from html import escape
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from doe.report.sections.answer import tolerances
-from doe.report.sections.plot import Plot, Point, Range, legend, span, symbol, tick_text, ticks, wide_svg
+from doe.report.sections.plot import Plot, Range, legend, span, symbol, tick_text, ticks, wide_svg
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses
 from doe.report.sections.searches import in_few_runs
+from doe.report.still import Point, Still
 from doe.report.words import SENSES, change, half_width, share_with_interval
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Section, Table, Widget
 from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Shape and role in the style sheet.
 MARKS = {
@@ -58,7 +63,7 @@ def pair_plots(
         for bound in up:
             plot.line([(plot.x[0], bound), (plot.x[1], bound)], "limit")
         for each in sets:
-            plot.dots([_pair(point, one, two) for point in each.points], each.role, first=each.first)
+            plot.dots([_pair(point, one, two) for point in each.points], each.role, each.first)
         for name, point in marks.items():
             plot.symbol(_pair(point, one, two), *_mark(name), name)
         for name, (place, error) in simulated.items():
@@ -144,11 +149,15 @@ def _axis(number: int, axes: int, name: str, limits: Range) -> str:
     return "".join(parts)
 
 
-def hypervolume(history: Sequence[float]) -> str:
+def hypervolume(history: Sequence[float]) -> Still:
     """Hypervolume by generation."""
-    plot = Plot((0.0, float(len(history))), span(history), ("generation", "hypervolume"), width=420.0, height=220.0)
-    plot.line([(float(number), value) for number, value in enumerate(history, 1)], "front")
-    return plot.svg(f"Hypervolume rises from {shown(history[0])} to {shown(history[-1])} in {len(history)} generations")
+    words = f"Hypervolume rises from {shown(history[0])} to {shown(history[-1])} in {len(history)} generations"
+    return Still(words, partial(_hypervolume, history), width=400.0, height=220.0)
+
+
+def _hypervolume(history: Sequence[float], axis: "Axes") -> None:
+    axis.plot(range(1, len(history) + 1), history)
+    axis.set(xlim=(0.0, len(history)), xlabel="generation", ylabel="hypervolume")
 
 
 # Points of a front that are drawn; more cannot be told apart.
@@ -334,7 +343,7 @@ def _search(record: Record) -> list[Block]:
         near = next((number for number, each in enumerate(history, 1) if each >= 0.99 * record["hypervolume"]), None)
         blocks.append(Paragraph(f"99 % of the hypervolume after generation {near}." if near else "", "small"))
     if len(history) > 2:
-        blocks.append(Figures([hypervolume(history)], "Hypervolume by generation: flat at the end means found."))
+        blocks.append(Figures([hypervolume(history).svg], "Hypervolume by generation: flat at the end means found."))
     return blocks
 
 

@@ -1,21 +1,31 @@
 """Dimension chains: the parts to make, what each contributes, how many assemblies pass."""
 
-from collections.abc import Mapping
-from html import escape
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, allocation, part, record_table
+from doe.report.still import COLOURS, FONT, Still, name_marks
 from doe.report.words import dimension, moved
 from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
 from rbdyn.base.words import counted, label, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Keys of a chain that have a place of their own.
 SHOWN_KEYS = {
     "closing_link", "yield", "yield_standard_errors", "exact_yield", "rejected", "contributions", "allocation", "status",
     "distribution", "linearisation", "cost", "selective_assembly", "samples",
 }  # fmt: skip
-WIDE, ROW, LEFT, COLOURS = 640.0, 34.0, 92.0, 8
+ROW = 34.0  # height of a bar with its margin [pt]
+WRITTEN = 8.0  # share of a bar above which its number has room in it [%]
+# Okabe and Ito 2008, ordered so that neighbours differ in lightness too, each with the colour of letters on it; none is a
+# colour of the page, for they are the same in light and dark.
+FILLS = (
+    ("#0072b1", "#fefefe"), ("#f0e442", "#111111"), ("#d55e00", "#fefefe"), ("#56b4e9", "#111111"),
+    ("#6b3a59", "#fefefe"), ("#e69f00", "#111111"), ("#006b4f", "#fefefe"), ("#e5a9cb", "#111111"),
+)  # fmt: skip
 KINDS = (("variance_percent", "variance"), ("worst_case_percent", "worst case"))
 NORMAL = 1.96  # half-width of a 95 % interval over its standard error
 
@@ -27,7 +37,7 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Heading(label(name)))
         if shares := chain.get("contributions"):
             caption = "What each part contributes to the scatter of the closing link."
-            blocks.append(Figures([contributions(name, shares)], caption))
+            blocks.append(Figures([contributions(name, shares).svg], caption))
         blocks += _distributions(chain)
         rest = {key: value for key, value in chain.items() if key not in SHOWN_KEYS}
         blocks.append(record_table(f"Further figures of the chain {label(name)}", rest, folded=True))
@@ -165,24 +175,34 @@ def _selective(found: Record) -> list[Block]:
     ]
 
 
-def contributions(name: str, shares: Record) -> str:
-    """Stacked bars, by variance and in worst case; a part is told by its number, colour and title."""
-    known = [(words, [part(each, kind) or 0.0 for each in shares.values()]) for kind, words in KINDS]
-    known = [(words, values) for words, values in known if sum(values) > 0.0]
-    high = ROW * len(known) + 8.0 + 18.0 * len(shares)
-    drawn = []
-    for row, (words, values) in enumerate(known):
-        v, u = ROW * row + 4.0, LEFT
-        drawn.append(f'<text x="{LEFT - 8}" y="{v + 17:g}" text-anchor="end">{words}</text>')
-        for number, (each, value) in enumerate(zip(shares, values, strict=True)):
-            width = (WIDE - LEFT - 4.0) * value / sum(values)
-            title = escape(f"{label(each)}: {value:.1f} % of the {words}")
-            drawn.append(f'<rect class="share c{number % COLOURS}" x="{u:.1f}" y="{v:g}" width="{width:.1f}" height="24"><title>{title}</title></rect>')  # fmt: skip
-            if width > 46.0:
-                drawn.append(f'<text class="on c{number % COLOURS}" x="{u + width / 2:.1f}" y="{v + 16:g}" text-anchor="middle">{number + 1}: {value:.0f} %</text>')  # fmt: skip
-            u += width
-    for number, each in enumerate(shares):
-        v = ROW * len(known) + 16.0 + 18.0 * number
-        drawn.append(f'<rect class="share c{number % COLOURS}" x="{LEFT}" y="{v - 9:g}" width="12" height="12"/>')
-        drawn.append(f'<text x="{LEFT + 18}" y="{v + 2:g}">{number + 1}: {escape(label(each))}</text>')
-    return wide_svg(WIDE, high, f"Contributions to the chain {label(name)}", drawn)
+def contributions(name: str, shares: Record) -> Still:
+    """Stacked bars, by variance and in worst case; a part is identified by its number, colour and title."""
+    sizes = [(words, [part(each, kind) or 0.0 for each in shares.values()]) for kind, words in KINDS]
+    sizes = [(words, values) for words, values in sizes if sum(values) > 0.0]
+    below = 12.0 + 18.0 * len(shares)
+    return Still(
+        f"Contributions to the chain {label(name)}",
+        partial(_contributions, [label(each) for each in shares], sizes),
+        width=640.0, height=16.0 + ROW * len(sizes) + below, left=92.0, bottom=below,
+    )  # fmt: skip
+
+
+def _contributions(names: Sequence[str], sizes: Sequence[tuple[str, Sequence[float]]], axis: "Axes") -> None:
+    bars: list[Any] = []
+    for row, (words, values) in enumerate(sizes):
+        start = 0.0
+        for number, value in enumerate(values):
+            share, (colour, ink) = 100.0 * value / sum(values), FILLS[number % len(FILLS)]
+            (bar,) = axis.barh(row, share, 0.7, start, color=colour, edgecolor=COLOURS["paper"])
+            name_marks(bar, "share", [f"{names[number]}: {value:.1f} % of the {words}"])
+            if share > WRITTEN:
+                axis.text(start + 0.5 * share, row, f"{number + 1}: {value:.0f} %", color=ink, ha="center", va="center")
+            bars += [bar] if row == 0 else []
+            start += share
+    axis.set(xlim=(0.0, 100.0), ylim=(len(sizes) - 0.5, -0.5), xticks=[])
+    axis.set_yticks(range(len(sizes)), [words for words, _ in sizes])
+    axis.grid(visible=False)
+    axis.spines[:].set_visible(False)
+    entries = [f"{number}: {name}" for number, name in enumerate(names, 1)]
+    axis.legend(bars, entries, loc="upper left", bbox_to_anchor=(0.0, 0.0), borderaxespad=0.4, borderpad=0.0,
+                handlelength=1.1, handleheight=1.1, labelspacing=0.5, fontsize=FONT)  # fmt: skip

@@ -1,10 +1,14 @@
-"""Static pictures as SVG: axes with tidy ticks, points, lines, symbols. Colours come from the style sheet by role."""
+"""Pictures of a front that scripts mark points in, as SVG: axes with tidy ticks, points, lines, symbols.
+
+Colours come from the style sheet by role. Pictures in which nothing changes are ``doe.report.still``.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-Point = tuple[float, float]
+from doe.report.still import Point
+
 Range = tuple[float, float]
 
 # Corners of symbols of radius 1, so that no mark is told by its colour alone.
@@ -53,24 +57,11 @@ class Plot:
     """A picture in the making: add marks, then ask for the SVG."""
 
     LEFT, RIGHT, TOP, BOTTOM = 58.0, 12.0, 12.0, 44.0
+    width, height = 340.0, 270.0
 
-    def __init__(
-        self, x: Range, y: Range, labels: tuple[str, str], *, width: float = 340.0, height: float = 270.0,
-        equal: bool = False,
-    ) -> None:  # fmt: skip
-        self.width, self.height = width, height
+    def __init__(self, x: Range, y: Range, labels: tuple[str, str]) -> None:
         self.x, self.y, self.labels = x, y, labels
         self.marks: list[str] = []
-        if equal:
-            self._make_equal()
-
-    def _make_equal(self) -> None:
-        """The same length a unit on both axes, by widening one range."""
-        wide, high = self.width - self.LEFT - self.RIGHT, self.height - self.TOP - self.BOTTOM
-        unit = max((self.x[1] - self.x[0]) / wide, (self.y[1] - self.y[0]) / high)
-        (a, b), (c, d) = self.x, self.y
-        self.x = (0.5 * (a + b - unit * wide), 0.5 * (a + b + unit * wide))
-        self.y = (0.5 * (c + d - unit * high), 0.5 * (c + d + unit * high))
 
     def place(self, x: float, y: float) -> Point:
         """Pixels of a point."""
@@ -79,25 +70,20 @@ class Plot:
         v = self.TOP + high * (self.y[1] - y) / (self.y[1] - self.y[0])
         return u, v
 
-    def dots(
-        self, points: Sequence[Point], role: str, *, radius: float = 2.6, titles: Sequence[str] = (), first: int | None = None
-    ) -> None:  # fmt: skip
-        """Round points; ``first`` numbers them for the scripts of the page."""
-        for number, point in enumerate(points):
+    def dots(self, points: Sequence[Point], role: str, first: int) -> None:
+        """Round points, numbered from ``first`` for the scripts of the page."""
+        for number, point in enumerate(points, first):
             u, v = self.place(*point)
-            tag = "" if first is None else f' data-point="{first + number}"'
-            title = f"<title>{escape(titles[number])}</title>" if titles else ""
-            mark = f'<circle class="dot {role}"{tag} cx="{u:.1f}" cy="{v:.1f}" r="{radius:g}"'
-            self.marks.append(f"{mark}>{title}</circle>" if title else f"{mark}/>")
+            self.marks.append(f'<circle class="dot {role}" data-point="{number}" cx="{u:.1f}" cy="{v:.1f}" r="2.6"/>')
 
     def line(self, points: Iterable[Point], role: str) -> None:
         """A line through points."""
         places = " ".join(f"{u:.1f},{v:.1f}" for u, v in (self.place(*point) for point in points))
         self.marks.append(f'<polyline class="line {role}" points="{places}"/>')
 
-    def symbol(self, point: Point, shape: str, role: str, title: str, radius: float = 5.5) -> None:
+    def symbol(self, point: Point, shape: str, role: str, title: str) -> None:
         """A marked point."""
-        self.marks.append(symbol(*self.place(*point), shape, role, radius, title))
+        self.marks.append(symbol(*self.place(*point), shape, role, title=title))
 
     def cross(self, point: Point, error: tuple[float | None, float | None], role: str) -> None:
         """Error bars of half-widths along x and y, as far as the frame reaches."""

@@ -1,15 +1,31 @@
 """The search in few runs: how far its front came, run by run, beside other fronts, and where each run was spent and why."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from functools import partial
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from doe.report.sections.plot import Plot, legend, span
 from doe.report.sections.record import Record, factors, part
+from doe.report.still import COLOURS, SMALL, Still, name_marks
 from rbdyn.base.blocks import Block, Figures, Heading, Table
 from rbdyn.base.words import label, shown, with_error
 
-# Shape of the runs made for each reason; the style sheet has their colours.
-SHAPES = {"design": "square", "improvement": "hexagon", "check": "diamond", "extension": "triangle", "fresh": "plus"}
-RADIUS = 1.6  # of a run of one replicate, so that areas are as the replicates
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Runs = dict[str, list[tuple[Record, int]]]
+# Marker and colour of the runs made for each reason.
+MARKS = {
+    "design": ("s", "blue"),
+    "improvement": ("h", "orange"),
+    "check": ("D", "green"),
+    "extension": ("^", "purple"),
+    "fresh": ("P", "ink"),
+}
+AREA = 7.0  # of a run of one replicate [pt²]
+# Size of a picture with a legend beneath, where no point lies, and letters in a line of it.
+HIGH, BOTTOM, LETTERS = 338.0, 112.0, 56
+BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.17)}
 SCALE = (
     "Hypervolume: how much of all combinations of the responses, from the best to the worst of each on these fronts, a front "
     "leaves behind it; larger is better, and all fronts are on one scale."
@@ -19,29 +35,23 @@ SPENT = "Where each run was spent and why; the larger a mark, the more replicate
 
 def in_few_runs(summary: Record) -> list[Block]:
     """The search in pictures, and its batches."""
-    adaptive = part(summary, "adaptive") or {}
-    history, known = adaptive.get("history") or [], part(adaptive, "compared", "search") or []
+    history, reached = part(summary, "adaptive", "history") or [], part(summary, "adaptive", "compared", "search") or []
     blocks: list[Block] = [Heading("The search in few runs")] if history else []
-    if history and len(known) == len(history):
-        entries = [(SHAPES.get(each.role, "line"), each.role, each.words) for each in curves(adaptive)]
-        blocks.append(Figures([_progress(adaptive), legend(entries)], SCALE))
-    if spent := spent_runs(summary):
-        given = factors(summary)
-        pairs = [_where(summary, spent, given[0].name, other.name) for other in given[1:]]
-        entries = [(SHAPES[why], why, why) for why in SHAPES if why in spent]
-        blocks.append(Figures([*pairs, legend([*entries, ("star", "pick", "pick")])], SPENT))
+    for stills, caption in zip(search_stills(summary), (SCALE, SPENT), strict=True):
+        if stills:
+            blocks.append(Figures([each.svg for each in stills], caption))
     rows = [
-        (shown(each["runs"]), f"{reached:.3f}", with_error(each["left"], each["deviation"]), each["why"])
-        for each, reached in zip(history, known, strict=False)
+        (shown(each["runs"]), f"{volume:.3f}", with_error(each["left"], each["deviation"]), each["why"])
+        for each, volume in zip(history, reached, strict=False)
         if {"runs", "left", "deviation", "why"} <= set(each)
     ]
     header = ("runs", "hypervolume", "still to gain", "next runs for")
     return [*blocks, Table("Adaptive search, batch by batch", header, rows, text_columns=(3,))]
 
 
-def spent_runs(summary: Record) -> dict[str, list[tuple[Record, int]]]:
+def spent_runs(summary: Record) -> Runs:
     """Factors and replicates of all runs of a search by why they were made, the fresh ones at its points last."""
-    found: dict[str, list[tuple[Record, int]]] = {}
+    found: Runs = {}
     for each in part(summary, "adaptive", "points") or []:
         found.setdefault(each["why"], []).append((each["factors"], each["replicates"]))
     if found:
@@ -75,31 +85,63 @@ def curves(adaptive: Record) -> list[Curve]:
     ]
 
 
-def _progress(adaptive: Record) -> str:
-    """Hypervolume against runs."""
-    drawn = curves(adaptive)
-    ends = [y + side * e for each in drawn for y, e in zip(each.reached, each.doubt, strict=True) for side in (-1, 1)]
-    plot = Plot(span(x for each in drawn for x in each.runs), span(ends), ("runs", "hypervolume"))
-    for role, words, runs, reached, doubt in drawn:
-        points = list(zip(runs or plot.x, reached if runs else 2 * reached, strict=True))
-        plot.line(points, role)
-        for point, error in zip(points, doubt if runs else (), strict=False):
-            plot.cross(point, (None, error), "error")
-        if role in SHAPES:
-            plot.symbol(points[0], SHAPES[role], role, words)
-        elif runs:
-            plot.dots(points, role, radius=3.4, titles=[f"{x:.0f} runs: {y:.3f}" for x, y in points])
-    first, last = drawn[0].reached[0], drawn[0].reached[-1]
-    return plot.svg(f"Hypervolume of the search rises from {first:.3f} to {last:.3f} in {drawn[0].runs[-1]:.0f} runs")
+def search_stills(summary: Record) -> tuple[list[Still], list[Still]]:
+    """Hypervolume against runs, and the runs over the first factor and each other one; either as far as it is known."""
+    adaptive = part(summary, "adaptive") or {}
+    history, reached = adaptive.get("history") or [], part(adaptive, "compared", "search") or []
+    progress, places = [], []
+    if history and len(reached) == len(history):
+        lines = curves(adaptive)
+        ends = f"{lines[0].reached[0]:.3f} to {lines[0].reached[-1]:.3f} in {lines[0].runs[-1]:.0f} runs"
+        words = f"Hypervolume of the search rises from {ends}"
+        progress.append(Still(words, partial(_progress, lines), height=HIGH, bottom=BOTTOM))
+    if spent := spent_runs(summary):
+        first, *others = factors(summary)
+        for other in others:
+            words = f"{sum(map(len, spent.values()))} runs over {label(first.name)} and {label(other.name)}"
+            draw = partial(_where, spent, part(summary, "pick"), first.name, other.name)
+            places.append(Still(words, draw, height=HIGH, bottom=BOTTOM))
+    return progress, places
 
 
-def _where(summary: Record, spent: dict[str, list[tuple[Record, int]]], one: str, two: str) -> str:
+def _progress(lines: Sequence[Curve], axis: "Axes") -> None:
+    """Hypervolume against runs; a front of no runs of its own is a line with a band."""
+    for role, words, runs, reached, doubt in lines:
+        mark, colour = MARKS.get(role, ("o", "blue" if runs else "quiet"))
+        color, entry = COLOURS[colour], fill(words, LETTERS)
+        if runs:
+            line, _, _ = axis.errorbar(
+                runs, reached, doubt, fmt=f"{mark}-", color=color, ecolor=COLOURS["ink"], capsize=3, label=entry
+            )
+            titles = [f"{x:.0f} runs: {y:.3f}" for x, y in zip(runs, reached, strict=True)]
+            name_marks(line, role, titles)
+        else:
+            line = axis.axhline(reached[0], color=color, linestyle="--", label=entry)
+            name_marks(line, role)
+    axis.set(xlabel="runs", ylabel="hypervolume (larger is better)")
+    axis.legend(**BENEATH)
+
+
+def _where(spent: Runs, pick: Record | None, one: str, two: str, axis: "Axes") -> None:
     """All runs over two factors."""
-    every = [at for runs in spent.values() for at, _ in runs]
-    plot = Plot(span(at[one] for at in every), span(at[two] for at in every), (label(one), label(two)))
     for why, runs in spent.items():
-        for at, count in runs:
-            plot.symbol((at[one], at[two]), SHAPES[why], why, f"{why}, {count} replicates", RADIUS * count**0.5)
-    if pick := part(summary, "pick"):
-        plot.symbol((pick[one], pick[two]), "star", "pick", "pick", 7.0)
-    return plot.svg(f"{sum(map(len, spent.values()))} runs over {label(one)} and {label(two)}")
+        mark, colour = MARKS[why]
+        x, y = ([at[name] for at, _ in runs] for name in (one, two))
+        sizes = [AREA * count for _, count in runs]
+        points = axis.scatter(
+            x, y, sizes, COLOURS[colour], marker=mark, edgecolors=COLOURS["paper"], linewidths=0.8, label=why
+        )
+        name_marks(points, why, [f"{why}, {count} replicates" for _, count in runs])
+    if pick:
+        (star,) = axis.plot(
+            pick[one],
+            pick[two],
+            "*",
+            color=COLOURS["vermilion"],
+            markeredgecolor=COLOURS["paper"],
+            markersize=15,
+            label="pick",
+        )
+        name_marks(star, "pick", ["pick"])
+    axis.set(xlabel=label(one), ylabel=label(two))
+    axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,8 +12,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from doe.report import still
 from doe.report.sections.record import Record
-from doe.report.sections.searches import curves, spent_runs
+from doe.report.sections.searches import search_stills
 from doe.response_surface import Surface
 from doe.study_file import Study
 from doe.workflow.robust import RobustFront
@@ -22,16 +22,7 @@ from doe.workflow.runs import design_of
 from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 
-# Marker and colour of the runs made for each reason and of the fronts; a legend where no point lies; pictures in a row.
-MARKERS = {
-    "design": ("s", "tab:blue"),
-    "improvement": ("h", "tab:orange"),
-    "check": ("D", "tab:green"),
-    "extension": ("^", "tab:purple"),
-    "fresh": ("P", "black"),
-}
-CURVES = (("o-", "tab:blue"), ("P", "black"), ("--", "tab:gray"), ("--", "tab:green"))
-BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
+# Pictures in a row.
 WIDEST = 3
 
 
@@ -86,41 +77,8 @@ def _bounds(study: Study, name: str) -> list[float]:
 
 def adaptive_search(record: Record, path: Path) -> None:
     """Hypervolume against runs beside other fronts, and where each run was spent and why, of the record of a study."""
-    names = record["design"]["factors"]
-    columns = min(len(names), WIDEST)
-    rows = -(-len(names) // columns)
-    figure = plt.figure(figsize=(5.2 * columns, 5.0 * rows), layout="constrained")
-    _hypervolumes(figure.add_subplot(rows, columns, 1), record["adaptive"])
-    for panel, name in enumerate(names[1:], 2):
-        axis = figure.add_subplot(rows, columns, panel)
-        for why, runs in spent_runs(record).items():
-            x, y = ([point[each] for point, _ in runs] for each in (names[0], name))
-            marker, color = MARKERS[why]
-            sizes = [7.0 * count for _, count in runs]
-            axis.scatter(x, y, sizes, color, marker=marker, alpha=0.8, edgecolors="white", linewidths=0.5, label=why)
-        pick = (record["pick"][each] for each in (names[0], name))
-        axis.plot(*pick, "*", c="tab:red", mec="white", ms=15, label="pick")
-        axis.set_xlabel(label(names[0]))
-        axis.set_ylabel(label(name))
-        axis.xaxis.set_major_locator(MaxNLocator(5))
-        axis.set_title("where each run was spent, and why; size: replicates", fontsize=10)
-        axis.legend(fontsize=8, ncol=4, **BENEATH)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
-
-
-def _hypervolumes(axis: Axes, adaptive: Record) -> None:
-    for each, (marker, color) in zip(curves(adaptive), CURVES, strict=False):
-        if each.runs:
-            axis.errorbar(each.runs, each.reached, each.doubt, fmt=marker, c=color, ms=7, capsize=3, label=each.words)
-        else:
-            (y,), (error,) = each.reached, each.doubt
-            axis.axhline(y, color=color, linestyle=marker, label=each.words)
-            axis.axhspan(y - error, y + error, color=color, alpha=0.15, linewidth=0)
-    axis.set_xlabel("runs")
-    axis.set_ylabel("hypervolume (larger is better)")
-    axis.set_title("how far each front gets, on one scale", fontsize=10)
-    axis.legend(fontsize=8, **BENEATH)
+    progress, places = search_stills(record)
+    still.save([*progress, *places], WIDEST, path)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:

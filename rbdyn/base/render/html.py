@@ -55,7 +55,8 @@ def render(block: Block) -> str:
             name = f' id="{key}"' if key else ""
             words = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
             four = " four" if len(pictures) == 4 and not key else ""
-            return f'<figure{name}><div class="pictures{four}">{"".join(pictures)}</div>{words}</figure>'
+            drawn = "".join(each if isinstance(each, str) else each() for each in pictures)
+            return f'<figure{name}><div class="pictures{four}">{drawn}</div>{words}</figure>'
     raise TypeError(f"{type(block).__name__} has no HTML of its own")
 
 
