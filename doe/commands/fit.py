@@ -92,6 +92,6 @@ def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "t
         refuse(f"--{option}: {path} says it; leave out one or the other" for option, given in named.items() if given)
         return Study.load(path), ()
     if data is None:
-        mend = "give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"
-        raise InputError([f"fit: nothing to fit; {mend}"])
+        fix = "give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"
+        raise InputError([f"fit: nothing to fit; {fix}"])
     return study_of_table(data, named["factor"] or [], named["response"] or [], named["model"] or "quadratic")

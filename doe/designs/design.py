@@ -244,7 +244,7 @@ def cube_points(factors: int, cube: str = "full") -> Array:
 def corner_blocks(corners: Array, blocks: int) -> Rows:
     """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
 
-    Blocks are told by the signs of interactions of three or more factors, the longest that serve; their
+    Blocks are set by the signs of interactions of three or more factors, the longest that serve; their
     products must not be short either. Raises MethodError where no such division exists.
     """
     if blocks == 1:
@@ -297,8 +297,8 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     Technometrics 2 (1960) 455-475.
     """
     if factors not in TOGETHER:
-        mend = 'use kind = "central_composite"'
-        raise MethodError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
+        fix = 'use kind = "central_composite"'
+        raise MethodError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {fix}")
     number = BLOCKS.get(factors, 1) if blocks else 1
     if blocks and number == 1:
         raise MethodError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
@@ -323,7 +323,7 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     """Definitive screening design in 2 to 8 factors: a conference matrix, its mirror image, and centre points.
 
     With one centre point 2k + 1 runs for an even number k of factors; an odd one takes a column less of the next even
-    design. Main effects are orthogonal to each other and to all squares and products; squares can be told from each
+    design. Main effects are orthogonal to each other and to all squares and products; squares can be distinguished from each
     other and from products, products not all from each other: the model for it is "pure_quadratic".
 
     Raises MethodError when the number of factors is out of range.
@@ -333,9 +333,9 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     using conference matrices, J. Qual. Technol. 44 (2012) 2-8.
     """
     if not 2 <= factors <= MOST_SCREENED:
-        mend = 'use kind = "d_optimal"'
+        fix = 'use kind = "d_optimal"'
         raise MethodError(
-            f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; {mend}"
+            f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; {fix}"
         )
     half = conference_matrix(factors + factors % 2)[:, :factors]
     points = np.stack([half, -half], axis=1).reshape(-1, factors)
@@ -370,9 +370,9 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
     ``centre_replicates`` points are added at the centre. Raises MethodError beyond 10 000 combinations.
     """
     if (runs := levels**factors) > MOST_RUNS:
-        mend = 'give fewer levels or use kind = "sobol"'
+        fix = 'give fewer levels or use kind = "sobol"'
         raise MethodError(
-            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
+            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {fix}"
         )
     values = np.linspace(-1.0, 1.0, levels)
     return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)

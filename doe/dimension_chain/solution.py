@@ -26,7 +26,7 @@ from rbdyn.base.records import Record, derived, keyed, outside_json
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
-# What is told of an allocated part.
+# What is reported of an allocated part.
 ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
 

@@ -194,7 +194,7 @@ def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
 def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, block: Whole) -> list[AnovaRow]:
     """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
 
-    ``solution`` is of the columns of ``terms`` followed by those that tell the blocks apart.
+    ``solution`` is of the columns of ``terms`` followed by those that distinguish the blocks.
     """
     model_df, residual = len(terms) - 1, solution.residual_sum
     error = solution.mean_square, solution.dof

@@ -49,7 +49,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     check_positive(response, name)
     runs, terms = columns.shape
     if runs <= terms:
-        raise MethodError(f"{name}: {counted(runs, 'run')} leave no residual beside {counted(terms, 'term')}; add runs")
+        raise MethodError(f"{name}: {counted(runs, 'run')} leave no residual for {counted(terms, 'term')}; add runs")
     if np.ptp(response) == 0.0:
         raise MethodError(f"{name}: all values are equal, so no transform can be judged; leave it out")
     log_likelihood = _log_likelihood(columns, response)

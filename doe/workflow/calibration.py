@@ -45,7 +45,7 @@ from rbdyn.scene.unknown import Input, put, value_of
 
 
 class Question(NamedTuple):
-    """A scene with what is not known of it, the inputs that are ``sought``, a rig's table, and notes."""
+    """A scene with its unknown inputs, the inputs that are ``sought``, a rig's table, and notes."""
 
     case: Case
     sought: list[Input]
@@ -54,7 +54,7 @@ class Question(NamedTuple):
 
 
 def question_of(question: Question) -> str:
-    """What tells one question from another: its scene, its rig, what is sought, and the code that answers it."""
+    """What distinguishes one question from another: its scene, its rig, what is sought, and the code that answers it."""
     case, sought, rig, _ = question
     sought_of = [[each.key, each.law.model_dump(mode="json")] for each in sought]
     declared = [case.uncertain.model_dump(mode="json"), case.scene.calibrate.model_dump(mode="json")]
@@ -114,7 +114,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {each.key for each in case.every}
     )
-    refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
+    refuse([] if sought else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
     if case.scene.calibrate.discrepancy == "none":
         exact = "discrepancy = none: the simulation is taken as exact"
         notes.append(f"{exact}; where it is not, intervals are far too narrow")
@@ -124,7 +124,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    # What is wrong at one condition alone is told once.
+    # What is wrong at one condition alone is reported once.
     refuse(dict.fromkeys(fault for each in cases_of(case, rig) for fault in impossible(each)))
     return Question(case, sought, rig, tuple(notes))
 
@@ -149,7 +149,7 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
 
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
-# Rows of the posterior sample, and input sets that tell what was likely before.
+# Rows of the posterior sample, and input sets that show what was likely before.
 SAMPLE, BEFORE = 1000, 2000
 
 
@@ -355,18 +355,18 @@ def _judged(given: Calibration) -> Calibration:
     judgement = judge(found, [quantity(name)[0] for name in given.rig.outputs], seed)
     quantiles = found.quantiles(points)
     prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
-    taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
-    against = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
+    gained = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
+    against = objections(judgement, anything=gained.anything, emulated=found.misfit < MISSED)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
     crowds = "the posterior crowds at an end of its range, which may be too narrow"
-    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in taught.narrow)
-    whole = replace(given, after=after, learnt=taught, judgement=judgement, objections=tuple(against), notes=notes)
+    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in gained.narrow)
+    whole = replace(given, after=after, learnt=gained, judgement=judgement, objections=tuple(against), notes=notes)
     return replace(whole, without=_without(whole))
 
 
 def _without(given: Calibration) -> dict[str, float] | None:
-    """Contraction by key without the cells that the others predict badly; None where there are none that teach."""
+    """Contraction by key without the cells that the others predict badly; None where there are no training cells."""
     found = given.found
     assert given.judgement is not None
     left = np.setdiff1d(found.measured.learnt, given.outliers())

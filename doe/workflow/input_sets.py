@@ -116,7 +116,7 @@ def _words(key: str, text: str) -> str:
         return "is empty; fill it in or remove the row"
     if len(text) > LONGEST_NUMBER:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter value"
-    return f"is no value of that key; rbdyn keys {key} tells which are"
+    return f"is no value of that key; rbdyn keys {key} lists which are"
 
 
 def _adapter(key: str) -> TypeAdapter[Any]:
@@ -193,7 +193,7 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the
+    """A scene file with its unknown inputs: ``every`` input, ``outputs`` that are looked at, by key what stands in the
     rows of a posterior ``sample``, what is to be doubted of that, in a sentence, ``remarks`` on keys that do not vary, and the file that declares all this as ``home``."""
 
     source: str
@@ -284,7 +284,7 @@ def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
-    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+    """A scene file with its unknown inputs. Raises InputError, also where all is known."""
     case = case_of(str(path), tables_of(path, overrides), outputs)
     check_overrides(overrides, case.every)
     return case
@@ -293,9 +293,9 @@ def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> C
 def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
     """Raises InputError for overrides of a scene that no run has: of inputs, unless their laws multiply them, and of keys
     ``fixed`` as something else."""
-    mend = "take one of them out, or multiply the value by times"
+    fix = "take one of them out, or multiply the value by times"
     claims = {
-        each.key: f"the {each.law.law} law of this unknown input replaces it; {mend}"
+        each.key: f"the {each.law.law} law of this unknown input replaces it; {fix}"
         for each in inputs
         if each.law.times != each.key
     }
@@ -336,7 +336,7 @@ def case_of(
     fixed: Mapping[str, str] = NOTHING,
     stated_in: Path | None = None,
 ) -> Case:
-    """Tables of a scene with what is not known of it.
+    """Tables of a scene with its unknown inputs.
 
     ``declared`` counts instead of the scene's own, with paths from the folder of the file that it is ``stated_in``; keys
     ``fixed`` vary otherwise, each as what it says. Raises InputError, also where all is known.
@@ -401,7 +401,7 @@ def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]
 
 
 def _doubt(sample: Path) -> str:
-    """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
+    """What the record next to a posterior sample says of its calibration, unless that succeeded; empty without a record."""
     try:
         record = read_json(sample.with_suffix(".json"))
         verdict, same = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())

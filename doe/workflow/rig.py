@@ -69,11 +69,11 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
         # Each sample counts for the time to the next one.
         moments = np.column_stack([rest[0][:-1] * np.diff(time), np.diff(time)])
     if len(moments) < FEWEST_SAMPLES:
-        few = f"{counted(len(moments), 'turn')} or samples; {FEWEST_SAMPLES} at least tell an error, measure longer"
-        raise InputError([f"{path}: {few}"])
+        turns = counted(len(moments), "turn")
+        raise InputError([f"{path}: {turns} or samples are too few for an error; measure at least {FEWEST_SAMPLES}"])
     mean = estimate([moments], lambda sums: sums[..., 0] / sums[..., 1])
     if not mean.value > 0.0 or not mean.half_width:
-        raise InputError([f"{path}: no cage speed above nothing that varies; check the signal"])
+        raise InputError([f"{path}: no positive, varying cage speed; check the signal"])
     return Mean(mean.value, mean.half_width / 1.96, note)
 
 
@@ -156,7 +156,7 @@ FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Any unit in use; pulses of the finest encoders.
 MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
-# Rows that teach; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
+# Training rows; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 
 
@@ -197,9 +197,9 @@ def read_rig(path: Path) -> Rig:
         raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
     cells, faults = _cells(sheet, keys)
     faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
-    teaching = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
-    if teaching < FEWEST:
-        faults.append(f"{path}: {counted(teaching, 'row')} to learn from; give {FEWEST} at least that are not on hold")
+    training = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
+    if training < FEWEST:
+        faults.append(f"{path}: only {counted(training, 'row')} not on hold; at least {FEWEST} are needed")
     refuse(faults)
     rows, notes = [], []
     for place in range(len(sheet.rows)):
@@ -272,7 +272,7 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
     if name.endswith(SD):
         return f"column {listed([name])}: no output {listed([name.removesuffix(SD)])} is measured here; add it or remove this"
     if name == "cage_slip":
-        return "column cage_slip: may be nothing or less; give cage_speed_rpm, which tells the same"
+        return "column cage_slip: may be nothing or less; give cage_speed_rpm, which means the same"
     return (
         f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD}, "
         f"{TURNS} nor {HOLD}; rename or remove it"
@@ -345,6 +345,6 @@ def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | 
 
 
 def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
-    """Frequencies [Hz] of the row's shaft and cage, as far as it tells them."""
+    """Frequencies [Hz] of the row's shaft and cage, as far as it shows them."""
     speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
     return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)

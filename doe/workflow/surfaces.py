@@ -144,7 +144,7 @@ def reference_runs(study: Study) -> Runs | None:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
         if not distance or min(distance) > 0.02:
             place = f"the design point {point.round(3).tolist()} (coded)"
-            raise InputError([f"{path}: no run left for {place}; mend the reference"])
+            raise InputError([f"{path}: no run left for {place}; fix the reference"])
         order.append(left.pop(int(np.argmin(distance))))
     return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])
 

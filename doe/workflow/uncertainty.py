@@ -1,4 +1,4 @@
-"""What is not known of a scene and what it does to its outputs: ``doe uncertainty``."""
+"""Unknown inputs of a scene and what they do to its outputs: ``doe uncertainty``."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

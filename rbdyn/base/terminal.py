@@ -29,7 +29,7 @@ from rbdyn.result import read_json, write_json
 
 # Ends that are looked back on: what a run takes may change on the way.
 LOOK_BACK = 256
-# A first report that comes within this time [s] tells of runs that were there before.
+# A first report that comes within this time [s] counts runs that were there before.
 AT_ONCE_S = 0.2
 
 
@@ -151,7 +151,7 @@ def hand_over(
 
 @contextmanager
 def keeping(path: Path | None) -> Iterator[None]:
-    """Let Ctrl-C tell that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
+    """Let Ctrl-C say that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
     try:
         yield
     except KeyboardInterrupt:

@@ -239,7 +239,7 @@ SWEPT = {
     "clearance": (over_clearance, "um", 1e-6),
     "wear": (over_wear, "um", 1e-6),
 }
-# What its record tells of a point, by column of the table.
+# What its record holds of a point, by column of the table.
 SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
 # Bearings of a lot that are solved in full to size the limits of race errors.
 SOLVED = 100
@@ -255,7 +255,7 @@ def runout_record(scene: BallScene) -> tuple[dict[str, Any], Followed]:
 
 def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
     """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; and the points
-    as a sweep tells them. Raises InputError for a double-decker, or where the sweep is refused.
+    as a sweep shows them. Raises InputError for a double-decker, or where the sweep is refused.
     """
     run, unit, si = SWEPT[swept]
     try:

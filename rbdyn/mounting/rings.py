@@ -35,7 +35,7 @@ class Ring:
     def __post_init__(self) -> None:
         if not 0.0 <= self.inner_radius < self.outer_radius:
             what = f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall"
-            raise MethodError(f"{what}; mend its diameters")
+            raise MethodError(f"{what}; fix its diameters")
 
     def pressure_growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
         """Growth at ``radius`` [m] under pressures on bore and outside [Pa] (Lamé)."""

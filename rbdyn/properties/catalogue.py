@@ -10,7 +10,7 @@ compared with what is known; its error stands with it, and with the bearing that
 Cylindrical rollers, over the 46 sizes of ``cylindrical_rollers.csv`` that list both raceways (d, D: bore, outside diameter):
 rollers fill half of what is between the raceways, D_w = 0.547 (D - d)/2; they stand 1.22 D_w apart (18 in a NU 215, as
 published); their effective length gives C0 by ISO 76, 44 (1 - D_w/d_m) Z L D_w. C by ISO 281 is then 1.00 of the classic
-ratings and 0.87 of those that a maker raised by 15 % for cleaner steel; it cannot tell Z, which one more moves by 0.2 %.
+ratings and 0.87 of those that a maker raised by 15 % for cleaner steel; it cannot identify Z, which one more moves by 0.2 %.
 
 Balls: read from the orders of the Timken catalogue's table A-9 (series 60, 62 and 63, 21 sizes: Z = BPFO + BPFI, and D_w/d_m
 from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO 281 and ISO 76).

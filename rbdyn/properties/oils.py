@@ -2,7 +2,7 @@
 
 Viscosity: ASTM D341 (Walther) through two points, the second from the viscosity index by ASTM D2270 where a grade gives
 one. Pressure coefficient: Gold et al. 2001, alpha = s nu^t. What a base oil has by default is an estimate; ``BaseOil``
-tells how far off it may be.
+shows how far off it may be.
 """
 
 import functools
@@ -16,13 +16,13 @@ from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
 
 # ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 % of it.
 GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460)
-# Of all pressure coefficients of ``BaseOil`` beside those measured at 40 to 100 C [-].
+# Of all pressure coefficients of ``BaseOil`` next to those measured at 40 to 100 C [-].
 GOLD_SPREAD = 0.25
 DENSITY_C = 15.0  # of data sheets
 
 
 class BaseOil(NamedTuple):
-    """What an oil has by its base where its grade or data sheet does not tell.
+    """What an oil has by its base where its grade or data sheet does not give it.
 
     ``gold``: s [1e-8/Pa] and t of alpha = s nu^t, nu [mm^2/s] at temperature, within 25 % (31 % for naphthenic oils).
     ``density`` at 15 C [kg/m^3], within 3 %; it falls by ``expansion`` a kelvin, within 20 % of that. ``conductivity`` [W/(m K)], within
@@ -148,7 +148,7 @@ def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
 
 
 class NamedOil(NamedTuple):
-    """An oil as it is asked for: what the scene calls it, its base oil if told, and whether it is the oil of a grease."""
+    """An oil as it is asked for: what the scene calls it, its base oil if given, and whether it is the oil of a grease."""
 
     oil: str
     base_oil: str | None = None

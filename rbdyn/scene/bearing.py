@@ -146,12 +146,12 @@ class Bearing(Consistent):
             yield f"{what} on a pitch circle of {self.pitch_diameter_mm:g} mm; make the roller smaller"
         if self.effective_length_mm > self.roller_length_mm:
             why = f"contact longer than the roller of {self.roller_length_mm:g} mm"
-            mend = "shorten it or lengthen bearing.roller_length_mm"
-            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {mend}"
+            fix = "shorten it or lengthen bearing.roller_length_mm"
+            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {fix}"
         if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
             why = f"out of proportion to a roller of {self.roller_diameter_mm:g} mm"
-            mend = "give millimetres, below a tenth of the roller"
-            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {mend}"
+            fix = "give millimetres, below a tenth of the roller"
+            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {fix}"
         yield from self._profile_faults()
         yield from self._form_faults()
 
@@ -169,7 +169,7 @@ class Bearing(Consistent):
             yield f"{what} needs a radius above {half:g} mm, commonly metres; enlarge it"
         points = self.profile_table_mm_um or []
         if any(len(point) != 2 for point in points):
-            yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
+            yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; fix the list"
             return
         if any(b[0] <= a[0] for a, b in pairwise(points)):
             yield "bearing.profile_table_mm_um: positions must rise from point to point; sort them"

@@ -157,7 +157,7 @@ class Numerics(Consistent):
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     """Longest run that extend makes, as a multiple of the turns asked for."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
-    """Runs of the same scene from different starts; they tell the statistical error."""
+    """Runs of the same scene from different starts; they show the statistical error."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all random starts and spreads: equal scenes of equal seed and version give equal bits."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20

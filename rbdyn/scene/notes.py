@@ -41,7 +41,7 @@ def unit_notes(
     cage_material: Material,
     bar_stiffness: float | str,
 ) -> tuple[str, ...]:
-    """One sentence a suspicious value; ``cage_material``: its density tells a cage that fills half the rollers' height, its
+    """One sentence a suspicious value; ``cage_material``: its density shows a cage that fills half the rollers' height, its
     modulus how stiff a bar may be; ``bar_stiffness`` [N/m] or "rigid".
     """
     usual = [*_of_cage(bearing, cage, cage_material, bar_stiffness), *_of_section(bearing, cage)]

@@ -61,7 +61,7 @@ class Operation(Consistent):
     unbalance_g_mm: NonNegative = 0.0
     """Unbalance of the shaft; its force grows with the square of the speed."""
     gravity_m_s2: NonNegative = 0.0
-    """Acceleration of gravity; off unless given, for beside centrifugal forces weight is small. 9.81 where it counts.
+    """Acceleration of gravity; off unless given, for weight is small compared with centrifugal forces. 9.81 where it counts.
     """
     gravity_direction_deg: float = 0.0
     """Direction of gravity, from that of the load."""
