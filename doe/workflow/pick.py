@@ -88,7 +88,7 @@ def searched_pick(
         if not (violations <= 0.0).all(axis=1).any():
             violations = goals.violations(front.values - below, front.values + above)
         baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
-        after = ", by what its tolerances leave of it"
+        after = ", at the ends of its tolerances"
     rounded = [rounded_within(study, point) for point in front.points]
     fresh = np.array([not any(np.array_equal(point, each.point) for each in simulated) for point in rounded])
     rows = np.flatnonzero(fresh) if fresh.any() else np.arange(len(front.points))
