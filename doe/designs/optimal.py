@@ -71,8 +71,9 @@ def optimal(
             few = f"too few for a model of {model}"
         raise MethodError(f"runs = {runs}: {few}; give at least {least}")
     if runs > MOST_RUNS:
-        fix = "give fewer, or kind = 'sobol'"
-        raise MethodError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {fix}")
+        raise MethodError(
+            f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; give fewer, or kind = 'sobol'"
+        )
     reach = max(1.0, float(np.abs(old).max(initial=0.0)))
     blocks = np.concatenate([groups, np.full(centre_replicates + runs, new)])
     contrasts = block_contrasts(blocks)

@@ -143,9 +143,10 @@ class Function:
         at = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
         what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
-        where = f"is {values[lost[0]]:g} at {at or 'any size'}{share}, which gives no finite closing link"
-        fix = "give it a value there, as max(x, 0) does, or keep the links it uses away from it"
-        return NoValueError(f'link "{link.name}": {what}: {where}; {fix}')
+        return NoValueError(
+            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no '
+            "finite closing link; give it a value there, as max(x, 0) does, or keep the links it uses away from it"
+        )
 
 
 @dataclass(frozen=True)

@@ -118,8 +118,10 @@ def _say_normality(p: float | str | None, alpha: float) -> str:
         return ""
     if p > alpha:
         return f"the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
-    rough = "p values and intervals are rough; look for an outlier, a missing term or a transform"
-    return f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): {rough}."
+    return (
+        f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): p values and intervals are rough; look for an "
+        "outlier, a missing term or a transform."
+    )
 
 
 def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> str:

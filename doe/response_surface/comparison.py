@@ -126,8 +126,10 @@ def _left_out(
             predicted.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
-        few = f"only {counted(count, 'point')} can be left out of the polynomial, too few to compare"
-        raise MethodError(f"{name}: {few}; add design points or choose a simpler model")
+        raise MethodError(
+            f"{name}: only {counted(count, 'point')} can be left out of the polynomial, too few to compare; add "
+            "design points or choose a simpler model"
+        )
     return np.concatenate(truths), np.vstack(predicted)
 
 

@@ -85,13 +85,15 @@ def compare(
 
 def describe_known_variance(known: KnownVariance, alpha: float) -> list[str]:
     """The comparison in sentences."""
-    against = f"against the known variance of the replicates chi-square is {known.chi_square:.4g} on {known.df}"
     verdict = "too few replicates a run to say more)"
     if known.p is not None:
         verdict = f"{p_text(known.p)}), the surface misses {'no ' if known.p > alpha else ''}more than that explains"
     share = math.sqrt(known.mean_square_ratio)
-    size = f"standard errors here come from the residual and are {share:.3g} times those of the known variance alone"
-    sentences = [f"{against} degrees of freedom ({verdict}; {size}."]
+    sentences = [
+        f"against the known variance of the replicates chi-square is {known.chi_square:.4g} on {known.df} degrees of "
+        f"freedom ({verdict}; standard errors here come from the residual and are {share:.3g} times those of the "
+        "known variance alone."
+    ]
     f, p = known.pure_error_ratio, known.pure_error_p
     if f is None or p is None:
         return sentences

@@ -343,10 +343,12 @@ def _terms(surface: Surface) -> str:
 def _lack_of_fit(surface: Surface) -> str:
     p = surface.lack_of_fit["p"]
     if p is not None and p <= ALPHA:
-        why = f"lack of fit is significant ({p_text(p)})"
-        what = f"{why}: the surface misses more than the scatter of replicates explains"
-        fix = "enlarge the model, transform the response or narrow the region, and confirm predictions by runs"
-        return f"{what}; {fix}."
+        what = (
+            f"lack of fit is significant ({p_text(p)}): the surface misses more than the scatter of replicates explains"
+        )
+        return (
+            f"{what}; enlarge the model, transform the response or narrow the region, and confirm predictions by runs."
+        )
     if p is not None:
         what = "what the surface misses is within the scatter of replicates"
         return f"lack of fit is not significant ({p_text(p)}): {what}."
@@ -360,8 +362,10 @@ def _lack_of_fit(surface: Surface) -> str:
 def _model_error(surface: Surface) -> str:
     if (error := surface.model_error) is None:
         return ""
-    size = f"a standard deviation of {error.variance**0.5:.3g} shown by {error.source} ({error.dof} degrees of freedom)"
-    return f"the 95 % intervals of its mean join the error of the coefficients with what the model misses, {size}."
+    return (
+        "the 95 % intervals of its mean join the error of the coefficients with what the model misses, a standard "
+        f"deviation of {error.variance**0.5:.3g} shown by {error.source} ({error.dof} degrees of freedom)."
+    )
 
 
 def _removed(surface: Surface) -> str:
@@ -388,13 +392,17 @@ def _summary(surface: Surface) -> str:
     if precision is not None and precision < DISCERNIBLE:
         tail = f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: the scatter hides the surface."
     if adjusted - predicted > FAR_APART:
-        worse = f"differ by more than {FAR_APART:g}: the surface predicts new runs worse than it fits its own"
-        return f"{figures} {worse}; look for influential runs or drop terms.{tail}"
+        return (
+            f"{figures} differ by more than {FAR_APART:g}: the surface predicts new runs worse than it fits its own; "
+            f"look for influential runs or drop terms.{tail}"
+        )
     return f"{figures} agree.{tail}"
 
 
 def _transform(surface: Surface) -> str:
     if surface.transform is not None:
-        scale = "the analysis is on that scale, predictions are medians in the unit of the response"
-        return f"fitted as Box-Cox transform with exponent {surface.transform:.3g}; {scale}."
+        return (
+            f"fitted as Box-Cox transform with exponent {surface.transform:.3g}; the analysis is on that scale, "
+            "predictions are medians in the unit of the response."
+        )
     return "" if surface.box_cox is None else str(surface.box_cox["sentence"])

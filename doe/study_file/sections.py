@@ -39,8 +39,10 @@ class Factor(Consistent):
         if self.step < FINEST * abs(self.centre):
             yield f"step = {self.step:g}: is lost in rounding next to centre = {self.centre:g}; widen it"
         if self.resolution is not None and self.resolution < FINEST * self.step:
-            steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
-            yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
+            yield (
+                f"resolution = {self.resolution:g}: makes more than {1.0 / FINEST:g} steps of step = {self.step:g}; "
+                "coarsen it"
+            )
         if self.whole and self.resolution is not None:
             yield f"resolution = {self.resolution:g}: whole = true has none but 1; leave it out"
         if self.whole and self.tolerance is not None:
@@ -140,8 +142,11 @@ class Design(Consistent):
 
     def faults(self) -> Iterator[str]:
         alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
-        fix = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
-        yield from (f"{key}: {fix}" for key in type(self).model_fields if key in alien)
+        yield from (
+            f"{key}: kind = {self.kind!r} has no such key; remove it or choose another kind"
+            for key in type(self).model_fields
+            if key in alien
+        )
         if self.kind in ("d_optimal", "i_optimal") and "runs" not in self.model_fields_set:
             yield f"runs: missing; kind = {self.kind!r} needs the number of runs to make"
         if self.cube_blocks > 1 and not self.blocks:
@@ -296,8 +301,9 @@ def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float
     """
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
-        why = f"missing, and no tolerance of {chain.factor} is known; add it"
-        raise InputError([f"chain {chain.name}: half_width_mm: {why}"])
+        raise InputError(
+            [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
+        )
     limits = {"lower_mm": value - half, "upper_mm": value + half}
     if chain.file is not None:
         named = _of_file(chain.name, folder / chain.file)

@@ -222,8 +222,12 @@ class Study:
     def scene(self) -> SceneFile:
         """Scene of the runs. Raises InputError for a study that has none."""
         if self.file.scene is None:
-            fix = "add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
-            raise InputError([f"{self.path}: scene: missing; {fix}"])
+            raise InputError(
+                [
+                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data "
+                    "TABLE.csv"
+                ]
+            )
         return self.file.scene
 
     @property

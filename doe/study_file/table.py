@@ -238,10 +238,14 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         faults += bad
     refuse(faults)
     if "run" in columns and len(set(columns["run"].tolist())) < len(sheet.rows):
-        twice = (
-            "rows of one run are its replicates, whose scatter gives it; remove the column, or number the runs apart"
+        refuse(
+            (
+                f"{path}: column {name}: rows of one run are its replicates, whose scatter gives it; remove the column, "
+                "or number the runs apart"
+            )
+            for name in (*errors, COUNT)
+            if name in columns
         )
-        refuse(f"{path}: column {name}: {twice}" for name in (*errors, COUNT) if name in columns)
         columns = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
     if size > MOST_RUNS:

@@ -101,13 +101,19 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
     case = case_of(str(path), tables, rig.outputs, declared, fixed)
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
-    varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
     check_overrides(overrides, sought, fixed)
     notes = [
         *rig.notes,
         *case.remarks,
         *overriding(case, overrides),
-        *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies"),
+        *(
+            (
+                f"{each.key} varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the "
+                "key that it multiplies"
+            )
+            for each in case.every
+            if each.law.kind == "varies"
+        ),
     ]
     refuse(
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
@@ -116,8 +122,9 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     )
     refuse([] if sought else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
     if case.scene.calibrate.discrepancy == "none":
-        exact = "discrepancy = none: the simulation is taken as exact"
-        notes.append(f"{exact}; where it is not, intervals are far too narrow")
+        notes.append(
+            "discrepancy = none: the simulation is taken as exact; where it is not, intervals are far too narrow"
+        )
     else:
         refuse(
             f"{path}: calibrate.discrepancy: {name} is not measured; known are {', '.join(rig.outputs)}"
@@ -185,8 +192,16 @@ class Calibration:
         """Why inputs may not be called calibrated."""
         cells = [self.cells[place] for place in self.found.refuted]
         told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
-        refuted = "refuted: no input set within the laws gives what was measured within the allowed discrepancy"
-        return [*([f"{refuted}: {told}"] if cells else []), *self.objections]
+        return [
+            *(
+                [
+                    f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
+                ]
+                if cells
+                else []
+            ),
+            *self.objections,
+        ]
 
     @property
     def quantiles(self) -> Array:
@@ -261,8 +276,9 @@ class _Rows:
         outputs, variances, freedom = scattered(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
-            why = "is nothing in a simulation, so no share of it can be compared"
-            raise RunError(f"{name}: {why}; leave its column out")
+            raise RunError(
+                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
+            )
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
         return (
@@ -359,8 +375,13 @@ def _judged(given: Calibration) -> Calibration:
     against = objections(judgement, anything=gained.anything, emulated=found.misfit < MISSED)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
-    crowds = "the posterior crowds at an end of its range, which may be too narrow"
-    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in gained.narrow)
+    notes = (
+        *given.notes,
+        *(
+            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
+            for place in gained.narrow
+        ),
+    )
     whole = replace(given, after=after, learnt=gained, judgement=judgement, objections=tuple(against), notes=notes)
     return replace(whole, without=_without(whole))
 

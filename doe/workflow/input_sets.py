@@ -293,9 +293,11 @@ def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> C
 def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
     """Raises InputError for overrides of a scene that no run has: of inputs, unless their laws multiply them, and of keys
     ``fixed`` as something else."""
-    fix = "take one of them out, or multiply the value by times"
     claims = {
-        each.key: f"the {each.law.law} law of this unknown input replaces it; {fix}"
+        each.key: (
+            f"the {each.law.law} law of this unknown input replaces it; take one of them out, or multiply the value "
+            "by times"
+        )
         for each in inputs
         if each.law.times != each.key
     }
@@ -318,8 +320,14 @@ def run_notes(case: Case, overrides: Sequence[str], by: str, runs: str = "") -> 
     given = {key_path(each): each for each in case.uncertain.set}
     clashing = _clashing(case, overrides)
     what = f"changes {runs}, not the input sets" if runs else "changes no run"
-    why = f"uncertain.set gives {'these' if runs else 'all of them'} {', '.join(given[key_path(each)] for each in clashing)}"
-    return [f"{by}{', '.join(clashing)} {what}: {why}"] if clashing else []
+    return (
+        [
+            f"{by}{', '.join(clashing)} {what}: uncertain.set gives {'these' if runs else 'all of them'} "
+            f"{', '.join(given[key_path(each)] for each in clashing)}"
+        ]
+        if clashing
+        else []
+    )
 
 
 def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
@@ -353,8 +361,12 @@ def case_of(
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
     every = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
     if not every:
-        fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
-        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
+        raise InputError(
+            [
+                f'{home}: uncertain: nothing is unknown; name keys as "table.key" = {{law = ...}} or leave out '
+                "defaults = 'none'"
+            ]
+        )
     keys = {each.key for each in every}
     by_set = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, columns) if each.key not in keys]
     idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
@@ -541,8 +553,10 @@ def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: S
     """Raises RunError where too many input sets are lost."""
     if lost > HOLES * sets:
         why = sentence(failures) if failures else impossible[0]
-        many = f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %"
-        raise RunError(f"{many}: {why}; narrow the laws of the inputs")
+        raise RunError(
+            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the "
+            "laws of the inputs"
+        )
 
 
 def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:

@@ -91,8 +91,9 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | Non
     quiet = np.zeros(1) if still is None else _filtered(still, cutoff, notches, STILL_PERIODS)[0]
     noise = float((quiet**2).mean()) / 2.0
     if 2.0 * noise > LOUDEST * float((speed**2).mean()):
-        loud = f"has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}"
-        raise InputError([f"{still}: {loud}; lower cutoff_hz"])
+        raise InputError(
+            [f"{still}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"]
+        )
     nearly = np.maximum(speed, np.sqrt(noise))
     mean = speed - noise / (2.0 * nearly) if noise else speed
     moments = np.stack([np.ones_like(speed), mean, speed**2 - 2.0 * noise])
@@ -119,8 +120,12 @@ def _filtered(path: Path, cutoff: float, notches: Sequence[float], fewest: int) 
         raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
     rate = 1.0 / interval
     if rate * (1.0 + 1e-6) < SAMPLES_A_PERIOD * cutoff:
-        few = f"{rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = {cutoff:g}"
-        raise InputError([f"{path}: {few}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"])
+        raise InputError(
+            [
+                f"{path}: {rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = "
+                f"{cutoff:g}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"
+            ]
+        )
     periods = len(time) * cutoff / rate
     if periods < fewest:
         raise InputError(
@@ -260,8 +265,9 @@ def _named(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if not outputs:
         faults.append(f"{sheet.path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:
-        fix = "add a column of a scene key such as operation.inner_speed_rpm"
-        faults.append(f"{sheet.path}: no operating condition; {fix}")
+        faults.append(
+            f"{sheet.path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm"
+        )
     if CUTOFF in sheet:
         faults += [f"{sheet.path}: column {key}: {CUTOFF} sets that key; remove one" for key in FILTER if key in sheet]
     refuse(faults)
@@ -309,8 +315,9 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
             yield cells.fault(name, place, "belongs to nothing in this row; leave it out, or add what it belongs to")
     for name in measured:
         if not (cells.states(name + SD, place) or cells.states(TURNS, place)):
-            fix = f"give it, or {TURNS} for the scatter of a run of so many shaft turns"
-            yield cells.fault(name + SD, place, f"is missing; {fix}")
+            yield cells.fault(
+                name + SD, place, f"is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
+            )
     if signal in measured:
         yield cells.fault(str(signal), place, f"comes from {FILE} too; leave out one")
     if kind == ORBIT and not cells.states(CUTOFF, place):

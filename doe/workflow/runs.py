@@ -159,8 +159,12 @@ def check_given(study: Study, folder: Path) -> None:
     """Raises InputError where the runs that are given stand in the table that the study writes into its folder."""
     name = study.file.design.augment
     if name is not None and study.beside(name).resolve() == (folder / RUNS_TABLE).resolve():
-        why = "the study writes its own runs there; copy it next to the study and name the copy"
-        raise InputError([f"{study.path}: design.augment = {name!r}: {why}"])
+        raise InputError(
+            [
+                f"{study.path}: design.augment = {name!r}: the study writes its own runs there; copy it next to the "
+                "study and name the copy"
+            ]
+        )
 
 
 def check_runs(study: Study, design: Design) -> None:
@@ -280,13 +284,20 @@ def tolerances_of(study: Study) -> Array:
     one that is missing or too wide."""
     known = dict.fromkeys(compress(study.factors, rigid(study)), 0.0) | known_tolerances(study)
     where = f"{study.path}: factor.tolerance of"
-    needs = "the tolerance-aware front needs the half width that manufacture keeps"
-    fix = "here or as half_width_mm of a chain that closes on this factor"
-    faults = [f"{where} {name}: missing; {needs}, {fix}" for name in study.factors if name not in known]
+    faults = [
+        (
+            f"{where} {name}: missing; the tolerance-aware front needs the half width that manufacture keeps, here or as "
+            "half_width_mm of a chain that closes on this factor"
+        )
+        for name in study.factors
+        if name not in known
+    ]
     for name, limit in zip(study.factors, region_of(study) * study.step, strict=True):
         if known.get(name, 0.0) >= limit:
-            why = f"leaves no room in the region, which reaches {limit:g} to either side of the centre"
-            faults.append(f"{where} {name} = {known[name]:g}: {why}; narrow it or widen the design")
+            faults.append(
+                f"{where} {name} = {known[name]:g}: leaves no room in the region, which reaches {limit:g} to either "
+                "side of the centre; narrow it or widen the design"
+            )
     refuse(faults)
     return np.array([known[name] for name in study.factors]) / study.step
 
@@ -378,8 +389,10 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     # One a term, one a block beyond the first, one to judge the fit.
     needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
     if failures and len(left) < needed:
-        few = f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}"
-        raise RunError(f"{few}: {sentence(failures)}")
+        raise RunError(
+            f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
+            f"{sentence(failures)}"
+        )
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _each_once((note for result in sound for note in result.notes), len(sound))
     if failures:

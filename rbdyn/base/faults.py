@@ -119,8 +119,9 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except UnicodeDecodeError as error:
         line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        sentence = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
-        raise InputError([f"{sentence}; save the file as UTF-8"]) from None
+        raise InputError(
+            [f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8); save the file as UTF-8"]
+        ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None

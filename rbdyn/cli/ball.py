@@ -112,9 +112,10 @@ def _row_sentences(row: RowReport) -> list[str]:
         film = ""
         if "central_film_um" in contact:
             film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
-        ellipse = f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} µm"
-        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
-        sentences.append(f"{race} race: {pressed} over {ellipse}{film}")
+        sentences.append(
+            f"{race} race: up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa over "
+            f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} µm{film}"
+        )
     life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
@@ -143,15 +144,18 @@ def _fits(fits: dict[str, Any]) -> str:
     loosens = fits["inner_ring_loosens_rpm"]
     state = "loose" if fits["inner_ring_loose"] else "tight"
     when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
-    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
-    return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
+    return (
+        f"fits: {fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the "
+        f"housing; the inner ring is {state}, rotation loosens it {when}"
+    )
 
 
 def _runout(runout: dict[str, Any]) -> str:
-    radial = f"{runout['indicator_um']:.3g} µm by an indicator, {runout['minimum_zone_um']:.3g} µm between circles"
-    axial = f"axial {runout['axial_um']:.3g} µm, face {runout['face_um']:.3g} µm"
-    asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} µm"
-    return f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}"
+    return (
+        f"runout over {counted(runout['turns'], 'turn')}: radial {runout['indicator_um']:.3g} µm by an indicator, "
+        f"{runout['minimum_zone_um']:.3g} µm between circles, axial {runout['axial_um']:.3g} µm, face "
+        f"{runout['face_um']:.3g} µm; asynchronous {runout['asynchronous_radial_um']:.3g} µm"
+    )
 
 
 # Points of a long table that are shown from its start, and from its end.
@@ -379,11 +383,12 @@ def _limits(record: dict[str, Any]) -> list[Block]:
     of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
     rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
     title = f"class {record['class']}: {record['radial_limit_um']:g} µm radial, {record['axial_limit_um']:g} µm axial runout"
-    good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
-    solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
     return [
         Table(title, ("race", "roundness up to [µm]", "side-sway up to [µm]"), rows),
-        Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
+        Paragraph(
+            f"yield {with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error) of "
+            f"{record['bearings']} bearings, {record['solved_in_full']} of them solved in full, seed {record['seed']}"
+        ),
     ]
 
 

@@ -172,9 +172,11 @@ def oil_named(text: str) -> NamedOil:
             return NamedOil(name)
     if re.fullmatch(r"(?:mobil )?jet (?:oil )?(?:ii|2)", plain, re.IGNORECASE):
         return NamedOil(next(iter(TURBINE_OILS)))
-    what = f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}"
-    why = f"with {', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II"
-    raise MethodError(f"{what}, {why}; own data go into [lubricant] as oil = 'data_sheet'")
+    raise MethodError(
+        f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}, with "
+        f"{', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II; own "
+        "data go into [lubricant] as oil = 'data_sheet'"
+    )
 
 
 # The maker's data sheet: 27.6 and 5.1 mm^2/s at 40 and 100 C, 1003.5 kg/m^3 at 15 C.

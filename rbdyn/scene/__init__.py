@@ -130,8 +130,10 @@ class Scene(SceneFile):
                     f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
                 )
         if self.traction.elasticity and self.numerics.method == "rosenbrock":
-            what = "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other"
-            yield f"{what}: the implicit method knows no traction coefficients as states; set the method to 'auto'"
+            yield (
+                "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other: the implicit "
+                "method knows no traction coefficients as states; set the method to 'auto'"
+            )
         touching = cage.pocket_contact_length_mm
         if touching is not None and touching > bearing.roller_length_mm:
             yield (
@@ -409,8 +411,12 @@ def scene_of(given: Scene | BallScene | Path | str) -> Scene | BallScene:
         return given
     if isinstance(given, str | PathLike):
         return Scene.load(Path(given))
-    what = f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file"
-    raise InputError([f"{what}; Scene.from_dict makes one of tables"])
+    raise InputError(
+        [
+            f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file; "
+            "Scene.from_dict makes one of tables"
+        ]
+    )
 
 
 def rollers_only(given: Scene | BallScene | Path | str) -> Scene:

@@ -199,5 +199,7 @@ class Numerics(Consistent):
         if self.whirl_notches_hz and self.whirl_cutoff_hz is None:
             yield "numerics.whirl_notches_hz: without numerics.whirl_cutoff_hz nothing is filtered; give that too"
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            room = f"memory for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
-            yield f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have {room}"
+            yield (
+                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory "
+                f"for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
+            )

@@ -91,8 +91,10 @@ class Lubricant(Consistent):
         alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
         given = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
         for key in (key for key in given if key in alien):
-            told = f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} sets that by itself"
-            yield f"{told}; leave it out or name another"
+            yield (
+                f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} sets that by itself; leave it out or "
+                "name another"
+            )
         for key in ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ():
             if key not in given:
                 yield f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it"
@@ -102,8 +104,10 @@ class Lubricant(Consistent):
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
-                what = f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature"
-                yield f"{what}, from -60 to {HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
+                yield (
+                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to "
+                    f"{HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
+                )
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -138,8 +142,10 @@ class Lubricant(Consistent):
             by_index = f" and its viscosity index of {index:g} (D2270)" if graded else ""
             parts.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
         if self.pressure_coefficient_1_GPa is None:
-            alpha = f"{1e9 * oil.pressure_coefficient:.3g} 1/GPa"
-            parts.append(f"pressure coefficient {alpha} by Gold, within {100.0 * GOLD_SPREAD:g} %")
+            parts.append(
+                f"pressure coefficient {1e9 * oil.pressure_coefficient:.3g} 1/GPa by Gold, within "
+                f"{100.0 * GOLD_SPREAD:g} %"
+            )
         if graded and self.density_kg_m3 is None:
             parts.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
         parts.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")

@@ -153,5 +153,9 @@ def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> tuple[str, .
         other.append(f"bearing.roller_length_mm = {bearing.roller_length_mm:g} (below {sizes.width:g}, the width)")
     if not other:
         return ()
-    what = f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(other)}"
-    return (f"{what}; correct the designation or these keys",)
+    return (
+        (
+            f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(other)}; "
+            "correct the designation or these keys"
+        ),
+    )
