@@ -80,7 +80,7 @@ def read_scene(study: Study) -> dict[str, Any]:
 
 
 def declares_unknowns(study: Study) -> bool:
-    """Whether the study or its scene declares what is not known; to name values as estimates alone is not to ask for it."""
+    """Whether the study or its scene declares unknown inputs; to name values as estimates alone is not to ask for it."""
     if study.file.uncertain is not None:
         return True
     return bool(set(read_scene(study).get("uncertain", {})) - {"estimated"})
@@ -106,7 +106,7 @@ def design_scenes(study: Study, points: Array, order: Sequence[int] | None = Non
     """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError, which names the point where a
     factor has a value that is impossible there.
 
-    ``order``: place of each run in the standard order, which sets its seed; as given unless told.
+    ``order``: place of each run in the standard order, which sets its seed; as given by default.
     """
     data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
@@ -252,7 +252,7 @@ def _in_threads(
         return ran
 
     def runs() -> Iterator[Callable[[], Ran]]:
-        # Compiled once here, lest every thread wait for the same compilation; faults are the run's to tell.
+        # Compiled once here, lest every thread wait for the same compilation; the run itself reports faults.
         with suppress(Exception):
             prepare(scenes[points[0].key], roller_bearing(scenes[points[0].key]))
         for left, point in zip(range(len(points), 0, -1), points, strict=True):

@@ -26,7 +26,7 @@ version_of = functools.cache(version)
 class Quantity(Record):
     """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
 
-    ``effective_samples``: how many independent batches would tell as much of it as the correlated ones of the run.
+    ``effective_samples``: how many independent batches would carry as much of it as the correlated ones of the run.
     ``degrees_of_freedom`` of Student's t in the statistical error; None without one.
     """
 
@@ -65,7 +65,7 @@ class Quantity(Record):
 
 
 class SavedRecord(Record):
-    """A record of which a file tells: ``FORMAT`` stands in it, and ``WHAT`` it is in messages."""
+    """A record that a file holds: ``FORMAT`` stands in it, and ``WHAT`` it is in messages."""
 
     FORMAT: ClassVar[str]
     WHAT: ClassVar[str]
@@ -98,7 +98,7 @@ class SimulationResult(Brief, SavedRecord):
     "pocket" the drawn, fit, temperature, rotation and operating share of each;
     ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's,
     None where the scene states no designation;
-    ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
+    ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not show it;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other; ``cage_orbit_radius_share``:
     root mean square distance of the cage's centre from its mean place over the cage's radial play, None where nothing guides it.

@@ -63,7 +63,7 @@ class Region(NamedTuple):
 
 
 def front_rows(emulators: Emulators, points: Array) -> tuple[Rows, Array]:
-    """Rows of points (n, k) whose foretold costs nothing allowed dominates, and all costs (n, q).
+    """Rows of points (n, k) whose predicted costs nothing allowed dominates, and all costs (n, q).
 
     Where no point is likely to keep all limits, of the points that come nearest.
     """
@@ -73,7 +73,7 @@ def front_rows(emulators: Emulators, points: Array) -> tuple[Rows, Array]:
 def candidates(
     emulators: Emulators, region: Region, random: np.random.Generator, avoid: Array, rounds: int = 1
 ) -> Array:
-    """Points (n, k) of the region, none a twin of those to ``avoid`` (a, k); the children of fronts foretold and of fronts
+    """Points (n, k) of the region, none a twin of those to ``avoid`` (a, k); the children of predicted fronts and of fronts
     drawn.
 
     ``rounds``: how often the children of each distance are made.
@@ -130,14 +130,14 @@ MOST_LEVELS = 1500  # of those
 DRAWS = 32  # fronts drawn
 WORTH = 0.25  # of an emulator's variance: as small the scatter of a run is to be
 NOTICED, SURE = 0.97, 1e-3  # changes of a deviation that are followed, and the least that is left of it
-BEYOND = 1.0  # of the range of a cost: as far below the best foretold a level may lie
+BEYOND = 1.0  # of the range of a cost: as far below the best predicted a level may lie
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
     """Levels (u, q) spread evenly over the box of costs from ``low`` to ``high`` (q,).
 
-    ``ideal`` and ``nadir`` (q,) of the front foretold are the scale of the hypervolume.
+    ``ideal`` and ``nadir`` (q,) of the predicted front are the scale of the hypervolume.
     """
 
     at: Array
@@ -158,7 +158,7 @@ class Levels:
 
 
 def levels_of(front: Array, hopes: Array, random: np.random.Generator) -> Levels:
-    """Levels from the best that is hoped for (q,) to the reference point of a front foretold (f, q)."""
+    """Levels from the best that is hoped for (q,) to the reference point of a predicted front (f, q)."""
     ideal, nadir = front.min(axis=0), front.max(axis=0)
     span = np.where(nadir > ideal, nadir - ideal, np.maximum(np.abs(ideal), 1e-12))
     high = ideal + REFERENCE * span
@@ -212,7 +212,7 @@ def batch(
     """Rows of ``candidates`` (n, k) that together are expected to gain most, one after the other, and their gains.
 
     ``left`` (u,) is the probability that a level is still to be gained. Candidates within ``apart`` (k,) of one taken are
-    its twins, and refused. Each is taken to turn out as foretold (Ginsbourger, Le Riche and Carraro's kriging believer). There are fewer rows than ``count`` where nothing else is left to gain.
+    its twins, and refused. Each is taken to turn out as predicted (Ginsbourger, Le Riche and Carraro's kriging believer). There are fewer rows than ``count`` where nothing else is left to gain.
     """
     if not len(candidates):
         return [], np.empty(0)
@@ -238,7 +238,7 @@ def batch(
         gains.append(share * float(expected[row]))
         left *= 1.0 - chance[row]
         free &= ~(np.abs(candidates - candidates[row]) <= apart).all(axis=1)
-        # What the run will tell of its neighbours: they are not other chances of the same luck.
+        # What the run will say about its neighbours: they are not other chances of the same luck.
         shared = emulators.covariance(candidates, candidates[row]) - np.einsum("rnm,rm->nm", learnt, learnt[:, row])
         new = shared / np.sqrt((1.0 + WORTH) * deviations[row] ** 2)
         learnt = np.concatenate([learnt, new[None]])

@@ -106,7 +106,7 @@ class Emulators:
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
-        """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
+        """Covariances (n, m) of the uncertainty of each response at points (n, k) and at one point (k,)."""
         told = zip(self.each, self._told(points), self._told(point[None]), strict=True)
         columns = [one.covariance(at, other)[:, 0] for one, at, other in told]
         return np.column_stack(columns) * self.stretch**2

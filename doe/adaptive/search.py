@@ -2,7 +2,7 @@
 beyond the border of its region, when it may stop, and what it gives.
 
 What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
-made afresh at the finalists and alone are reported, which had no part in their choice; what they tell helps to choose
+made afresh at the finalists and alone are reported, which had no part in their choice; what they show helps to choose
 the finalists that are left, but has no say in what was chosen.
 """
 
@@ -44,7 +44,7 @@ class Place(NamedTuple):
 
 
 def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator) -> list[Face]:
-    """The faces that the pick of the front foretold lies at."""
+    """Faces of the region at which the pick of the predicted front lies."""
     emulators, region, points, moves = place
     rows, costs = front_rows(emulators, points)
     pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
@@ -101,10 +101,10 @@ def _held(border: Border, region: Region, factor: int, side: int) -> str:
 class Batch:
     """State of the search after ``runs`` runs that went well, those of the design included.
 
-    ``hypervolume`` of the front foretold and its standard deviation over the functions drawn from the emulators; ``gained``
-    by the last batch (NaN before the first); ``left`` to be gained if all were known. All on the scale of the front foretold
+    ``hypervolume`` of the predicted front and its standard deviation over the functions drawn from the emulators; ``gained``
+    by the last batch (NaN before the first); ``left`` to be gained if all were known. All on the scale of the predicted front
     at that time; ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front. ``why``
-    the next batch was made: "improvement", or "check" of the front foretold; "" after the last.
+    the next batch was made: "improvement", or "check" of the predicted front; "" after the last.
     """
 
     runs: int
@@ -121,8 +121,8 @@ class AdaptiveFront:
     """A front found by emulators and confirmed by fresh runs.
 
     ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
-    whole front that the emulators foretell, of which the rows ``shown`` have the largest hypervolume, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
-    ``region`` that was searched in the end. ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that stand for the front foretold at each; ``searched`` (n,) are all runs of design and search, in factor units,
+    whole front that the emulators predict, of which the rows ``shown`` have the largest hypervolume, with its predicted responses ``predictions`` (a, m) and their ``deviations`` (a, m).
+    ``region`` that was searched in the end. ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that stand for the predicted front at each; ``searched`` (n,) are all runs of design and search, in factor units,
     ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
     and where to (coded); ``faces`` that the pick lies at in the end.
     ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
@@ -133,7 +133,7 @@ class AdaptiveFront:
     front: SimulatedFront
     archive: Array
     shown: Rows
-    foretold: Array
+    predictions: Array
     deviations: Array
     emulators: Emulators
     region: Region
@@ -173,8 +173,8 @@ def missed(emulators: Emulators, runs: Runs) -> np.ndarray:
     return np.asarray((runs.values - means) / np.sqrt(deviations**2 + own))
 
 
-def as_foretold(emulators: Emulators, runs: Runs) -> bool:
-    """Whether fresh runs lie within what the emulators foretell of them, all responses with a goal or a limit together."""
+def as_predicted(emulators: Emulators, runs: Runs) -> bool:
+    """Whether fresh runs lie within what the emulators predict of them, all responses with a goal or a limit together."""
     goals = emulators.goals
     columns = sorted({*goals.objectives.tolist(), *(index for index, _, _ in goals.limited)})
     off = missed(emulators, runs.rows(runs.good))[:, columns]
@@ -182,9 +182,9 @@ def as_foretold(emulators: Emulators, runs: Runs) -> bool:
 
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
-TESTED = 4  # last batches that tell how right the emulators' deviations are
+TESTED = 4  # last batches that show how right the emulators' deviations are
 ROUNDS = 3  # of candidates for a front that is reported
-SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels, by which its hypervolume is told
+SHOWN, FEW = 200, 2048  # points of a predicted front that are shown, and levels by which its hypervolume is computed
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,8 @@ class Plan:
         return round(FRESH * self.budget)
 
 
-# Tells of the state after a batch, and of how many runs are done of all.
-Tell = Callable[[Batch, int, int], None]
+# Reports the state after a batch, the runs that are done and those of the whole search.
+Watch = Callable[[Batch, int, int], None]
 
 
 @one_thread
@@ -223,7 +223,7 @@ def adaptive_front(
     goals: Goals,
     plan: Plan,
     baseline: Array,
-    tell: Tell = lambda state, done, total: None,
+    watch: Watch = lambda state, done, total: None,
     border: Border | None = None,
 ) -> AdaptiveFront:
     """Find the front; the same seed and the same runs give the same bits.
@@ -238,7 +238,7 @@ def adaptive_front(
     widest = border or region
     shares = shares_of(centre, step, widest.low, widest.high)
     why = ["design"] * len(design.points)
-    search = _Search(evaluate, centre, step, region, goals, plan, design, tell, border, shares, why=why)
+    search = _Search(evaluate, centre, step, region, goals, plan, design, watch, border, shares, why=why)
     stopped = search.spend()
     return search.finish(baseline, stopped)
 
@@ -275,7 +275,7 @@ class _Search:
     goals: Goals
     plan: Plan
     runs: Runs
-    tell: Tell
+    watch: Watch
     border: Border | None
     shares: tuple[float, ...]
     history: list[Batch] = field(default_factory=list)
@@ -304,7 +304,7 @@ class _Search:
             if self.history and rows and (beyond := self._beyond(emulators, points, count, random)) is not None:
                 chosen, why, check, since = beyond, "extension", False, len(self.history)
             self.history.append(replace(state, why=why))
-            self.tell(self.history[-1], len(self.runs.points), self.plan.budget)
+            self.watch(self.history[-1], len(self.runs.points), self.plan.budget)
             replicates = self._replicates(emulators, chosen)
             self.seconds += time.perf_counter() - started
             if not rows:
@@ -313,8 +313,8 @@ class _Search:
             self.off.append(missed(emulators, fresh.rows(fresh.good)))
             self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(chosen)]
             if check:
-                if as_foretold(emulators, fresh):
-                    return "batches gained nothing more and fresh runs on the front were as foretold"
+                if as_predicted(emulators, fresh):
+                    return "batches gained nothing more and fresh runs on the front were as predicted"
                 since = len(self.history) - 1
 
     def _fit(self, runs: Runs) -> Emulators:
@@ -328,7 +328,7 @@ class _Search:
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
         """Levels, the probability that each is still to be gained (u,), and where the search stands.
 
-        What is gained is gained by the front foretold, not by the runs: these fill it up whatever they tell.
+        What is gained is gained by the predicted front, not by the runs: these fill it up whatever they show.
         """
         everything = np.vstack([points, emulators.runs.points])
         rows, costs = front_rows(emulators, everything)
@@ -348,7 +348,7 @@ class _Search:
         return levels, known.left, state
 
     def _faces(self, emulators: Emulators, points: Array, random: np.random.Generator) -> list[Face]:
-        """Faces that the pick foretold lies at."""
+        """Faces at which the predicted pick lies."""
         place = Place(emulators, self.region, points, len(self.moves))
         border = self.border or Border(self.region.low, self.region.high, lambda corners: False)
         return faces(place, border, self.plan.pick, random)
@@ -365,13 +365,13 @@ class _Search:
         return self.region.snap(low + (high - low) * even)
 
     def _check(self, emulators: Emulators, points: Array, levels: Levels) -> list[int]:
-        """Rows of points spread over the front foretold."""
+        """Rows of points spread over the predicted front."""
         rows, _ = front_rows(emulators, points)
         chosen, _ = batch(emulators, points[rows], levels, np.ones(len(levels.at)), CHECKS, self.region.apart)
         return rows[chosen].tolist()
 
     def _replicates(self, emulators: Emulators, points: Array) -> Whole:
-        """As many (n,) as make the scatter of a run small beside what is not known of it."""
+        """As many (n,) as make the scatter of a run small compared with the uncertainty of it."""
         columns = self.goals.objectives
         single, deviations = emulators.scatter(points)[:, columns], emulators.predict(points)[1][:, columns]
         wanted = np.ceil((single / (WORTH * deviations**2)).max(axis=1))
@@ -382,7 +382,7 @@ class _Search:
         return Runs(points, values, errors, freedom, replicates)
 
     def finish(self, baseline: Array, stopped: str) -> AdaptiveFront:
-        """Fresh runs at the finalists, and what all runs together tell."""
+        """Fresh runs at the finalists, and what all runs together show."""
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
         finals = self._finals((baseline - self.centre) / self.step, random)
         if not finals.runs.good.any():
@@ -392,13 +392,13 @@ class _Search:
         points = candidates(emulators, self.region, random, self.runs.points[~self.runs.good], ROUNDS)
         rows, costs = front_rows(emulators, points)
         archive, self.fronts[-1] = points[rows], points[rows[spread(costs[rows], SHOWN)]]
-        foretold, deviations = emulators.predict(archive)
+        predictions, deviations = emulators.predict(archive)
         self.seconds += time.perf_counter() - started
         return AdaptiveFront(
             front=self._front(finals),
             archive=self.centre + self.step * archive,
             shown=best_for_hypervolume(costs[rows], SHOWN),
-            foretold=foretold,
+            predictions=predictions,
             deviations=deviations,
             emulators=emulators,
             region=self.region,
@@ -417,7 +417,7 @@ class _Search:
         )
 
     def _finals(self, original: Array, random: np.random.Generator) -> _Finals:
-        """Fresh runs at the finalists and at the original point (k,), a batch at a time: each tells where the next gains most.
+        """Fresh runs at the finalists and at the original point (k,), a batch at a time: each shows where the next gains most.
 
         None has a say in whether it is reported.
         """
@@ -441,14 +441,14 @@ class _Search:
         return _Finals(runs, base, np.vstack(believed), np.vstack(off))
 
     def _tested(self, emulators: Emulators) -> Emulators:
-        """Emulators with deviations by which the last batches lay within what had been foretold of them; runs left out one at
+        """Emulators with deviations by which the last batches lay within what had been predicted of them; runs left out one at
         a time have neighbours that a point yet to be run has not. Source: Dawid, Statistical theory: the prequential approach
         (1984)."""
         last = np.vstack([np.ones((1, len(emulators.stretch))), *self.off[-TESTED:]])
         return replace(emulators, stretch=emulators.stretch * np.sqrt((last**2).mean(axis=0)).clip(1.0))
 
     def _finalists(self, emulators: Emulators, before: Array, count: int, random: np.random.Generator) -> Array:
-        """Points of the front foretold that are expected to gain most beside those ``before`` (f, k)."""
+        """Points of the predicted front that are expected to gain most next to those ``before`` (f, k)."""
         points = candidates(
             emulators, self.region, random, np.vstack([self.runs.points[~self.runs.good], before]), ROUNDS
         )
@@ -461,14 +461,14 @@ class _Search:
         return archive[batch(emulators, archive, levels, left, count, self.region.apart)[0]]
 
     def _on_one_scale(self, emulators: Emulators, front: Array) -> list[Batch]:
-        """The history with the hypervolumes of all fronts foretold, by the last emulators, on the scale of the last front
+        """The history with the hypervolumes of all predicted fronts, by the last emulators, on the scale of the last front
         (f, q)."""
         ideal, nadir = front.min(axis=0), front.max(axis=0)
         reached = [hypervolume(self.goals.costs(emulators.predict(each)[0]), ideal, nadir) for each in self.fronts]
         return [replace(each, reached=value) for each, value in zip(self.history, reached, strict=True)]
 
     def _check_limits(self, emulators: Emulators, points: Array) -> None:
-        """Raises InfeasibleError where nothing foretold is likely to keep all limits, with the nearest point."""
+        """Raises InfeasibleError where nothing predicted is likely to keep all limits, with the nearest point."""
         means, deviations = emulators.predict(points)
         kept = emulators.kept(means, deviations)
         if kept.max() < 0.5 and (violations := self.goals.violations(means, means)).size:

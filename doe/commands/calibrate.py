@@ -31,7 +31,7 @@ def calibrate(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find what is not known of a scene from measurements on a rig, and tell whether it may be called calibrated."""
+    """Identify the unknown inputs of a scene from measurements on a rig, and state whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write

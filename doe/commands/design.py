@@ -18,7 +18,7 @@ def design(
     quiet: Annotated[bool, flag("--quiet", "-q", says="Actual values only.")] = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also seeds and leverages.")] = False,
 ) -> None:
-    """Print the design: every run, and how well the runs can tell what is asked of them."""
+    """Print the design: every run, and how well the runs can answer what is asked of them."""
     with guarded(as_json):
         from doe.report.steps.fit import blocks, design_record, print_csv
         from doe.study_file import Study

@@ -72,8 +72,14 @@ def _answer(record: dict[str, Any], study: "Study", data: Path | None, path: Pat
     from doe.report.sections.fits import fit_blocks
     from doe.report.sections.record import known
 
-    names = f"factors {', '.join(study.factors)}; responses {', '.join(study.responses)}"
-    taken = f"{data}: {names}; coded -1 and +1 are the ends of a factor's range" if path is None else ""
+    taken = (
+        (
+            f"{data}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are "
+            "the ends of a factor's range"
+        )
+        if path is None
+        else ""
+    )
     remarks = [Note(remark, Detail.LEAST) for remark in record.get("notes", ())]
     fits = [
         block
@@ -92,6 +98,7 @@ def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "t
         refuse(f"--{option}: {path} says it; leave out one or the other" for option, given in named.items() if given)
         return Study.load(path), ()
     if data is None:
-        mend = "give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"
-        raise InputError([f"fit: nothing to fit; {mend}"])
+        raise InputError(
+            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
+        )
     return study_of_table(data, named["factor"] or [], named["response"] or [], named["model"] or "quadratic")

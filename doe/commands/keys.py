@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
-    """Tell what every key of a study or of a dimension chain means, its unit, range and default."""
+    """Explain every key of a study or of a dimension chain: its meaning, its unit, range and default."""
     with guarded(as_json):
         run(kinds(), word, as_schema, as_json)
 

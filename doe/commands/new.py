@@ -54,7 +54,7 @@ def new(
 
 
 def _factors(scene: dict[str, Any]) -> list[str]:
-    """A factor a clearance that the scene's file tells and that something reads."""
+    """A factor a clearance that the scene's file gives and that something reads."""
     landless = scene["cage"]["guidance"] == "roller" or scene.get("model", {}).get("guide_land") == "off"
     found = []
     for name, table, share in CLEARANCES:

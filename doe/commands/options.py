@@ -17,7 +17,8 @@ Adaptive = Annotated[
     bool, flag("--adaptive", says="Also search the front in few runs, chosen by emulators; the pick is of it.")
 ]
 Robust = Annotated[
-    bool, flag("--robust", says="Judge the pick over what is not known of the scene; also done where that is declared.")
+    bool,
+    flag("--robust", says="Judge the pick over the unknown inputs of the scene; also done where that is declared."),
 ]
 Out = Annotated[Path | None, folder_option("Folder of results and of the store of finished runs.")]
 StudyOut = Annotated[

@@ -26,7 +26,7 @@ def status(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Tell where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
+    """Show where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
     with guarded(as_json):
         from doe.workflow.status import status_of
 

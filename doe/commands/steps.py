@@ -28,7 +28,7 @@ def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> N
 
 @contextmanager
 def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
-    """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
+    """Let Ctrl-C say that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
     study of the file ``source`` runs there."""
     from doe.running.lock import at_work
     from doe.workflow.runs import STORE

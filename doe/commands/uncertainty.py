@@ -31,7 +31,7 @@ def uncertainty(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Tell what is not known of a scene, what that does to every output, and which input decides."""
+    """List the unknown inputs of a scene, what they do to every output, and which input decides."""
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import blocks, record_of, write

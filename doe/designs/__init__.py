@@ -1,7 +1,7 @@
 """Designs of experiments in coded units, one column a factor.
 
 - ``design``: the record of a design, and the designs that are constructed; ``optimal``: those that are searched for
-- ``evaluation`` (on ``model``): what a design can tell before any run is made
+- ``evaluation`` (on ``model``): how good a design is before any run is made
 """
 
 from doe.designs.design import (

@@ -233,8 +233,10 @@ def cube_points(factors: int, cube: str = "full") -> Array:
         raise MethodError(f'cube = {cube!r}: choose "full" or "resolution_v"')
     generators = RESOLUTION_V.get(factors, ()) if cube == "resolution_v" else ()
     if cube == "resolution_v" and not generators:
-        tabulated = f"tabulated for {factors} factors, only for {min(RESOLUTION_V)} to {max(RESOLUTION_V)}"
-        raise MethodError(f"cube = 'resolution_v': no fraction of resolution V is {tabulated}; use cube = \"full\"")
+        raise MethodError(
+            f"cube = 'resolution_v': no fraction of resolution V is tabulated for {factors} factors, only for "
+            f'{min(RESOLUTION_V)} to {max(RESOLUTION_V)}; use cube = "full"'
+        )
     basic = factors - len(generators)
     corners = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=basic)])
     added = [corners[:, ["ABCDEFGH".index(letter) for letter in word]].prod(axis=1) for word in generators]
@@ -244,7 +246,7 @@ def cube_points(factors: int, cube: str = "full") -> Array:
 def corner_blocks(corners: Array, blocks: int) -> Rows:
     """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
 
-    Blocks are told by the signs of interactions of three or more factors, the longest that serve; their
+    Blocks are set by the signs of interactions of three or more factors, the longest that serve; their
     products must not be short either. Raises MethodError where no such division exists.
     """
     if blocks == 1:
@@ -261,8 +263,10 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
             between = one * two
             if not np.abs(short.T @ between).any():
                 return (2 * (one > 0) + (two > 0)).astype(np.intp)
-    what = f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without"
-    raise MethodError(f"{what} confusing a block with a second-order term; use fewer blocks or a larger cube")
+    raise MethodError(
+        f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without "
+        "confusing a block with a second-order term; use fewer blocks or a larger cube"
+    )
 
 
 def _short_products(corners: Array) -> Array:
@@ -297,14 +301,17 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     Technometrics 2 (1960) 455-475.
     """
     if factors not in TOGETHER:
-        mend = 'use kind = "central_composite"'
-        raise MethodError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
+        raise MethodError(
+            f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; use kind = \"central_composite\""
+        )
     number = BLOCKS.get(factors, 1) if blocks else 1
     if blocks and number == 1:
         raise MethodError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
     if centre_replicates % number:
-        need = f"{number} blocks need equal shares of the centre points; give a multiple of {number}"
-        raise MethodError(f"centre_replicates = {centre_replicates}: {need}")
+        raise MethodError(
+            f"centre_replicates = {centre_replicates}: {number} blocks need equal shares of the centre points; give "
+            f"a multiple of {number}"
+        )
     edges, of_run = [], []
     for place, letters in enumerate(TOGETHER[factors]):
         columns = ["ABCDEFG".index(letter) for letter in letters]
@@ -323,7 +330,7 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     """Definitive screening design in 2 to 8 factors: a conference matrix, its mirror image, and centre points.
 
     With one centre point 2k + 1 runs for an even number k of factors; an odd one takes a column less of the next even
-    design. Main effects are orthogonal to each other and to all squares and products; squares can be told from each
+    design. Main effects are orthogonal to each other and to all squares and products; squares can be distinguished from each
     other and from products, products not all from each other: the model for it is "pure_quadratic".
 
     Raises MethodError when the number of factors is out of range.
@@ -333,9 +340,9 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     using conference matrices, J. Qual. Technol. 44 (2012) 2-8.
     """
     if not 2 <= factors <= MOST_SCREENED:
-        mend = 'use kind = "d_optimal"'
         raise MethodError(
-            f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; {mend}"
+            f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; use kind = "
+            '"d_optimal"'
         )
     half = conference_matrix(factors + factors % 2)[:, :factors]
     points = np.stack([half, -half], axis=1).reshape(-1, factors)
@@ -370,9 +377,9 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
     ``centre_replicates`` points are added at the centre. Raises MethodError beyond 10 000 combinations.
     """
     if (runs := levels**factors) > MOST_RUNS:
-        mend = 'give fewer levels or use kind = "sobol"'
         raise MethodError(
-            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
+            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; give "
+            'fewer levels or use kind = "sobol"'
         )
     values = np.linspace(-1.0, 1.0, levels)
     return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)

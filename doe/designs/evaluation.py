@@ -1,4 +1,4 @@
-"""What a design can tell before any run is made: precision of terms and predictions, tests, power.
+"""How good a design is before any run is made: precision of terms and predictions, tests, power.
 
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., chapters 8 and 9.
 """
@@ -50,7 +50,7 @@ def evaluate(
     ``condition_number`` of the model matrix with columns of unit length; ``degrees_of_freedom``; ``blocks``:
     None for one block, else ``sizes``, whether ``orthogonal`` and the ``largest_cosine`` between block and terms.
 
-    Raises MethodError naming the terms that the runs cannot tell apart.
+    Raises MethodError naming the terms that the runs cannot distinguish.
 
     Source: Atkinson, Donev and Tobias, Optimum Experimental Designs (2007) (efficiencies);
     Giovannitti-Jensen and Myers, Technometrics 31 (1989) (by radius); Zahran, Anderson-Cook and Myers,
@@ -61,7 +61,7 @@ def evaluate(
     groups = np.zeros(runs, dtype=np.intp) if block is None else np.unique(block, return_inverse=True)[1]
     lost = lost_terms(points, terms, groups)
     if lost:
-        raise MethodError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
+        raise MethodError(f"the {runs} runs cannot separate {', '.join(lost)} from the other terms")
     region, reach = _where(points, region, reach)
     # A row a run in memory too: sums over columns then have the same bits whatever made the columns.
     matrix, contrasts = np.ascontiguousarray(model_matrix(points, terms)), block_contrasts(groups)
@@ -133,7 +133,7 @@ def _precision(points: Array, terms: Sequence[str], covariance: Array, region: R
 
 
 def lost_terms(coded: Array, terms: Sequence[str], block: Rows | None = None) -> list[str]:
-    """Terms that the runs cannot tell from blocks and the terms before them."""
+    """Terms that the runs cannot separate from blocks and the terms before them."""
     groups = np.zeros(len(coded), dtype=np.intp) if block is None else block
     columns = np.column_stack([block_contrasts(groups), model_matrix(coded, terms)])
     columns = columns / np.linalg.norm(columns, axis=0).clip(1e-300)

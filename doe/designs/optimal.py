@@ -1,4 +1,4 @@
-"""D- and I-optimal designs: so many runs as tell a model best, all new or added to runs that were made.
+"""D- and I-optimal designs: so many runs as estimate a model best, all new or added to runs that were made.
 
 Source: Meyer and Nachtsheim, The coordinate-exchange algorithm for constructing exact optimal experimental designs,
 Technometrics 37 (1995) 60-69; exchange formulas of Fedorov, Theory of Optimal Experiments (1972).
@@ -27,7 +27,7 @@ GRID = np.linspace(-1.0, 1.0, 9)  # of the first exchanges; then coordinates mov
 MOVES = (2, 1)
 SWEEPS = 20  # through all coordinates, at most, with one step
 LEAST = 1e-5  # share by which an exchange improves a design at least
-RIDGE = 1e-6  # keeps designs that do not tell all terms comparable
+RIDGE = 1e-6  # keeps designs that do not estimate all terms comparable
 
 
 def optimal(
@@ -42,7 +42,7 @@ def optimal(
     block: ArrayLike | None = None,
     centre_replicates: int = 0,
 ) -> Design:
-    """Add ``runs`` runs to those made such that all together tell a model as well as they can.
+    """Add ``runs`` runs to those made such that all together estimate a model as well as they can.
 
     criterion : "d", the largest determinant of X'X and so the smallest joint region of the coefficients; "i", the least
         mean variance of predictions over the box.
@@ -64,12 +64,16 @@ def optimal(
     fixed = np.vstack([old, np.zeros((centre_replicates, factors))])
     needed = len(terms) + len(np.unique([*groups, new])) - 1
     if len(fixed) + runs < needed:
-        beside = f"beside {len(fixed)} given or at the centre " if len(fixed) else ""
-        mend = f"give at least {needed + 1 - len(fixed)}"
-        raise MethodError(f"runs = {runs}: {beside}too few for a model of {counted(len(terms), 'term')}; {mend}")
+        least, model = needed + 1 - len(fixed), counted(len(terms), "term")
+        if len(fixed):
+            few = f"with {len(fixed)} given or at the centre too few for a model of {model}"
+        else:
+            few = f"too few for a model of {model}"
+        raise MethodError(f"runs = {runs}: {few}; give at least {least}")
     if runs > MOST_RUNS:
-        mend = "give fewer, or kind = 'sobol'"
-        raise MethodError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {mend}")
+        raise MethodError(
+            f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; give fewer, or kind = 'sobol'"
+        )
     reach = max(1.0, float(np.abs(old).max(initial=0.0)))
     blocks = np.concatenate([groups, np.full(centre_replicates + runs, new)])
     contrasts = block_contrasts(blocks)

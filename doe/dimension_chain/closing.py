@@ -125,7 +125,7 @@ BETWEEN = 512  # points between the corners
 
 
 class NoValueError(MethodError):
-    """Sizes at which a function has no finite value; the message names the link, the sizes and the mend."""
+    """Sizes at which a function has no finite value; the message names the link, the sizes and the fix."""
 
 
 @dataclass(frozen=True)
@@ -136,16 +136,17 @@ class Function:
     value: Callable[[Sizes], Any]
 
     def without_value(self, value: Any, sizes: Sizes) -> NoValueError:
-        """Tell the first of the sizes at which the value is not finite."""
+        """Report the first of the sizes at which the value is not finite."""
         link, values = self.link, np.atleast_1d(value)
         lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
         first = {name: np.broadcast_to(sizes[name], values.shape)[lost[0]] for name in _varies_with(link)}
         at = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
         what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
-        where = f"is {values[lost[0]]:g} at {at or 'any size'}{share}, which gives no finite closing link"
-        mend = "give it a value there, as max(x, 0) does, or keep the links it uses away from it"
-        return NoValueError(f'link "{link.name}": {what}: {where}; {mend}')
+        return NoValueError(
+            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no '
+            "finite closing link; give it a value there, as max(x, 0) does, or keep the links it uses away from it"
+        )
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ class ClosingFunction:
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
         """Change of the closing link per change of each part at the given sizes."""
-        self.bent(sizes)  # a place without a value is told as it is, before the steps aside
+        self.bent(sizes)  # a place without a value is reported as it is, before the steps aside
         slopes = dict(self.coefficients)
         for name in self.arguments:
             above, below = ({**sizes, name: sizes[name] + sign * STEP} for sign in (1, -1))
@@ -258,13 +259,13 @@ def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
     """
     fit_mm, raceway_mm = fit.fit_mm or bore_nominal, fit.raceway_mm
     outer = raceway_mm > fit_mm
-    # The raceway bounds the part that it stands on, unless told otherwise.
+    # The raceway bounds the part that it stands on, unless stated otherwise.
     shaft_bore_mm = (0.0 if outer else raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
     outside_mm = raceway_mm if fit.outside_mm is None else fit.outside_mm
     if fit.outside_mm is None and not outer:
         raise MethodError("outside_mm is missing: give the outside diameter of what holds the ring")
     if not shaft_bore_mm <= raceway_mm <= outside_mm or raceway_mm == fit_mm:
-        raise MethodError(f"a raceway of {raceway_mm:g} mm lies on neither part; mend its diameter")
+        raise MethodError(f"a raceway of {raceway_mm:g} mm lies on neither part; fix its diameter")
     # Free of loads but the pressure, a part needs neither mass nor heat.
     shaft_steel = Material(1e9 * fit.shaft_modulus_GPa, fit.shaft_poisson, 0.0)
     bore_steel = Material(1e9 * fit.bore_modulus_GPa, fit.bore_poisson, 0.0)

@@ -126,7 +126,7 @@ class Link(Strict):
     capability: Positive = 1.0
     """T/(6 sigma) of a normal or truncated normal part."""
     fixed: bool = False
-    """Whether the tolerance stays as given when tolerances are allocated, also where all links have deviations. Beside
+    """Whether the tolerance stays as given when tolerances are allocated, also where all links have deviations. Next to
     links without any, given ones stay in any case."""
     position: Position = "unilateral"
     """Where an allocated tolerance lies: on one side, so that it can only shorten the closing link, on both, or by a

@@ -29,7 +29,7 @@ def faults(chain: Chain) -> list[str]:
     sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
     sentences += _reference_faults(chain) + _selective_faults(chain)
     sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
-    # The width that fixed links leave can only be told of a chain that is otherwise sound.
+    # The width that fixed links leave can only be computed for a chain that is otherwise sound.
     try:
         return sentences or _room_faults(chain)
     except NoValueError as error:
@@ -105,13 +105,16 @@ def _reference_faults(chain: Chain) -> list[str]:
     for link in chain.link:
         if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
-            mend = f"name one of {', '.join(before) or 'those placed before it'}"
             alien = [f'uses "{name}", which no link before it is called' for name in names if name not in before]
-            sentences += [f'link "{link.name}": {fault}; {mend}' for fault in alien]
+            sentences += [
+                f'link "{link.name}": {fault}; name one of {", ".join(before) or "those placed before it"}'
+                for fault in alien
+            ]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
-                why = f'thermal_growth.of = "{grown.name}": must be a positive dimension'
-                sentences.append(f'link "{link.name}": {why}')
+                sentences.append(
+                    f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
+                )
         bore = link.press_fit and before.get(link.press_fit.bore)
         if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
             sentences.append(f'link "{link.name}": press_fit: {wrong}')
@@ -125,8 +128,9 @@ def _selective_faults(chain: Chain) -> list[str]:
     parts = [link.name for link in chain.link if is_part(link)]
     pair = {"first": chain.selective.first, "second": chain.selective.second}
     alien = {key: name for key, name in pair.items() if name not in parts}
-    mend = f"name one of {', '.join(parts)}"
-    sentences = [f'selective.{key} = "{name}": is no part; {mend}' for key, name in alien.items()]
+    sentences = [
+        f'selective.{key} = "{name}": is no part; name one of {", ".join(parts)}' for key, name in alien.items()
+    ]
     if pair["first"] == pair["second"]:
         sentences.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
     return sentences

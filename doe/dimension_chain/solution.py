@@ -26,7 +26,7 @@ from rbdyn.base.records import Record, derived, keyed, outside_json
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
-# What is told of an allocated part.
+# What is reported of an allocated part.
 ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
 
@@ -200,10 +200,11 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
     nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if part.name in free)
     kind = "RSS" if mode == "rss" else "worst-case"
     wanted = f" where a yield of {search.chain.allocate.target_yield:g} is wanted" if mode == "yield" else ""
-    why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}{wanted}"
-    put = f"the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm"
-    allowed = f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed"
-    return f"refused: {put} where {allowed} ({why}); the nearest that fits is {nearest}"
+    return (
+        f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm where "
+        f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed ({kind} tolerance {high - low:.4f} mm where "
+        f"{width:.4f} mm is there, yield {share:.4g}{wanted}); the nearest that fits is {nearest}"
+    )
 
 
 def _kept(search: Allocation, parts: list[Part], share: float) -> bool:

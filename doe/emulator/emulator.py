@@ -78,7 +78,7 @@ class Emulator:
 
     @one_thread
     def covariance(self, points: ArrayLike, other: ArrayLike) -> Array:
-        """Covariance (n, m) of what is not known of the response at points (n, k) and (m, k)."""
+        """Covariance (n, m) of the uncertainty of the response at points (n, k) and (m, k)."""
         first, second, given = np.asarray(points, float), np.asarray(other, float), self.hyperparameters
         (inside, left), (inside_other, left_other) = (self._explained(*self._beside(at)) for at in (first, second))
         between = given.variance * correlation(first, second, given.lengths)
@@ -97,13 +97,13 @@ class Emulator:
 
     @one_thread
     def leave_one_out(self) -> tuple[Array, Array]:
-        """What every run would be foretold by the others: mean and standard deviation (n,), its own scatter included."""
+        """What the others predict of every run: mean and standard deviation (n,), its own scatter included."""
         projection = self.solution.projection
         variance = 1.0 / np.diag(projection)
         return self.values - variance * (projection @ self.values), np.sqrt(variance)
 
     def q2(self) -> float:
-        """Share of the values' variance that the other runs foretell."""
+        """Share of the values' variance that the other runs predict."""
         missed = self.values - self.leave_one_out()[0]
         return 1.0 - float((missed**2).sum() / ((self.values - self.values.mean()) ** 2).sum())
 
@@ -157,7 +157,7 @@ def fit_emulator(
     The trend is the largest up to the one asked for with at most a term for two runs. ``start``: hyperparameters of nearly
     the same runs, from which the search starts in the place of the last of its own starts; without ``search`` they stay as
     they are. ``prior``: mean and deviation of the logarithm of a length in half ranges of one factor alone. ``trended``: the
-    first so many coordinates, all unless told, are those of the trend. Raises MethodError for
+    first so many coordinates, all by default, are those of the trend. Raises MethodError for
     numbers that are not finite, variances below 0 or fewer than two runs.
     """
     at, y = np.asarray(points, float), np.asarray(values, float)
@@ -166,7 +166,7 @@ def fit_emulator(
         raise MethodError(f"emulator: points {at.shape} and values {y.shape}: give two runs at least, a value each")
     if not (np.isfinite(at).all() and np.isfinite(y).all() and np.isfinite(known).all() and (known >= 0.0).all()):
         raise MethodError(
-            "emulator: a point, value or variance is not a finite number, or a variance is below 0; mend it"
+            "emulator: a point, value or variance is not a finite number, or a variance is below 0; fix it"
         )
     terms = _terms(trend, len(at), at.shape[1] if trended is None else trended)
     fitted = start

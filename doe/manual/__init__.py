@@ -1,4 +1,4 @@
-"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand beside, its command, its keys."""
+"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand next to it, its command, its keys."""
 
 from pathlib import Path
 

@@ -229,5 +229,5 @@ def _values(objectives: Objectives, points: Array) -> Array:
     if bad.size:
         row, column = bad[0]
         given = f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}"
-        raise MethodError(f"{given}; narrow the bounds or mend the objective")
+        raise MethodError(f"{given}; narrow the bounds or fix the objective")
     return values

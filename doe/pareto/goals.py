@@ -107,7 +107,7 @@ class Goals:
 Rule = Literal["knee", "desirability", "weights"]
 
 RULES: tuple[Rule, ...] = get_args(Rule)
-AUGMENTATION = 1e-3  # share of the sum in the Tchebycheff distance: tells apart points of equal maximum
+AUGMENTATION = 1e-3  # share of the sum in the Tchebycheff distance: distinguishes points of equal maximum
 NAMES = {"knee": "the knee", "desirability": "the most desirable", "weights": "the best by the weights"}
 
 

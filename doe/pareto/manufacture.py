@@ -300,7 +300,7 @@ def tolerance_aware_front(
     pick: Rule = "knee",
     doubt: Doubt | None = None,
 ) -> ToleranceAware:
-    """NSGA-II on robust costs, and what it costs and gains beside the plain front; the same seed, the same bits.
+    """NSGA-II on robust costs, and what it costs and gains compared with the plain front; the same seed, the same bits.
 
     surfaces : of the m responses, in coded units.
     box : the tolerances.

@@ -156,7 +156,7 @@ def best_for_hypervolume(costs: Array, keep: int, seed: int = 1) -> Rows:
 
 
 Objectives = Callable[[Array], Array]
-# How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
+# How far below and above (n, m) what is predicted of points (n, k) their responses may be when limits are judged.
 Doubt = Callable[[Array], tuple[Array, Array]]
 
 

@@ -1,6 +1,6 @@
 """What tolerances leave of the points of a simulated front, and its pick.
 
-A simulator's front has no surface to tell what parts about a point do. Here the shape about a point is that of given
+A simulator's front has no surface to show what parts about a point do. Here the shape about a point is that of given
 surfaces, corrected by what the search's own runs near it say: a local straight line through what the surfaces missed
 there (Cleveland, Robust locally weighted regression, 1979). The level is that of the fresh runs at the point itself. Parts
 may lie beyond the bounds of the search by the tolerance, where the same shape goes on.
@@ -19,7 +19,7 @@ from doe.pareto.search import dominates, non_dominated
 from rbdyn.base.arrays import Array
 
 NEIGHBOURS = 10  # runs a coefficient of a local line: with tricube weights the half of them counts
-HARDLY_VARIED = 0.1  # of the largest spread of the neighbours: along directions with less they tell no slope
+HARDLY_VARIED = 0.1  # of the largest spread of the neighbours: along directions with less they show no slope
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ class WidestTolerances:
     """Half widths (k,) of the widest tolerances, NaN of what has none, and what they keep.
 
     ``probability`` is the share of the parts that keep every limit, ``standard_error`` its Monte Carlo error alone;
-    ``interval`` holds the true share with 95 %, as far as what was drawn tells.
+    ``interval`` holds the true share with 95 %, as far as what was drawn shows.
     ``limited_by`` names the limit that parts break first beyond, or the rim of the region; ``at_rim`` (k,) the
     factors that reach it. ``sentence`` says it in words.
     """
@@ -222,6 +222,6 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     error = error_of_share(share, len(parts.offsets))
     interval, (promise, open_errors) = parts.interval(half), parts.said
     within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}, {parts.percent} demanded"
-    rim = "Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
+    rim = "Where a tolerance ends at the rim of the region, no run shows whether it may be wider."
     said = [f"{within}. They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
     return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, said)))

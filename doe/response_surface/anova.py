@@ -118,8 +118,10 @@ def _say_normality(p: float | str | None, alpha: float) -> str:
         return ""
     if p > alpha:
         return f"the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
-    rough = "p values and intervals are rough; look for an outlier, a missing term or a transform"
-    return f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): {rough}."
+    return (
+        f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): p values and intervals are rough; look for an "
+        "outlier, a missing term or a transform."
+    )
 
 
 def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> str:
@@ -194,7 +196,7 @@ def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
 def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, block: Whole) -> list[AnovaRow]:
     """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
 
-    ``solution`` is of the columns of ``terms`` followed by those that tell the blocks apart.
+    ``solution`` is of the columns of ``terms`` followed by those that distinguish the blocks.
     """
     model_df, residual = len(terms) - 1, solution.residual_sum
     error = solution.mean_square, solution.dof

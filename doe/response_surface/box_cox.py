@@ -49,7 +49,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     check_positive(response, name)
     runs, terms = columns.shape
     if runs <= terms:
-        raise MethodError(f"{name}: {counted(runs, 'run')} leave no residual beside {counted(terms, 'term')}; add runs")
+        raise MethodError(f"{name}: {counted(runs, 'run')} leave no residual for {counted(terms, 'term')}; add runs")
     if np.ptp(response) == 0.0:
         raise MethodError(f"{name}: all values are equal, so no transform can be judged; leave it out")
     log_likelihood = _log_likelihood(columns, response)
@@ -102,8 +102,10 @@ def check_positive(values: ArrayLike, name: str) -> None:
     response = np.asarray(values, float)
     bad = np.flatnonzero(~(np.isfinite(response) & (response > 0.0)))
     if bad.size:
-        given = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
-        raise MethodError(f'{name}: {given}, but a power transform needs positive values; use transform = "none"')
+        raise MethodError(
+            f"{name}: the value of run {bad[0] + 1} is {response[bad[0]]:g}, but a power transform needs positive "
+            'values; use transform = "none"'
+        )
 
 
 def forward(values: ArrayLike, exponent: float) -> Array:
@@ -135,12 +137,16 @@ def slope(values: ArrayLike, exponent: float) -> Array:
 
 def _sentence(name: str, best: float, interval: list[float], recommended: float) -> str:
     cut = ", cut at what was searched" if set(interval) & set(SEARCHED) else ""
-    ends = f"{100 * LEVEL:g} % interval {interval[0]:.2f} to {interval[1]:.2f}{cut}"
-    estimate = f"{name}: the likelihood is largest for the exponent {best:.2f}, {ends}"
+    estimate = (
+        f"{name}: the likelihood is largest for the exponent {best:.2f}, {100 * LEVEL:g} % interval "
+        f"{interval[0]:.2f} to {interval[1]:.2f}{cut}"
+    )
     if interval[0] <= 1.0 <= interval[1]:
         return f"{estimate}, which holds 1: no transform is called for."
     if recommended == 1.0:
-        advice = "keep the response as it is, and look for an outlier or a missing term"
-        return f"{estimate}, beyond all usual exponents: {advice}."
+        return (
+            f"{estimate}, beyond all usual exponents: keep the response as it is, and look for an outlier or a "
+            "missing term."
+        )
     power = NAMES.get(recommended, f"y^{recommended:.3g}")
     return f"{estimate}, which does not hold 1: fit {power} instead of y (transform = {recommended:.3g})."

@@ -93,9 +93,11 @@ def describe_canonical(analysis: Canonical, place: StationaryPoint | None) -> st
         return head + kind + ("." if analysis["inside"] else "; the best point lies on the border of the region.")
     axis = int(np.argmin(np.abs(analysis["eigenvalues"])))
     lettered = zip(ascii_uppercase, analysis["eigenvectors"][axis], strict=False)
-    flat = f"hardly bends along {' '.join(f'{x:+.2f} {letter}' for letter, x in lettered)}"
-    why = f"an eigenvalue of {values} is within its error of zero"
-    return f"{head}a {analysis['nature']}: {why}, so the response {flat} and the place along it is not determined."
+    return (
+        f"{head}a {analysis['nature']}: an eigenvalue of {values} is within its error of zero, so the response "
+        f"hardly bends along {' '.join(f'{x:+.2f} {letter}' for letter, x in lettered)} and the place along it is "
+        "not determined."
+    )
 
 
 def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:

@@ -1,4 +1,4 @@
-"""A polynomial surface against a Gaussian process, which bends wherever the runs say so: which one foretells points that it
+"""A polynomial surface against a Gaussian process, which bends wherever the runs say so: which one predicts points that it
 has not seen."""
 
 import math
@@ -25,7 +25,7 @@ MOST_SINGLY, FOLDS = 60, 20
 INDISPENSABLE = 0.95
 
 
-# What a rival made of the runs of some rows foretells (n,) at coded points (n, k).
+# What a rival made of the runs of some rows predicts (n,) at coded points (n, k).
 Rival = Callable[[Rows, Array], Array]
 
 
@@ -41,7 +41,7 @@ def compare(
     """Leave out each point in turn with all its replicates, refit both, and compare what they miss there.
 
     Both rivals see the same runs and are wholly refitted without the point (the process with its
-    hyperparameters, the polynomial with its choice of terms), and foretell the mean of the runs left out;
+    hyperparameters, the polynomial with its choice of terms), and predict the mean of the runs left out;
     each point counts once. Of more than `MOST_SINGLY` points a twentieth is left out at a time, and the process keeps
     the hyperparameters of all runs: a fit costs the cube of their number. A point without which the polynomial cannot be fitted, or is a guess, such as the
     centre of a spherical design, is not compared: no one would leave it out.
@@ -84,8 +84,8 @@ def compare(
 
     spared = [[first for first in fold if (basis[group == first] ** 2).sum() <= INDISPENSABLE] for fold in folds]
     kept = [fold for fold in spared if fold]
-    truths, foretold = _left_out(name, points, response, group, kept, (polynomial, process))
-    squares = (truths[:, None] - foretold) ** 2
+    truths, predicted = _left_out(name, points, response, group, kept, (polynomial, process))
+    squares = (truths[:, None] - predicted) ** 2
     compared = f"{len(truths)} of {len(firsts)} points{'' if singly else f' (in {len(folds)} groups)'}"
     difference = _difference(squares[:, 0] - squares[:, 1])
     scores = [_score(each, truths) for each in squares.T]
@@ -115,20 +115,22 @@ def _hyperparameters(process: Emulator, scatter: bool) -> dict[str, Any]:
 def _left_out(
     name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Rival, ...]
 ) -> tuple[Array, Array]:
-    """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
+    """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them predict (c, rivals).
 
     A fold without which a rival cannot be fitted is passed over. Raises MethodError where fewer than three points are left.
     """
-    truths, foretold = [np.empty(0)], [np.empty((0, len(rivals)))]
+    truths, predicted = [np.empty(0)], [np.empty((0, len(rivals)))]
     for fold in folds:
         rows = np.flatnonzero(~np.isin(group, fold))
         with suppress(MethodError):
-            foretold.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
+            predicted.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
-        few = f"only {counted(count, 'point')} can be left out of the polynomial, too few to compare"
-        raise MethodError(f"{name}: {few}; add design points or choose a simpler model")
-    return np.concatenate(truths), np.vstack(foretold)
+        raise MethodError(
+            f"{name}: only {counted(count, 'point')} can be left out of the polynomial, too few to compare; add "
+            "design points or choose a simpler model"
+        )
+    return np.concatenate(truths), np.vstack(predicted)
 
 
 def _difference(paired: Array) -> dict[str, Any]:
@@ -144,8 +146,7 @@ def _score(squares: Array, means: Array) -> dict[str, Any]:
 
 
 def _sentence(name: str, compared: str, polynomial: float, process: float, low: float, high: float) -> str:
-    misses = f"{polynomial:.3g} by the polynomial and by {process:.3g} by a Gaussian process (root mean square)"
-    figures = f"{name}: {compared} left out in turn are missed by {misses}"
+    figures = f"{name}: leave-one-out RMSE of {compared} is {polynomial:.3g} by the polynomial, {process:.3g} by a Gaussian process"
     if low > 0.0:
         return f"{figures}; the process is better by more than the error of the comparison: prefer it."
     if high < 0.0:

@@ -158,7 +158,7 @@ class Data:
 
     @property
     def block_columns(self) -> Array:
-        """Columns that tell the blocks apart, each of mean zero, shape (n, blocks - 1).
+        """Columns that distinguish the blocks, each of mean zero, shape (n, blocks - 1).
 
         The surface then stands for the mean over all runs, and blocks that are orthogonal leave it as it is.
         """
@@ -179,14 +179,15 @@ def checked(
     """Runs as arrays. Raises MethodError when shapes differ, a number is not finite, or all values are equal."""
     points, response = np.asarray(coded, float), np.asarray(values, float)
     if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise MethodError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+        raise MethodError(
+            f"{name}: points of shape {points.shape} and values of shape {response.shape} do not match; give one row "
+            "of factors and one value a run"
+        )
     if not np.isfinite(points).all():
-        raise MethodError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
+        raise MethodError(f"{name}: a coded factor is not a finite number; fix or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
     if bad.size:
-        given = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
-        raise MethodError(f"{name}: {given}; mend or leave out that run")
+        raise MethodError(f"{name}: the value of run {bad[0] + 1} is {response[bad[0]]}; fix or leave out that run")
     errors = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)
     known = errors is not None and bool((np.isfinite(errors) & (errors > 0)).all())
     return Data(
@@ -203,14 +204,16 @@ def checked(
 
 def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
     """Raises MethodError unless every run has a positive standard error, as weighting by them needs."""
-    mend = 'give each run a positive error or use weighting = "equal"'
+    fix = 'give each run a positive error or use weighting = "equal"'
     if standard_errors is None:
-        raise MethodError(f'{name}: weighting = "replicates" needs the errors of the runs; {mend}')
+        raise MethodError(f'{name}: weighting = "replicates" needs the errors of the runs; {fix}')
     errors = np.atleast_1d(np.asarray(standard_errors, float))
     bad = np.flatnonzero(~(np.isfinite(errors) & (errors > 0)))
     if bad.size:
-        given = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
-        raise MethodError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
+        raise MethodError(
+            f'{name}: the error of run {bad[0] + 1} is {errors[bad[0]]:g}, but weighting = "replicates" needs '
+            f"positive ones; {fix}"
+        )
 
 
 def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:
@@ -219,21 +222,23 @@ def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:
     size = len(terms) + more
     if runs <= size:
         blocks = f", {more} for the blocks" if more else ""
-        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
         raise MethodError(
-            f"{name}: {counted(runs, 'run')} {are(runs)} too few for the {model} model; give at least {least}"
+            f"{name}: {counted(runs, 'run')} {are(runs)} too few for the {model} model; give at least {size + 1} "
+            f"({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
         )
 
 
 def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
-    """Raises MethodError when runs cannot tell the columns apart.
+    """Raises MethodError when runs cannot distinguish the columns.
 
     ``matrix`` (n, p) holds the columns of ``terms``, then those of the blocks.
     """
     if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
-        what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"
-        raise MethodError(f"{name}: the runs cannot tell {what}; add design points or choose a simpler model")
+        raise MethodError(
+            f"{name}: the runs cannot separate {', '.join(sorted(names))} from the other terms of the {model} model "
+            "(its matrix is singular); add design points or choose a simpler model"
+        )
 
 
 def _whole(labels: ArrayLike | None, size: int) -> Whole:

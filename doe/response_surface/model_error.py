@@ -1,8 +1,8 @@
-"""What the known variance of each run says beside the scatter of the runs, and what a surface misses beyond that scatter, as
+"""What the known variance of each run says next to the scatter of the runs, and what a surface misses beyond that scatter, as
 an error of its predictions.
 
 Known variances are those of replicates of the simulation. The residuals over them give a test of lack of fit that needs
-no repeated design points; repeated points tell whether the replicates know all of the scatter. A variance of few
+no repeated design points; repeated points show whether the replicates know all of the scatter. A variance of few
 replicates is itself uncertain: the tests allow for it, and with weights from few replicates they err on the safe side
 (with 8, a true surface is doubted at 5 % in 1 to 2 % of fits; with equal weights in 5 %).
 
@@ -10,7 +10,7 @@ Where lack of fit is significant, the response is the model plus a random field:
 within a coded unit and strange to itself farther away, so that distinct runs of a design hardly share it. The mean
 square of lack of fit less that of pure error, over the runs' share in it, estimates its variance (a component of
 variance, by the expectation of the sum of squares). A prediction misses by the error of the coefficients and by the
-field; an interval joins the two as root sum square, with Student's t on the degrees of freedom of what told the field.
+field; an interval joins the two as root sum square, with Student's t on the degrees of freedom of the source of the field.
 Where lack of fit is not significant there is no field, and every interval is that of the textbook.
 
 Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.7; Sacks, Welch, Mitchell and
@@ -85,17 +85,19 @@ def compare(
 
 def describe_known_variance(known: KnownVariance, alpha: float) -> list[str]:
     """The comparison in sentences."""
-    against = f"against the known variance of the replicates chi-square is {known.chi_square:.4g} on {known.df}"
     verdict = "too few replicates a run to say more)"
     if known.p is not None:
         verdict = f"{p_text(known.p)}), the surface misses {'no ' if known.p > alpha else ''}more than that explains"
     share = math.sqrt(known.mean_square_ratio)
-    size = f"standard errors here come from the residual and are {share:.3g} times those of the known variance alone"
-    sentences = [f"{against} degrees of freedom ({verdict}; {size}."]
+    sentences = [
+        f"against the known variance of the replicates chi-square is {known.chi_square:.4g} on {known.df} degrees of "
+        f"freedom ({verdict}; standard errors here come from the residual and are {share:.3g} times those of the "
+        "known variance alone."
+    ]
     f, p = known.pure_error_ratio, known.pure_error_p
     if f is None or p is None:
         return sentences
-    head = f"repeated runs scatter with {f:.3g} times the variance that their replicates tell ({p_text(p)}): "
+    head = f"repeated runs scatter with {f:.3g} times the variance that their replicates give ({p_text(p)}): "
     if p > alpha:
         return [*sentences, head + "the two agree, so the errors of the runs can be relied on."]
     why = "the errors of the runs are too wide, or the repeated runs share their seeds"
@@ -155,9 +157,9 @@ def model_error(
 ) -> ModelError | None:
     """The model error of a fit, None where no test at 5 % shows any.
 
-    ``matrix`` (n, p) is that of the fit and ``groups`` (n,) marks repeated points. Repeated runs tell it (lack of fit
+    ``matrix`` (n, p) is that of the fit and ``groups`` (n,) marks repeated points. Repeated runs show it (lack of fit
     against pure error), or the known variance of the replicates; where both do, the larger counts. A known variance
-    that the repeated runs refute tells nothing.
+    that the repeated runs refute shows nothing.
     """
     share = _share(solution, matrix, groups)
     if share <= 0.0:

@@ -54,7 +54,7 @@ class Surface(Record):
     response or of its transform; ``transform`` is the exponent of Box and Cox, None without one. They and all
     statistics are on the scale of the fit; predictions are in units of the response. ``covariance`` is
     scaled by ``residual_mean_square`` on ``residual_dof`` degrees of freedom; with weights 1 / variance that
-    mean square has no unit, and `known_variance` tells what it should be. ``lack_of_fit`` is what the surface misses
+    mean square has no unit, and `known_variance` shows what it should be. ``lack_of_fit`` is what the surface misses
     against the scatter of replicates, ``pure_error`` that scatter about their own means.
     ``observation_variance`` is that of a new run about the surface (of the mean run, if they differ).
     ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
@@ -143,7 +143,7 @@ class Surface(Record):
 
     @property
     def interval_dof(self) -> int:
-        """Degrees of freedom of the intervals of a mean: of the residual, or of what told the model error."""
+        """Degrees of freedom of the intervals of a mean: of the residual, or of the source of the model error."""
         return self.residual_dof if self.model_error is None else self.model_error.dof
 
     def coefficient_table(self) -> list[dict[str, Any]]:
@@ -196,7 +196,7 @@ def fit(
         "quadratic" (full second order); or "reduced", which starts from the quadratic and drops the term of largest p until every p is at most
         0.05, keeping each term that a remaining interaction or square is built on (hierarchy).
     centre, step : actual value of each factor at coded 0 and its change over one coded unit, shape (k,).
-    standard_errors : of each value, from the replicates of the simulation, shape (n,). They are set beside
+    standard_errors : of each value, from the replicates of the simulation, shape (n,). They are compared with
         the scatter of the runs, and weigh them if ``weighting`` says so; NaN where unknown.
     replicates : number behind each standard error, shape (n,); 0 for errors that count as known exactly.
     weighting : "equal", or "replicates" for weights 1 / standard_error^2.
@@ -205,7 +205,7 @@ def fit(
     without : places of factors that the surface does not depend on.
 
     Raises MethodError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
-    for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
+    for it, the runs cannot distinguish its terms, a transform meets a value that is not positive, or weights are
     asked for and an error is not positive.
     """
     if model not in MODELS:
@@ -343,10 +343,12 @@ def _terms(surface: Surface) -> str:
 def _lack_of_fit(surface: Surface) -> str:
     p = surface.lack_of_fit["p"]
     if p is not None and p <= ALPHA:
-        why = f"lack of fit is significant ({p_text(p)})"
-        what = f"{why}: the surface misses more than the scatter of replicates explains"
-        mend = "enlarge the model, transform the response or narrow the region, and confirm predictions by runs"
-        return f"{what}; {mend}."
+        what = (
+            f"lack of fit is significant ({p_text(p)}): the surface misses more than the scatter of replicates explains"
+        )
+        return (
+            f"{what}; enlarge the model, transform the response or narrow the region, and confirm predictions by runs."
+        )
     if p is not None:
         what = "what the surface misses is within the scatter of replicates"
         return f"lack of fit is not significant ({p_text(p)}): {what}."
@@ -360,15 +362,17 @@ def _lack_of_fit(surface: Surface) -> str:
 def _model_error(surface: Surface) -> str:
     if (error := surface.model_error) is None:
         return ""
-    size = f"a standard deviation of {error.variance**0.5:.3g} told by {error.source} ({error.dof} degrees of freedom)"
-    return f"the 95 % intervals of its mean join the error of the coefficients with what the model misses, {size}."
+    return (
+        "the 95 % intervals of its mean join the error of the coefficients with what the model misses, a standard "
+        f"deviation of {error.variance**0.5:.3g} shown by {error.source} ({error.dof} degrees of freedom)."
+    )
 
 
 def _removed(surface: Surface) -> str:
     if not surface.elimination:
         return ""
     listed = ", ".join(f"{each['term']} ({p_text(each['p'])})" for each in surface.elimination)
-    return f"removed in this order: {listed}; the p values of what is left are too small, for the same runs chose the terms."
+    return f"removed in this order: {listed}; p values of the remaining terms are optimistic, for the same runs selected them."
 
 
 def _blocks(surface: Surface) -> str:
@@ -388,13 +392,17 @@ def _summary(surface: Surface) -> str:
     if precision is not None and precision < DISCERNIBLE:
         tail = f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: the scatter hides the surface."
     if adjusted - predicted > FAR_APART:
-        worse = f"differ by more than {FAR_APART:g}: the surface foretells new runs worse than it fits its own"
-        return f"{figures} {worse}; look for influential runs or drop terms.{tail}"
+        return (
+            f"{figures} differ by more than {FAR_APART:g}: the surface predicts new runs worse than it fits its own; "
+            f"look for influential runs or drop terms.{tail}"
+        )
     return f"{figures} agree.{tail}"
 
 
 def _transform(surface: Surface) -> str:
     if surface.transform is not None:
-        scale = "the analysis is on that scale, predictions are medians in the unit of the response"
-        return f"fitted as Box-Cox transform with exponent {surface.transform:.3g}; {scale}."
+        return (
+            f"fitted as Box-Cox transform with exponent {surface.transform:.3g}; the analysis is on that scale, "
+            "predictions are medians in the unit of the response."
+        )
     return "" if surface.box_cox is None else str(surface.box_cox["sentence"])

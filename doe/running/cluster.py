@@ -110,8 +110,9 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     # What answers there may be anything, and its words mean anything.
     except Exception:
-        silent = f"no dask scheduler answers there within {KNOCK_S:g} s"
-        raise InputError([f"{where}: {silent}; check the address"]) from None
+        raise InputError(
+            [f"{where}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
+        ) from None
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)

@@ -139,7 +139,7 @@ def _place() -> Path | None:
 def _notes() -> Iterator[_Note]:
     place = _place()
     for path in () if place is None else place.glob("*.json"):
-        # One that is being written or has just been taken away tells nothing, nor does one that was spoilt.
+        # One that is being written or has just been taken away shows nothing, nor does one that was spoilt.
         with suppress(OSError, ValueError, TypeError, KeyError):
             content = read_json(path)
             study, store = content["study"], content["store"]

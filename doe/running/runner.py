@@ -140,7 +140,7 @@ class Stage:
 class Agenda:
     """The stages of a command, which of them is under way, and what its runs took.
 
-    ``command`` in words; ``options`` and ``inputs`` (a digest) tell for what its answer stands, ``asked`` also by which runs;
+    ``command`` in words; ``options`` and ``inputs`` (a digest) identify what its answer is for, ``asked`` also by which runs;
     ``measured``: what runs took, of one thread each; ``crowd``: wall time over processor time, 1 on an idle machine; ``predicted``: wall time of the
     command from ``begin`` on [s], the least and the most, once that was predicted, and ``took_s`` what it was; ``files`` are
     the names of the answer's files once all are written; ``fault`` is what ended the command.
@@ -191,7 +191,7 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     """Agendas noted in a store, the newest last, and whether the process of each still lives."""
     agendas = []
     for text, alive in store.notes(NOTE):
-        # What cannot be read tells nothing.
+        # What cannot be read shows nothing.
         with suppress(ValueError):
             agendas.append((Agenda.from_json(text), alive))
     return sorted(agendas, key=lambda each: each[0].begin)

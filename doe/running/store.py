@@ -46,7 +46,7 @@ class Failure:
 
 
 class StoppedError(RunError):
-    """Runs that something from outside has stopped; arguments: what, and the mend after which they go on."""
+    """Runs that something from outside has stopped; arguments: what, and the fix after which they go on."""
 
     def __str__(self) -> str:
         return "{}; finished runs are kept: {}".format(*self.args)
@@ -90,9 +90,9 @@ SCHEMA = (
 )
 # How long to wait for another process that writes [s].
 PATIENCE_S = 30.0
-# What mends a complaint of sqlite.
+# What fixes a complaint of sqlite.
 PLACE = "see that its folder is there and that both can be written, or name another folder"
-MENDS = {
+FIXES = {
     sqlite3.SQLITE_NOTADB: "it is no database; move it away or name another folder",
     sqlite3.SQLITE_CORRUPT: "it is damaged; move it away, its runs are then run again",
     sqlite3.SQLITE_BUSY: "another process holds it; start again when that has ended",
@@ -143,8 +143,8 @@ class Database:
         if version != VERSION:
             newer = version.isdigit() and int(version) > int(VERSION)
             what = f"a store of version {version}, not {VERSION}" if version else "not a store of runs"
-            mend = "install the newer doe that made it" if newer else "move it away"
-            raise InputError([f"{self.path}: {what}; {mend} or name another folder"])
+            fix = "install the newer doe that made it" if newer else "move it away"
+            raise InputError([f"{self.path}: {what}; {fix} or name another folder"])
         (sound,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
         if sound != "ok":
             raise InputError([f"{self.path}: damaged ({sound}); move it away, its runs are then run again"])
@@ -181,14 +181,14 @@ class Database:
             yield
         except sqlite3.Error as error:
             if getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-                what, mend = f"{self.path}: cannot be written ({error})", "make room on the disk and start again"
-                raise StoppedError(what, mend) from None
-            mend = MENDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
-            raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {mend}"]) from None
+                what, fix = f"{self.path}: cannot be written ({error})", "make room on the disk and start again"
+                raise StoppedError(what, fix) from None
+            fix = FIXES.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
+            raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {fix}"]) from None
 
 
 def _address(path: Path, read_only: bool) -> str:
-    """URI of the file. One that is only read is left alone wholly: no log is begun beside it."""
+    """URI of the file. One that is only read is left alone wholly: no log is begun next to it."""
     if not read_only:
         return path.absolute().as_uri()
     logs = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
@@ -273,8 +273,8 @@ class Store(Database):
         with self._faults():
             token = lock.seize(self.path)
         if token is None:
-            mend = "wait until it has ended, or name another folder"
-            raise InputError([f"{self.path}: {self._holder()} works on it; {mend}"])
+            fix = "wait until it has ended, or name another folder"
+            raise InputError([f"{self.path}: {self._holder()} works on it; {fix}"])
         self._token = token
         if self._meta("lock") == token:
             return
@@ -304,7 +304,7 @@ class Store(Database):
     def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, RunResult]:
         """Results and failures of those points that have ended, by key.
 
-        A row spoilt on the disk, or whose result is not ``sound``, is told on standard error and counts as not there.
+        A row spoilt on the disk, or whose result is not ``sound``, is reported on standard error and counts as not there.
         """
         outcomes, spoilt = dict[str, RunResult](), list[str]()
         query = "SELECT status, result, digest, cause FROM runs WHERE key = ? AND status != 'claimed'"
@@ -421,7 +421,7 @@ class Store(Database):
 
 
 def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, cause: Any) -> RunResult | None:
-    """What a row of an ended run tells; None where it is spoilt."""
+    """What a row of an ended run shows; None where it is spoilt."""
     if status == "failed":
         return Failure(point.label, cause, point.run, dict(point.factors)) if isinstance(cause, str) else None
     if not isinstance(result, str) or digest_of(result) != digest:

@@ -11,7 +11,7 @@ from rbdyn.base.fields import Figure, Number, Positive, no_power_of_two
 
 # A name that heads a column of a table: one field whoever writes or reads it.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
-# Steps beside a value, or resolutions within a step, that are finer than this are lost in rounding.
+# Steps next to a value, or resolutions within a step, that are finer than this are lost in rounding.
 FINEST = 1e-9
 
 
@@ -21,7 +21,7 @@ class Factor(Consistent):
     name: Name
     """Name of the factor in tables and messages."""
     key: Annotated[str, Field(min_length=3)] = ""
-    """Its key in the scene, such as cage.pocket_clearance_mm; needed beside [scene]."""
+    """Its key in the scene, such as cage.pocket_clearance_mm; needed with [scene]."""
     centre: Number
     """Value at coded 0."""
     step: Positive
@@ -29,7 +29,7 @@ class Factor(Consistent):
     resolution: Positive | None = None
     """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
     tolerance: Positive | None = None
-    """Half width of what manufacture makes of it."""
+    """Manufacturing tolerance, as a half width."""
     whole: bool = False
     """Whether only whole numbers are made, such as rollers; runs and pick are rounded to them."""
     allowed: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
@@ -37,10 +37,12 @@ class Factor(Consistent):
 
     def faults(self) -> Iterator[str]:
         if self.step < FINEST * abs(self.centre):
-            yield f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it"
+            yield f"step = {self.step:g}: is lost in rounding next to centre = {self.centre:g}; widen it"
         if self.resolution is not None and self.resolution < FINEST * self.step:
-            steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
-            yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
+            yield (
+                f"resolution = {self.resolution:g}: makes more than {1.0 / FINEST:g} steps of step = {self.step:g}; "
+                "coarsen it"
+            )
         if self.whole and self.resolution is not None:
             yield f"resolution = {self.resolution:g}: whole = true has none but 1; leave it out"
         if self.whole and self.tolerance is not None:
@@ -73,8 +75,8 @@ class Category(Consistent):
 
     def faults(self) -> Iterator[str]:
         values = [_in_toml(each) for each in self.categories]
-        mend, alien = f"write one of {', '.join(values)}", [name for name in self.inactive if name not in values]
-        yield from (f"inactive.{name}: is none of the categories; {mend}" for name in alien)
+        fix, alien = f"write one of {', '.join(values)}", [name for name in self.inactive if name not in values]
+        yield from (f"inactive.{name}: unknown category; {fix}" for name in alien)
         if len(self.categories) > len({*map(str, self.categories)}):
             yield f"categories = {self.categories}: name each value once"
 
@@ -100,7 +102,7 @@ KEYS_OF = {
     "d_optimal": {"runs", "augment"},
     "i_optimal": {"runs", "augment"},
 }
-# Runs at the centre unless told.
+# Runs at the centre by default.
 CENTRES = {"central_composite": 6, "box_behnken": 6, "definitive_screening": 1}
 
 
@@ -123,11 +125,11 @@ class Design(Consistent):
     levels: Annotated[int, Field(ge=2, le=100)] = 3
     """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
-    """Runs of a Latin hypercube or Sobol sequence; of an optimal design, which has no default, those beside runs that are
+    """Runs of a Latin hypercube or Sobol sequence; of an optimal design, which has no default, those next to runs that are
     given or at the centre."""
     augment: str | None = None
-    """Table of runs that were made, beside the study: an optimal design keeps them as they are and adds its own, so that all
-    together tell most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
+    """Table of runs that were made, next to the study: an optimal design keeps them as they are and adds its own, so that all
+    together show most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
     order: Literal["standard", "random"] = "standard"
     """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -140,12 +142,15 @@ class Design(Consistent):
 
     def faults(self) -> Iterator[str]:
         alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
-        mend = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
-        yield from (f"{key}: {mend}" for key in type(self).model_fields if key in alien)
+        yield from (
+            f"{key}: kind = {self.kind!r} has no such key; remove it or choose another kind"
+            for key in type(self).model_fields
+            if key in alien
+        )
         if self.kind in ("d_optimal", "i_optimal") and "runs" not in self.model_fields_set:
             yield f"runs: missing; kind = {self.kind!r} needs the number of runs to make"
         if self.cube_blocks > 1 and not self.blocks:
-            yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it"
+            yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true with it"
 
 
 class Goal(Consistent):
@@ -224,7 +229,7 @@ class Adaptive(Strict):
 
 
 class Robust(Consistent):
-    """Whether the pick beats the baseline over what is not known of the scene, with --robust."""
+    """Whether the pick beats the baseline over the unknown inputs of the scene, with --robust."""
 
     points: Annotated[int, Field(ge=32, le=1024)] = 256
     """Input sets, a power of two; the baseline and the pick are simulated at each."""
@@ -232,7 +237,7 @@ class Robust(Consistent):
     """Further simulations, as a share of the first, spent on the input sets where a gain is in doubt."""
     front: Literal["quantile", "mean", "none"] = "quantile"
     """A front of what holds over the unknowns: the quantile or the mean of each gain over the baseline; some of its points are
-    simulated beside the pick."""
+    simulated next to the pick."""
     quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
     """Quantile of a robust front: in how many of the cases a gain may be less."""
 
@@ -271,7 +276,7 @@ class StudyChain(Consistent):
     """Half width of the closing link about the pick; the tolerance that the study derives for the factor where left
     out."""
     file: str | None = None
-    """CHAIN.toml beside the study, which has the links under the chain's name."""
+    """CHAIN.toml next to the study, which has the links under the chain's name."""
     link: list[dict[str, Any]] = []
     """Links, as in a CHAIN.toml."""
     allocate: dict[str, Any] = {}
@@ -296,8 +301,9 @@ def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float
     """
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
-        why = f"missing, and no tolerance of {chain.factor} is known; add it"
-        raise InputError([f"chain {chain.name}: half_width_mm: {why}"])
+        raise InputError(
+            [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
+        )
     limits = {"lower_mm": value - half, "upper_mm": value + half}
     if chain.file is not None:
         named = _of_file(chain.name, folder / chain.file)

@@ -44,7 +44,7 @@ class SceneFile(Strict):
     """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
 
     file: str
-    """The scene file, beside the study."""
+    """The scene file, next to the study."""
     set: list[str] = []
     """Keys of the scene that are replaced for the design runs, as "key=value"; factors and seeds are none of them."""
 
@@ -83,10 +83,10 @@ class Confirmation(Strict):
 
 
 class Reference(Strict):
-    """A published table of the same design to stand beside."""
+    """A published table of the same design to compare with."""
 
     file: str
-    """The published table, beside the study."""
+    """The published table, next to the study."""
     label: str
     """Name of the source."""
     why: dict[str, str] = {}
@@ -113,7 +113,7 @@ class StudyFile(Consistent):
     robust: Robust = Robust()
     """The judgement over unknown inputs, with --robust."""
     uncertain: Uncertain | None = None
-    """What is not known of the scene; replaces what the scene says of it."""
+    """Unknown inputs of the scene; they replace those that the scene declares."""
     tolerances: Tolerances | None = None
     """The widest tolerances of the factors about the pick; none where left out."""
     confirmation: Confirmation = Confirmation()
@@ -123,7 +123,7 @@ class StudyFile(Consistent):
     chain: list[StudyChain] = []
     """Dimension chains that the pick's clearances close."""
     reference: Reference | None = None
-    """A published table of the same design to stand beside."""
+    """A published table of the same design to compare with."""
 
     @model_validator(mode="before")
     @classmethod
@@ -222,8 +222,12 @@ class Study:
     def scene(self) -> SceneFile:
         """Scene of the runs. Raises InputError for a study that has none."""
         if self.file.scene is None:
-            mend = "add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
-            raise InputError([f"{self.path}: scene: missing; {mend}"])
+            raise InputError(
+                [
+                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data "
+                    "TABLE.csv"
+                ]
+            )
         return self.file.scene
 
     @property

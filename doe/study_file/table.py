@@ -214,7 +214,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
 
     A column "<response>_error" holds 95 % half widths (empty or "nan" where unknown), "replicates" and "block" whole
     numbers; all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a
-    column "run" are replicates: their mean is one run, with the half width that their scatter tells.
+    column "run" are replicates: their mean is one run, with the half width of their scatter.
 
     Raises InputError, with all faults, when the file, a column or a number is missing, a row has more or fewer fields
     than the header, a column comes twice, a number is not finite or impossible, replicates have different factors, or there
@@ -238,10 +238,14 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         faults += bad
     refuse(faults)
     if "run" in columns and len(set(columns["run"].tolist())) < len(sheet.rows):
-        twice = (
-            "rows of one run are its replicates, whose scatter tells it; remove the column, or number the runs apart"
+        refuse(
+            (
+                f"{path}: column {name}: rows of one run are its replicates, whose scatter gives it; remove the column, "
+                "or number the runs apart"
+            )
+            for name in (*errors, COUNT)
+            if name in columns
         )
-        refuse(f"{path}: column {name}: {twice}" for name in (*errors, COUNT) if name in columns)
         columns = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
     if size > MOST_RUNS:

@@ -29,7 +29,7 @@ ROUNDS = 12
 
 
 def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[Array, Array]:
-    """Implausibility (n, k) of the cells that teach at quantiles (n, d), and the share (n, k) that the emulator has in what
+    """Implausibility (n, k) of the training cells at quantiles (n, d), and the share (n, k) that the emulator has in what
     the cell is compared with row by row."""
     learnt = measured.learnt
     mean, doubt = (each[:, learnt] for each in cells.predict(quantiles))
@@ -54,7 +54,7 @@ def ruling_out(implausible: Array) -> Whole:
 
 
 def more_sets(left: Array, fits: Callable[[Array], Mask], wanted: int, random: np.random.Generator) -> Array:
-    """At least ``wanted`` quantiles where there are as many, of those left (n, d) and of others beside them that fit."""
+    """At least ``wanted`` quantiles where there are as many, of those left (n, d) and of others next to them that fit."""
     for _ in range(ROUNDS):
         if len(left) >= wanted or len(left) < 3:
             break
@@ -76,7 +76,7 @@ def spread_out(candidates: Array, count: int) -> Array:
     return candidates[places]
 
 
-# Input sets of a wave: so many, and so many an input; candidates that tell what is left; sets that try the posterior.
+# Input sets of a wave: so many, and so many an input; candidates that show what is left; sets that try the posterior.
 FEWEST, EACH, CANDIDATES, TRIED = 64, 10, 16384, 50
 # Emulators miss where squared residuals of the posterior's simulations average more than this.
 MISSED = 2.0
@@ -168,7 +168,7 @@ def matched(
         points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
     assert batch is not None and cells is not None
     found = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
-    # A larger discrepancy than was allowed may still tell patterns; an exact simulation that is refuted tells nothing.
+    # A larger discrepancy than was allowed may still show patterns; an exact simulation that is refuted shows nothing.
     return found if refuted and not measured.scales.any() else _posterior(simulate, found, seed, particles, random)
 
 

@@ -38,7 +38,7 @@ class Better:
 def better(gains: Array, variances: Array, seed: int) -> Better:
     """How likely the true gains (n, m) are positive, given what was simulated and its variances (n, m)."""
     random = np.random.default_rng(seed)
-    # Every resampling shrinks anew: how much is noise is known no better than the rows tell it.
+    # Every resampling shrinks anew: how much is noise is known no better than the rows show it.
     *each, every = resampled(lambda rows: _shares(gains[rows], variances[rows], random), len(gains), random)
     return Better(each, every)
 

@@ -105,7 +105,7 @@ def table_of(laws: Mapping[str, Law | Sampled], quantiles: Array) -> list[dict[s
     return [dict(zip(laws, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-# Rows beside one of a sample that are as good as on it.
+# Rows next to one of a sample that are as good as on it.
 NEAR = 8
 
 
@@ -129,7 +129,7 @@ class Joint:
 
     @property
     def independent(self) -> bool:
-        """Whether no input tells anything of another."""
+        """Whether no input shows anything of another."""
         return self.factor is None and self.rows is None
 
     def sets(self, points: int, seed: int) -> Array:
@@ -145,7 +145,7 @@ class Joint:
 
     def redrawn(self, sets: Array, shared: Array, fresh: Array) -> Array:
         """Other input sets (n, d + 1) that have the inputs where ``shared`` (d + 1,) in common with ``sets``, and of the rest
-        what is likely beside these, by ``fresh`` evenly spread ones: drawn from the copula, or of a near row of the
+        what is likely next to these, by ``fresh`` evenly spread ones: drawn from the copula, or of a near row of the
         sample."""
         keep, redraw = (np.flatnonzero(shared[:-1] == which) for which in (True, False))
         found = np.where(shared, sets, fresh)

@@ -2,7 +2,7 @@
 
 Cells of a table go together, so a few principal components hold what the inputs do to all of them; each component has an
 emulator of its own. Cells are in units of what they are compared with, so that what matters is kept: components are left
-out once the signal in the rest is small beside that. What scatter adds to components and to the rest is known and taken off.
+out once the signal in the rest is small compared with that. What scatter adds to components and to the rest is known and taken off.
 
 Source: Higdon, Gattiker, Williams and Rightley, Computer model calibration using high-dimensional output, Journal of the
 American Statistical Association 103 (2008) 570.
@@ -19,7 +19,7 @@ Each output is of one of three kinds, so that the sample itself weighs whether t
 The share of the posterior in the last two over that of the prior is a Bayes factor.
 
 Sources: Kennedy and O'Hagan, Bayesian calibration of computer models, J. R. Statist. Soc. B 63 (2001) 425; Box and Tiao,
-A Bayesian approach to some outlier problems, Biometrika 55 (1968) 119, for the wide alternative beside the usual error.
+A Bayesian approach to some outlier problems, Biometrika 55 (1968) 119, for the wide alternative next to the usual error.
 """
 
 from dataclasses import dataclass, replace
@@ -118,7 +118,7 @@ class Measured:
 
     @property
     def learnt(self) -> Whole:
-        """Places of the cells that may teach."""
+        """Places of the cells that may be trained on."""
         return np.flatnonzero(~self.held)
 
     @property

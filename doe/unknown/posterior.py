@@ -27,7 +27,7 @@ from rbdyn.base.faults import RunError
 PARTICLES = 4000
 # Share of particles that still count at the next power; accepted moves of each particle there, and at the last; sweeps at most.
 COUNTING, ACCEPTED, ACCEPTED_LAST, MOST_SWEEPS = 0.5, 2.0, 4.0, 24
-# Accepted share that the length of moves aims at; share of moves of full length, from mode to mode; scatter beside a line.
+# Accepted share that the length of moves aims at; share of moves of full length, from mode to mode; scatter next to a line.
 AIM, LEAPS, BESIDE = 0.25, 0.1, 1e-3
 
 LogDensity = Callable[[Array], Array]
@@ -75,7 +75,7 @@ def sampled(log_likelihood: LogDensity, inputs: int, seed: int, particles: int =
 
 
 def effective(log_weights: Array) -> float:
-    """How many equally weighted particles would tell as much."""
+    """How many equally weighted particles would carry as much."""
     weights = _weights(log_weights)[0]
     return float(1.0 / (weights**2).sum())
 

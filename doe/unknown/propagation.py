@@ -11,7 +11,7 @@ by what of them is noise.
 
 Source: Hsu and Nelson, Control variates for quantile estimation, Management Science 36 (1990) 835.
 
-Which input makes an output vary: Sobol' indices of an emulator, with intervals, beside an input that does nothing.
+Which input makes an output vary: Sobol' indices of an emulator, with intervals, next to an input that does nothing.
 
 First-order index of an input: the share of the output's variance that would vanish if the input were known; total index:
 the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean, and shares of the

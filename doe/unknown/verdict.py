@@ -2,7 +2,7 @@
 
 Rows held out are predicted from the rest; without enough of them every row is, from all others: particles of whichever
 power serve best are weighed by the likelihood of those others. Predicted are the measured values themselves, with biases as
-the other rows tell them and the errors of rig and simulation. How wide predictions are is tried in turn: half of the rows
+the other rows determine them and the errors of rig and simulation. How wide predictions are is tried in turn: half of the rows
 predict the next, these together the one after it, and so on to the rows held out.
 
 Sources: Gneiting and Raftery, Strictly proper scoring rules, J. Am. Statist. Assoc. 102 (2007) 359 (CRPS); Vehtari, Gelman
@@ -11,11 +11,11 @@ J. Am. Statist. Assoc. 90 (1995) 773.
 
 Whether predictive distributions are as wide as they should be: too narrow and too wide both count against them.
 
-Cells are predicted row by row, each row from those before it, so what is left over of one row tells nothing of the next.
+Cells are predicted row by row, each row from those before it, so what is left over of one row shows nothing of the next.
 Each cell becomes a normal score by its rank among the draws of its prediction (its probability integral transform), and the
 scores of a row are made independent by their correlation among the draws. The sum of their squares is small where
 predictions are too wide and large where they are too narrow. It is judged for all cells together and for each output apart;
-the draws themselves, put in the place of the measured values, tell how small the smallest of all these chances may be.
+the draws themselves, put in the place of the measured values, show how small the smallest of all these chances may be.
 
 Sources: Dawid, Statistical theory: the prequential approach, J. R. Statist. Soc. A 147 (1984) 278; Westfall and Young,
 Resampling-based multiple testing (1993), section 2.3, for the smallest of several chances.
@@ -35,7 +35,7 @@ from rbdyn.base.arrays import Array, Mask, Whole
 
 # Chance of a rejection, of either side, where predictions are right.
 LEVEL = 0.05
-# Predictions twice too wide, or too narrow, must be found at least this often, or the cells are too few to tell.
+# Predictions twice too wide, or too narrow, must be found at least this often, or the cells are too few to decide.
 TWICE, OFTEN = 2.0, 0.5
 
 
@@ -68,7 +68,7 @@ class Width:
 
     @property
     def enough(self) -> bool:
-        """Whether the cells would tell predictions that are twice too wide or too narrow."""
+        """Whether the cells would show predictions that are twice too wide or too narrow."""
         return min(self.power) >= OFTEN
 
 
@@ -114,15 +114,15 @@ def width(parts: Sequence[Scores]) -> Width:
     return Width(output.size, float(ratios[0]), chance, name, float(ratios[worst]), (power[0], power[1]))
 
 
-# Rows held out that tell by themselves; share of cells that their interval is to hold.
+# Rows held out that decide by themselves; share of cells that their interval is to hold.
 ENOUGH, INSIDE = 3, 0.9
-# Residuals beyond so many standard deviations are too large; Bayes factors from the first on tell strongly that an output is
-# not explained, and particles tell them up to the second.
+# Residuals beyond so many standard deviations are too large; Bayes factors from the first on show strongly that an output is
+# not explained, and particles resolve them up to the second.
 FAR, STRONG, MOST = 3.0, 10.0, 1e6
 # Draws of a cell, of a row whose width is tried, and particles of each power that they are drawn from.
 DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
 ENDS = (0.5, 0.05, 0.95)
-# A bias is seen from so many of its standard deviations on, which so many particles tell.
+# A bias is seen from so many of its standard deviations on, which so many particles resolve.
 TOLD, FEWEST = 3.0, 30
 
 JointAt = Callable[[Array], Joint]
@@ -202,7 +202,7 @@ class Particles:
 
 
 def by_others(particles: Particles, seed: int) -> Prediction:
-    """Every row that teaches, predicted by the other rows that do."""
+    """Every training row, predicted by the others."""
     random, measured = np.random.default_rng(seed), particles.measured
     row = measured.row[measured.learnt]
     parts = [
@@ -213,7 +213,7 @@ def by_others(particles: Particles, seed: int) -> Prediction:
 
 
 def held_out(particles: Particles, seed: int) -> Prediction:
-    """The rows held out, predicted by all that teach."""
+    """The rows held out, predicted by all training rows."""
     measured = particles.measured
     return _prediction(particles, measured.learnt, np.flatnonzero(measured.held), np.random.default_rng(seed))
 
@@ -231,7 +231,7 @@ def _prediction(particles: Particles, known: Whole, asked: Whole, random: np.ran
 
 
 def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
-    """Scores of half of the rows that teach and of the rows held out, each by all rows before it, in an order by chance."""
+    """Scores of half of the training rows and of the rows held out, each by all rows before it, in an order by chance."""
     random, measured = np.random.default_rng(seed), particles.measured
     rows = [
         [places[measured.row[places] == row] for row in random.permutation(np.unique(measured.row[places]))]
@@ -281,7 +281,7 @@ def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Mea
 
 
 def bayes_factor(share: float, before: float) -> float:
-    """Odds of a share of the posterior over those of its share before, as far as particles tell them."""
+    """Odds of a share of the posterior over those of its share before, as far as particles resolve them."""
     odds = share * (1.0 - before) / max((1.0 - share) * before, 1e-300)
     return float(np.clip(odds, 1.0 / MOST, MOST))
 
@@ -294,7 +294,7 @@ def joint_factor(beyond: Mask) -> float:
 @dataclass(frozen=True, eq=False)
 class Judgement:
     """What may be claimed of a match: its ``trial``, each of the ``outputs``, the Bayes factor ``any_factor`` of any of them
-    being off, ``residuals`` (c,) of all cells as the others predict them, and the ``particles`` that told."""
+    being off, ``residuals`` (c,) of all cells as the others predict them, and the ``particles`` behind it."""
 
     trial: Trial
     outputs: list[Explanation]

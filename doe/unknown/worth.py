@@ -8,7 +8,7 @@ about their medians shows how much hangs on the ranges themselves, which are opi
 
 Intervals are by resampling: half of the rows without replacement, emulated by the hyperparameters of the whole. The estimate
 from n/2 of n rows scatters about that from all of them as this does about the truth (the delete-d jackknife at d = n/2), and
-no row comes twice, which an emulator would take for a replicate. Fewer rows foretell less, so the resamplings count by their
+no row comes twice, which an emulator would take for a replicate. Fewer rows predict less, so the resamplings count by their
 scatter about their mean; how far that lies from the estimate by all rows is the bias of this one, as of errors that fall
 with the rows, and lengthens the interval on its side. So do what slices blur, and what the worth would be without the
 emulators' own errors, which are no scatter where they go together along the input. The error of averages over fresh
@@ -74,7 +74,7 @@ class Together(NamedTuple):
 @dataclass(frozen=True)
 class Decides:
     """Inputs by their worth, the best first; the pair worth most, None where that is another one in many resamplings or worth no more than one input; share of
-    each gain's variance that the inputs foretell, of what noise leaves; by how much the probability that all gains are positive
+    each gain's variance that the inputs predict, of what noise leaves; by how much the probability that all gains are positive
     changes with ranges half as wide.
 
     ``verdict``: "decided" where the first input decides, "nothing" where none alone is worth measuring, else "undecided".
@@ -116,7 +116,7 @@ class _Gain:
         return covariance_of(self.emulator.points, self.emulator.variances, self.emulator.hyperparameters)
 
     def of(self, rows: Whole, sharp: bool = False) -> tuple[Array, Array]:
-        """What ``rows`` foretell at the fresh input sets (k,), and what they miss of each other (r,), of which noise is taken
+        """What ``rows`` predict at the fresh input sets (k,), and what they miss of each other (r,), of which noise is taken
         off, and where ``sharp`` what the emulator knows to be its own error; of equal hyperparameters."""
         here, there = self.columns
         gain, variances = self.emulator.values[rows], self.emulator.variances[rows]
@@ -124,7 +124,7 @@ class _Gain:
         projection = solution.projection
         alone = 1.0 / np.diag(projection)
         others = gain - alone * (projection @ gain)
-        # What the other rows foretell counts by as much as a row's gain follows it: nothing where it follows by chance only.
+        # What the other rows predict counts by as much as a row's gain follows it: nothing where it follows by chance only.
         follows = float(np.cov(gain, others)[0, 1] / max(others.var(ddof=1), 1e-300))
         slope, middle, mean = min(max(follows, 0.0), 1.0), float(others.mean()), float(gain.mean())
         missed = gain - mean - slope * (others - middle)
@@ -137,7 +137,7 @@ class _Gain:
 
     @property
     def foretold(self) -> float:
-        """Share of the gain's variance that the inputs foretell, of what noise leaves."""
+        """Share of the gain's variance that the inputs predict, of what noise leaves."""
         missed = self.of(np.arange(self.emulator.values.size))[1]
         whole = float(self.emulator.values.var(ddof=1) - self.emulator.variances.mean())
         return max(1.0 - float((missed**2).mean()) / max(whole, 1e-300), 0.0)
@@ -403,7 +403,7 @@ def _mean(again: Array) -> Array:
 
 
 def _chances(gains: Sequence[tuple[Array, Array]]) -> Array:
-    """Probability (k,) that all gains are positive, of what is foretold of each (k,) and missed (n,): what one row misses of all
+    """Probability (k,) that all gains are positive, of what is predicted of each (k,) and missed (n,): what one row misses of all
     gains may be missed anywhere."""
     positive = np.ones((gains[0][1].size, gains[0][0].size), dtype=bool)
     for foretold, missed in gains:

@@ -138,7 +138,7 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
                 goals,
                 plan,
                 np.append(study.baseline, -np.ones(counts)),
-                evaluate.tell,
+                evaluate.report,
                 border_of(study),
             )
         except InfeasibleError:
@@ -160,8 +160,8 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     return Adaptive(found, front, chosen, each[levels], edges, failures, time.perf_counter() - started)
 
 
-def costs_foretold(study: Study, adaptive: Adaptive, points: Array) -> Array:
-    """Costs (n, q) that the emulators foretell of points (n, k), as they are drawn and with the pick's categories."""
+def predicted_costs(study: Study, adaptive: Adaptive, points: Array) -> Array:
+    """Costs (n, q) that the emulators predict of points (n, k), as they are drawn and with the pick's categories."""
     found = adaptive.found
     beside = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
     coded = np.hstack([study.coded(points) / region_of(study), beside])
@@ -272,12 +272,12 @@ def advice(study: Study, surfaces: list[Surface]) -> list[str]:
 
 
 class _Evaluator(Evaluator):
-    """Runs batches of points with replicates of their own; the bar tells where the search stands."""
+    """Runs batches of points with replicates of their own; the bar shows where the search stands."""
 
     def __init__(self, study: Study, simulations: Simulations, total: int) -> None:
         super().__init__(study, simulations, simulations.progress("adaptive front"), total)
 
-    def tell(self, state: Batch, done: int, total: int) -> None:
+    def report(self, state: Batch, done: int, total: int) -> None:
         """A new bar a batch."""
         left = 100.0 * state.left / max(state.hypervolume, 1e-300)
         words = f"adaptive front: hypervolume {state.hypervolume:.3f}, at most {left:.1f} % to gain"
@@ -318,9 +318,9 @@ def _about(study: Study, found: AdaptiveFront, levels: tuple[int, ...]) -> Sampl
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """Hypervolumes between ``ideal`` and ``nadir`` (q,), in costs, of the front foretold.
+    """Hypervolumes between ``ideal`` and ``nadir`` (q,), in costs, of the predicted front.
 
-    By the last emulators: ``search`` (b,), of the fronts foretold before every batch and after the last, and ``surfaces``, of
+    By the last emulators: ``search`` (b,), of the predicted fronts before every batch and after the last, and ``surfaces``, of
     the polynomials' front as it is drawn. By the simulator, with its standard error: ``fresh``, of the search's points by
     their fresh runs.
     """
@@ -335,13 +335,13 @@ class Compared:
 def compared(study: Study, adaptive: Adaptive, on_surfaces: Array) -> Compared:
     """Fronts of a search and of the surfaces, (n, k) in factor units, on one scale."""
     found, goals = adaptive.found, adaptive.found.front.goals
-    costs = goals.costs(found.foretold)
+    costs = goals.costs(found.predictions)
     best = costs[non_dominated(costs)]
     scale = best.min(axis=0), best.max(axis=0)
     return Compared(
         *scale,
         search=np.array([hypervolume(goals.costs(found.emulators.predict(each)[0]), *scale) for each in found.fronts]),
-        surfaces=hypervolume(costs_foretold(study, adaptive, on_surfaces), *scale),
+        surfaces=hypervolume(predicted_costs(study, adaptive, on_surfaces), *scale),
         fresh=noisy_hypervolume(found.front.costs, found.front.cost_errors, *scale, DRAWS, found.front.seed),
     )
 
@@ -365,13 +365,13 @@ class Pull(NamedTuple):
 def pulls(study: Study, adaptive: Adaptive, pick: Array) -> list[Pull]:
     """How the responses with a goal pull at every factor of a point (k,) in factor units."""
     names = [study.responses[index] for index in goals_of(study).objectives]
-    span = np.ptp(adaptive.found.front.goals.costs(adaptive.found.foretold), axis=0)
+    span = np.ptp(adaptive.found.front.goals.costs(adaptive.found.predictions), axis=0)
     found = []
     for index, (low, high) in enumerate(adaptive.edges.tolist()):
         sides = np.clip(pick[index] + AWAY * (high - low) * np.array([-1.0, 0.0, 1.0]), low, high)
         at = np.tile(pick, (3, 1))
         at[:, index] = sides
-        below, here, above = costs_foretold(study, adaptive, at) / np.where(span > 0.0, span, 1.0)
+        below, here, above = predicted_costs(study, adaptive, at) / np.where(span > 0.0, span, 1.0)
         more = (here - above > LITTLE) & (above < below)
         less = (here - below > LITTLE) & (below <= above)
         turn = ~more & ~less & (np.maximum(above, below) - here > LITTLE)

@@ -45,7 +45,7 @@ from rbdyn.scene.unknown import Input, put, value_of
 
 
 class Question(NamedTuple):
-    """A scene with what is not known of it, the inputs that are ``sought``, a rig's table, and notes."""
+    """A scene with its unknown inputs, the inputs that are ``sought``, a rig's table, and notes."""
 
     case: Case
     sought: list[Input]
@@ -54,7 +54,7 @@ class Question(NamedTuple):
 
 
 def question_of(question: Question) -> str:
-    """What tells one question from another: its scene, its rig, what is sought, and the code that answers it."""
+    """What distinguishes one question from another: its scene, its rig, what is sought, and the code that answers it."""
     case, sought, rig, _ = question
     sought_of = [[each.key, each.law.model_dump(mode="json")] for each in sought]
     declared = [case.uncertain.model_dump(mode="json"), case.scene.calibrate.model_dump(mode="json")]
@@ -101,30 +101,37 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
     case = case_of(str(path), tables, rig.outputs, declared, fixed)
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
-    varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
     check_overrides(overrides, sought, fixed)
     notes = [
         *rig.notes,
         *case.remarks,
         *overriding(case, overrides),
-        *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies"),
+        *(
+            (
+                f"{each.key} varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the "
+                "key that it multiplies"
+            )
+            for each in case.every
+            if each.law.kind == "varies"
+        ),
     ]
     refuse(
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
         for key in free
         if key not in {each.key for each in case.every}
     )
-    refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
+    refuse([] if sought else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
     if case.scene.calibrate.discrepancy == "none":
-        exact = "discrepancy = none: the simulation is taken as exact"
-        notes.append(f"{exact}; where it is not, intervals are far too narrow")
+        notes.append(
+            "discrepancy = none: the simulation is taken as exact; where it is not, intervals are far too narrow"
+        )
     else:
         refuse(
             f"{path}: calibrate.discrepancy: {name} is not measured; known are {', '.join(rig.outputs)}"
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    # What is wrong at one condition alone is told once.
+    # What is wrong at one condition alone is reported once.
     refuse(dict.fromkeys(fault for each in cases_of(case, rig) for fault in impossible(each)))
     return Question(case, sought, rig, tuple(notes))
 
@@ -149,7 +156,7 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
 
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
-# Rows of the posterior sample, and input sets that tell what was likely before.
+# Rows of the posterior sample, and input sets that show what was likely before.
 SAMPLE, BEFORE = 1000, 2000
 
 
@@ -185,8 +192,16 @@ class Calibration:
         """Why inputs may not be called calibrated."""
         cells = [self.cells[place] for place in self.found.refuted]
         told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
-        refuted = "refuted: no input set within the laws gives what was measured within the allowed discrepancy"
-        return [*([f"{refuted}: {told}"] if cells else []), *self.objections]
+        return [
+            *(
+                [
+                    f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
+                ]
+                if cells
+                else []
+            ),
+            *self.objections,
+        ]
 
     @property
     def quantiles(self) -> Array:
@@ -261,8 +276,9 @@ class _Rows:
         outputs, variances, freedom = scattered(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
-            why = "is nothing in a simulation, so no share of it can be compared"
-            raise RunError(f"{name}: {why}; leave its column out")
+            raise RunError(
+                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
+            )
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
         return (
@@ -355,18 +371,23 @@ def _judged(given: Calibration) -> Calibration:
     judgement = judge(found, [quantity(name)[0] for name in given.rig.outputs], seed)
     quantiles = found.quantiles(points)
     prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
-    taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
-    against = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
+    gained = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
+    against = objections(judgement, anything=gained.anything, emulated=found.misfit < MISSED)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
-    crowds = "the posterior crowds at an end of its range, which may be too narrow"
-    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in taught.narrow)
-    whole = replace(given, after=after, learnt=taught, judgement=judgement, objections=tuple(against), notes=notes)
+    notes = (
+        *given.notes,
+        *(
+            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
+            for place in gained.narrow
+        ),
+    )
+    whole = replace(given, after=after, learnt=gained, judgement=judgement, objections=tuple(against), notes=notes)
     return replace(whole, without=_without(whole))
 
 
 def _without(given: Calibration) -> dict[str, float] | None:
-    """Contraction by key without the cells that the others predict badly; None where there are none that teach."""
+    """Contraction by key without the cells that the others predict badly; None where there are no training cells."""
     found = given.found
     assert given.judgement is not None
     left = np.setdiff1d(found.measured.learnt, given.outliers())

@@ -329,7 +329,7 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
 
 
 def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
-    """How likely the pick keeps its limits over the unknown inputs, or the command that tells; empty without limits."""
+    """How likely the pick keeps its limits over the unknown inputs, or the command that computes it; empty without limits."""
     if not goals_of(study).limited:
         return ""
     if odds is None:

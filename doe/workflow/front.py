@@ -40,7 +40,7 @@ MOST_RUNS = 300  # design runs whose misses count; of more, evenly spread ones
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """What was simulated of one response at coded points (c, k) less what was foretold: ``misses`` (c,), with the
+    """What was simulated of one response at coded points (c, k) less what was predicted: ``misses`` (c,), with the
     standard errors of the simulation (c,) and of the forecast (c,)."""
 
     points: Array
@@ -345,7 +345,7 @@ def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], a
         missed = " and ".join(f"{name} {sense} {limit:g} by {by:.4g}" for name, sense, limit, by in broken)
         where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
         none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
-        mend = "loosen a limit or widen the design"
-        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {mend}"]) from None
+        fix = "loosen a limit or widen the design"
+        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {fix}"]) from None
     except MethodError as error:
         raise InputError([f"{study.path}: front{after}: {error}"]) from None

@@ -116,7 +116,7 @@ def _words(key: str, text: str) -> str:
         return "is empty; fill it in or remove the row"
     if len(text) > LONGEST_NUMBER:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter value"
-    return f"is no value of that key; rbdyn keys {key} tells which are"
+    return f"is no value of that key; rbdyn keys {key} lists which are"
 
 
 def _adapter(key: str) -> TypeAdapter[Any]:
@@ -193,7 +193,7 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the
+    """A scene file with its unknown inputs: ``every`` input, ``outputs`` that are looked at, by key what stands in the
     rows of a posterior ``sample``, what is to be doubted of that, in a sentence, ``remarks`` on keys that do not vary, and the file that declares all this as ``home``."""
 
     source: str
@@ -284,7 +284,7 @@ def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
-    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+    """A scene file with its unknown inputs. Raises InputError, also where all is known."""
     case = case_of(str(path), tables_of(path, overrides), outputs)
     check_overrides(overrides, case.every)
     return case
@@ -293,9 +293,11 @@ def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> C
 def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
     """Raises InputError for overrides of a scene that no run has: of inputs, unless their laws multiply them, and of keys
     ``fixed`` as something else."""
-    mend = "take one of them out, or multiply the value by times"
     claims = {
-        each.key: f"the {each.law.law} law of this unknown input replaces it; {mend}"
+        each.key: (
+            f"the {each.law.law} law of this unknown input replaces it; take one of them out, or multiply the value "
+            "by times"
+        )
         for each in inputs
         if each.law.times != each.key
     }
@@ -318,8 +320,14 @@ def run_notes(case: Case, overrides: Sequence[str], by: str, runs: str = "") -> 
     given = {key_path(each): each for each in case.uncertain.set}
     clashing = _clashing(case, overrides)
     what = f"changes {runs}, not the input sets" if runs else "changes no run"
-    why = f"uncertain.set gives {'these' if runs else 'all of them'} {', '.join(given[key_path(each)] for each in clashing)}"
-    return [f"{by}{', '.join(clashing)} {what}: {why}"] if clashing else []
+    return (
+        [
+            f"{by}{', '.join(clashing)} {what}: uncertain.set gives {'these' if runs else 'all of them'} "
+            f"{', '.join(given[key_path(each)] for each in clashing)}"
+        ]
+        if clashing
+        else []
+    )
 
 
 def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
@@ -336,7 +344,7 @@ def case_of(
     fixed: Mapping[str, str] = NOTHING,
     stated_in: Path | None = None,
 ) -> Case:
-    """Tables of a scene with what is not known of it.
+    """Tables of a scene with its unknown inputs.
 
     ``declared`` counts instead of the scene's own, with paths from the folder of the file that it is ``stated_in``; keys
     ``fixed`` vary otherwise, each as what it says. Raises InputError, also where all is known.
@@ -353,8 +361,12 @@ def case_of(
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
     every = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
     if not every:
-        fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
-        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
+        raise InputError(
+            [
+                f'{home}: uncertain: nothing is unknown; name keys as "table.key" = {{law = ...}} or leave out '
+                "defaults = 'none'"
+            ]
+        )
     keys = {each.key for each in every}
     by_set = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, columns) if each.key not in keys]
     idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
@@ -401,7 +413,7 @@ def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]
 
 
 def _doubt(sample: Path) -> str:
-    """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
+    """What the record next to a posterior sample says of its calibration, unless that succeeded; empty without a record."""
     try:
         record = read_json(sample.with_suffix(".json"))
         verdict, same = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())
@@ -541,8 +553,10 @@ def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: S
     """Raises RunError where too many input sets are lost."""
     if lost > HOLES * sets:
         why = sentence(failures) if failures else impossible[0]
-        many = f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %"
-        raise RunError(f"{many}: {why}; narrow the laws of the inputs")
+        raise RunError(
+            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the "
+            "laws of the inputs"
+        )
 
 
 def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:

@@ -88,7 +88,7 @@ def searched_pick(
         if not (violations <= 0.0).all(axis=1).any():
             violations = goals.violations(front.values - below, front.values + above)
         baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
-        after = ", by what its tolerances leave of it"
+        after = ", at the ends of its tolerances"
     rounded = [rounded_within(study, point) for point in front.points]
     fresh = np.array([not any(np.array_equal(point, each.point) for each in simulated) for point in rounded])
     rows = np.flatnonzero(fresh) if fresh.any() else np.arange(len(front.points))
@@ -107,7 +107,7 @@ def neighbourhood(
 
 def _doubt(study: Study, searched: Adaptive, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
     """Mean and standard deviation (f, m) of what the front's fresh runs err by, given what they missed at the points
-    simulated, each beside its nearest row."""
+    simulated, each next to its nearest row."""
     front = searched.front
     shift, deviation = np.zeros_like(front.values), front.standard_errors.copy()
     if not simulated:
@@ -213,8 +213,8 @@ def choices(
 ) -> dict[str, Choice]:
     """The pick, then the picks by the other rules and of the searched front, by name.
 
-    What was ``chosen`` of the searched front is the pick, and the pick of the surfaces stands beside it. Where the study asks
-    for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot tell apart
+    What was ``chosen`` of the searched front is the pick, and the pick of the surfaces stands next to it. Where the study asks
+    for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot distinguish
     the first stands for all, and its reason says so.
     """
     wanted: dict[str, Choice] = {}
@@ -278,7 +278,7 @@ class Outward(Record):
 
     ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
     factor in millimetres, else one unit of the factor); the half-width is NaN where it is not known. ``source`` is
-    "surfaces" or "simulation". ``goals``: what is wanted, by response; small unless told.
+    "surfaces" or "simulation". ``goals``: what is wanted, by response; small by default.
     """
 
     factor: str = outside_json()
@@ -361,7 +361,7 @@ def edge_of(
     simulations: Simulations | None,
     ends: Array | None = None,
 ) -> Edge:
-    """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` tell, else the surfaces.
+    """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` show, else the surfaces.
 
     ``ends`` (k, 2), in factor units, of the region that the pick was searched in, where that has grown.
     """

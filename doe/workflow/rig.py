@@ -69,11 +69,11 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
         # Each sample counts for the time to the next one.
         moments = np.column_stack([rest[0][:-1] * np.diff(time), np.diff(time)])
     if len(moments) < FEWEST_SAMPLES:
-        few = f"{counted(len(moments), 'turn')} or samples; {FEWEST_SAMPLES} at least tell an error, measure longer"
-        raise InputError([f"{path}: {few}"])
+        turns = counted(len(moments), "turn")
+        raise InputError([f"{path}: {turns} or samples are too few for an error; measure at least {FEWEST_SAMPLES}"])
     mean = estimate([moments], lambda sums: sums[..., 0] / sums[..., 1])
     if not mean.value > 0.0 or not mean.half_width:
-        raise InputError([f"{path}: no cage speed above nothing that varies; check the signal"])
+        raise InputError([f"{path}: no positive, varying cage speed; check the signal"])
     return Mean(mean.value, mean.half_width / 1.96, note)
 
 
@@ -91,8 +91,9 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | Non
     quiet = np.zeros(1) if still is None else _filtered(still, cutoff, notches, STILL_PERIODS)[0]
     noise = float((quiet**2).mean()) / 2.0
     if 2.0 * noise > LOUDEST * float((speed**2).mean()):
-        loud = f"has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}"
-        raise InputError([f"{still}: {loud}; lower cutoff_hz"])
+        raise InputError(
+            [f"{still}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"]
+        )
     nearly = np.maximum(speed, np.sqrt(noise))
     mean = speed - noise / (2.0 * nearly) if noise else speed
     moments = np.stack([np.ones_like(speed), mean, speed**2 - 2.0 * noise])
@@ -119,8 +120,12 @@ def _filtered(path: Path, cutoff: float, notches: Sequence[float], fewest: int) 
         raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
     rate = 1.0 / interval
     if rate * (1.0 + 1e-6) < SAMPLES_A_PERIOD * cutoff:
-        few = f"{rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = {cutoff:g}"
-        raise InputError([f"{path}: {few}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"])
+        raise InputError(
+            [
+                f"{path}: {rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = "
+                f"{cutoff:g}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"
+            ]
+        )
     periods = len(time) * cutoff / rate
     if periods < fewest:
         raise InputError(
@@ -156,7 +161,7 @@ FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Any unit in use; pulses of the finest encoders.
 MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
-# Rows that teach; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
+# Training rows; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 
 
@@ -197,9 +202,9 @@ def read_rig(path: Path) -> Rig:
         raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
     cells, faults = _cells(sheet, keys)
     faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
-    teaching = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
-    if teaching < FEWEST:
-        faults.append(f"{path}: {counted(teaching, 'row')} to learn from; give {FEWEST} at least that are not on hold")
+    training = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
+    if training < FEWEST:
+        faults.append(f"{path}: only {counted(training, 'row')} not on hold; at least {FEWEST} are needed")
     refuse(faults)
     rows, notes = [], []
     for place in range(len(sheet.rows)):
@@ -260,8 +265,9 @@ def _named(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if not outputs:
         faults.append(f"{sheet.path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:
-        fix = "add a column of a scene key such as operation.inner_speed_rpm"
-        faults.append(f"{sheet.path}: no operating condition; {fix}")
+        faults.append(
+            f"{sheet.path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm"
+        )
     if CUTOFF in sheet:
         faults += [f"{sheet.path}: column {key}: {CUTOFF} sets that key; remove one" for key in FILTER if key in sheet]
     refuse(faults)
@@ -272,7 +278,7 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
     if name.endswith(SD):
         return f"column {listed([name])}: no output {listed([name.removesuffix(SD)])} is measured here; add it or remove this"
     if name == "cage_slip":
-        return "column cage_slip: may be nothing or less; give cage_speed_rpm, which tells the same"
+        return "column cage_slip: may be nothing or less; give cage_speed_rpm, which means the same"
     return (
         f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD}, "
         f"{TURNS} nor {HOLD}; rename or remove it"
@@ -309,8 +315,9 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
             yield cells.fault(name, place, "belongs to nothing in this row; leave it out, or add what it belongs to")
     for name in measured:
         if not (cells.states(name + SD, place) or cells.states(TURNS, place)):
-            fix = f"give it, or {TURNS} for the scatter of a run of so many shaft turns"
-            yield cells.fault(name + SD, place, f"is missing; {fix}")
+            yield cells.fault(
+                name + SD, place, f"is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
+            )
     if signal in measured:
         yield cells.fault(str(signal), place, f"comes from {FILE} too; leave out one")
     if kind == ORBIT and not cells.states(CUTOFF, place):
@@ -345,6 +352,6 @@ def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | 
 
 
 def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
-    """Frequencies [Hz] of the row's shaft and cage, as far as it tells them."""
+    """Frequencies [Hz] of the row's shaft and cage, as far as it shows them."""
     speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
     return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)

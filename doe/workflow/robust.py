@@ -117,7 +117,7 @@ POPULATION, GENERATIONS = 60, 40
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A design simulated over what is not known: its point (k,), why this one, how likely it gains, and the mean or the
+    """A design simulated over the unknown inputs: its point (k,), why this one, how likely it gains, and the mean or the
     quantile (q,) of its gains."""
 
     point: Array
@@ -163,7 +163,7 @@ def find_robust_front(
             baseline=study.baseline,
         )
     except InfeasibleError:
-        note = "no point keeps the limits over what is not known"
+        note = "no point keeps the limits over the unknown inputs"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
     chosen = {"pick": (pick, "the pick"), **_choices(study, found, predicted)}
     designs = {"baseline": clearance.assignments(study.at(()), study.baseline)}
@@ -324,7 +324,7 @@ class Decision:
 @dataclass(frozen=True)
 class Robust:
     """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
-    that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
+    that are worth most together, how well inputs predict each gain, by how much the chance of all gains changes with ranges
     half as wide, the front of points that hold over the inputs, None where the study wants none, the inputs, which all vary in
     every set, ``screened``: those that no emulator of a gain covers, with the largest share that the main effect of each makes of
     a gain, the cost in runs, the ``decision`` which of the deciding inputs is first, notes: what is to be doubted of a posterior
@@ -334,7 +334,7 @@ class Robust:
     better: Better
     decides: list[Decider]
     pair: tuple[str, str, float] | None
-    foretold: list[float]
+    explained: list[float]
     halved: float
     front: RobustFront | None
     inputs: list[Input]
@@ -349,24 +349,24 @@ class Robust:
 
 
 def robust_advice(study: Study) -> list[str]:
-    """Where the scene names estimates, what a judgement over them would tell and cost; else nothing."""
+    """Where the scene names estimates, what a judgement over them would answer and cost; else nothing."""
     if "uncertain" not in clearance.read_scene(study):
         return []
     runs = round(2 * study.file.robust.points * (1.0 + study.file.robust.settle))
     return [
-        "the scene names values that are estimates: --robust tells in how many of 100 cases the pick is better in spite of "
-        f"them, by {runs} short simulations and more for a front; doe uncertainty tells what they do to each figure"
+        "the scene names values that are estimates: --robust counts in how many of 100 cases the pick is better in spite of "
+        f"them, by {runs} short simulations and more for a front; doe uncertainty shows what they do to each figure"
     ]
 
 
 def check_robust(study: Study) -> None:
-    """Raises InputError where what is not known of the study's scene is declared wrongly."""
+    """Raises InputError where the unknown inputs of the study's scene are declared wrongly."""
     case_of_study(study)
 
 
 @one_thread
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
-    """Judge the pick (k,) beside the baseline. Raises InputError, RunError, KeyboardInterrupt."""
+    """Judge the pick (k,) next to the baseline. Raises InputError, RunError, KeyboardInterrupt."""
     case, goals = case_of_study(study), goals_of(study)
     joint, seed = case.joint(case.every), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
@@ -422,7 +422,7 @@ def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
 
 
 def case_of_study(study: Study) -> Case:
-    """The study's scene with what is not known of it; factors are known."""
+    """The study's scene with its unknown inputs; factors are known."""
     path = study.beside(study.scene.file)
     data = clearance.read_scene(study)
     for override in study.scene.set:

@@ -79,7 +79,7 @@ def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
 
 
 def _without(design: Design, inactive: list[int]) -> Design:
-    """Runs with the inactive factors at their centre; of those that only these told apart the ones that were there, or the
+    """Runs with the inactive factors at their centre; of runs that differ in these alone the ones that were there, or the
     first."""
     settled = design.coded.copy()
     settled[:, inactive] = 0.0
@@ -134,7 +134,7 @@ def _table(study: Study, name: str) -> Table:
         for row, column in np.argwhere(away > FARTHEST).tolist()
     )
     refuse(
-        f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; mend the row"
+        f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; fix the row"
         for column, factor in enumerate(study.file.factor)
         for row in np.flatnonzero(factor.whole & (table.actual[:, column] % 1.0 != 0.0)).tolist()
     )
@@ -154,8 +154,12 @@ def check_given(study: Study, folder: Path) -> None:
     """Raises InputError where the runs that are given stand in the table that the study writes into its folder."""
     name = study.file.design.augment
     if name is not None and study.beside(name).resolve() == (folder / RUNS_TABLE).resolve():
-        why = "the study writes its own runs there; copy it beside the study and name the copy"
-        raise InputError([f"{study.path}: design.augment = {name!r}: {why}"])
+        raise InputError(
+            [
+                f"{study.path}: design.augment = {name!r}: the study writes its own runs there; copy it next to the "
+                "study and name the copy"
+            ]
+        )
 
 
 def check_runs(study: Study, design: Design) -> None:
@@ -173,8 +177,8 @@ def check_runs(study: Study, design: Design) -> None:
     def simpler(model: Model) -> str:
         others: tuple[Model, ...] = "pure_quadratic", "interaction", "linear"
         less = [each for each in others if set(terms_of(study, each)) < set(terms_of(study, model))]
-        told = [each for each in less if runs >= needed(each) and not lost(each)]
-        return f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
+        fitting = [each for each in less if runs >= needed(each) and not lost(each)]
+        return f"choose a simpler model{' (' + ' or '.join(fitting) + ')' if fitting else ''}"
 
     faults = []
     for number, response in enumerate(study.file.response, 1):
@@ -188,13 +192,15 @@ def check_runs(study: Study, design: Design) -> None:
             more = "enlarge the design" if key != "runs" and lost(model) else f"raise design.{key}"
             faults.append(f"{where}: {few}: {more} or {simpler(model)}")
         elif gone := lost(model):
-            mend = f"add levels or centre points, or {simpler(model)}"
-            faults.append(f"{where}: the runs of the design cannot tell {', '.join(gone)} from the other terms; {mend}")
+            fix = f"add levels or centre points, or {simpler(model)}"
+            faults.append(
+                f"{where}: the runs of the design cannot separate {', '.join(gone)} from the other terms; {fix}"
+            )
     refuse(faults)
 
 
 def evaluation(study: Study, design: Design) -> dict[str, Any]:
-    """What the design can tell about the largest model that a response asks for, with its name as ``model``.
+    """How good the design is for the largest model that a response asks for, with its name as ``model``.
 
     See `doe.designs.evaluation.evaluate`. Raises InputError when the runs do not suffice.
     """
@@ -293,10 +299,12 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     # One a term, one a block beyond the first, one to judge the fit.
     needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
     if failures and len(left) < needed:
-        few = f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}"
-        raise RunError(f"{few}: {sentence(failures)}")
+        raise RunError(
+            f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
+            f"{sentence(failures)}"
+        )
     sound = [result for result in results if not isinstance(result, Failure)]
-    notes = _each_once(note for result in sound for note in result.notes)
+    notes = _each_once((note for result in sound for note in result.notes), len(sound))
     if failures:
         notes.append(
             f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
@@ -308,10 +316,12 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     )
 
 
-def _each_once(notes: Iterable[str]) -> list[str]:
-    """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
-    told = ((group, len(set(group)) == 1) for group in alike(notes, str))
-    return [group[0] if same else f"{group[0]} (so or similarly {len(group)} runs)" for group, same in told]
+def _each_once(notes: Iterable[str], runs: int) -> list[str]:
+    """Notes of so many ``runs``; of those that differ in their numbers only the first, and in how many runs there are."""
+    same = ((group, len(set(group)) == 1) for group in alike(notes, str))
+    return [
+        group[0] if one else f"{group[0]} (in {len(group)} of {runs} runs; figures of the first)" for group, one in same
+    ]
 
 
 def read_runs(study: Study, path: Path) -> Runs:

@@ -78,7 +78,7 @@ def design_works(study: Study) -> list[tuple[str, float]]:
     return [(point.key, work_of(scene)) for point, scene in zip(points, ordered.scenes, strict=True)]
 
 
-# What simulates, what judges, and what tells it.
+# What simulates, what judges, and what shows it.
 CODE = ("rbdyn.dynamics.simulate", "doe.workflow.whole", "doe.report.study.files")
 
 
@@ -307,7 +307,7 @@ def _record(
 
 
 def _stage(agenda: Agenda, place: int, answered: bool) -> dict[str, Any]:
-    """A stage as ``doe status`` tells it; ``state``: done, running (or where a command that is gone ended) or to come."""
+    """A stage as ``doe status`` shows it; ``state``: done, running (or where a command that is gone ended) or to come."""
     stage = agenda.stages[place]
     past = answered or place < agenda.place
     state = "done" if past else "to come" if agenda.stage is None or place > agenda.place else "running"
@@ -359,7 +359,7 @@ def _threads(agenda: Agenda, content: Content) -> int:
 
 
 def _at_once(since: float, content: Content, now: float) -> float | None:
-    """Runs at once, in the mean since a moment; None while too few have ended to tell."""
+    """Runs at once, in the mean since a moment; None while too few have ended to decide."""
     rows = [run for run in content.ended if run.seconds and run.started is not None and run.started >= since]
     begin = min((run.started for run in rows if run.started is not None), default=now)
     if len(rows) < 2 or now <= begin:

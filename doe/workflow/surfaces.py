@@ -78,8 +78,11 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
 def unrivalled(surfaces: Sequence[Surface]) -> list[str]:
     """A note where surfaces have too many runs to be compared with a Gaussian process; else none."""
     runs = max(len(surface.data.values) for surface in surfaces)
-    why = f"a Gaussian process of more than {MOST_RIVALLED} takes too long"
-    return [f"{runs} runs are not compared with a rival: {why}"] if runs > MOST_RIVALLED else []
+    return (
+        [f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} takes too long"]
+        if runs > MOST_RIVALLED
+        else []
+    )
 
 
 def independent_values(runs: Runs) -> Whole:
@@ -128,9 +131,10 @@ class Beside(Record):
         shown = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
         opposite = [factor for factor, effect in shown.items() if not effect.same_sign]
         signs = f"sign differs for {', '.join(opposite)}" if opposite else "all with our sign"
-        level = f"our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs"
-        effects = f"of their {len(shown)} significant linear effects, {signs}"
-        return f"{self.response}: {level}; {effects}; rank correlation {self.rank_correlation:+.2f}."
+        return (
+            f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs; of their "
+            f"{len(shown)} significant linear effects, {signs}; rank correlation {self.rank_correlation:+.2f}."
+        )
 
 
 def reference_runs(study: Study) -> Runs | None:
@@ -144,8 +148,9 @@ def reference_runs(study: Study) -> Runs | None:
     for point in design_of(study).coded:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
         if not distance or min(distance) > 0.02:
-            place = f"the design point {point.round(3).tolist()} (coded)"
-            raise InputError([f"{path}: no run left for {place}; mend the reference"])
+            raise InputError(
+                [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
+            )
         order.append(left.pop(int(np.argmin(distance))))
     return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])
 

@@ -1,4 +1,4 @@
-"""What is not known of a scene and what it does to its outputs: ``doe uncertainty``."""
+"""Unknown inputs of a scene and what they do to its outputs: ``doe uncertainty``."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -148,17 +148,23 @@ def _notes(
     for name, output in outputs.items():
         spread = output.spread
         if spread.hidden:
-            fix = "raise numerics.replicates or numerics.turns in uncertain.set"
-            notes.append(f"{name}: simulation noise exceeds the effect of the inputs; {fix}")
-        elif not spread.by_emulator:
-            share = f"Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}"
-            notes.append(f"{name}: its emulator predicts too little ({share}) to say which input makes it")
-        elif output.explained < WHOLE:
-            parts = f"{100.0 * output.explained:.0f} % of its variance"
             notes.append(
-                f"{name}: the inputs named make {parts}; other inputs and what the emulator misses make the rest"
+                f"{name}: simulation noise exceeds the effect of the inputs; raise numerics.replicates or "
+                "numerics.turns in uncertain.set"
+            )
+        elif not spread.by_emulator:
+            notes.append(
+                f"{name}: its emulator predicts too little (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to "
+                "say which input makes it"
+            )
+        elif output.explained < WHOLE:
+            notes.append(
+                f"{name}: the inputs named make {100.0 * output.explained:.0f} % of its variance; other inputs "
+                "and what the emulator misses make the rest"
             )
         if spread.known > target and not spread.hidden:
-            known = f"known to {100.0 * spread.known:.0f} % of its width only"
-            notes.append(f"{name}: after {count} input sets an end of its range is {known}")
+            notes.append(
+                f"{name}: after {count} input sets an end of its range is known to {100.0 * spread.known:.0f} % of "
+                "its width only"
+            )
     return tuple(notes)

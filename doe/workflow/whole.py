@@ -1,4 +1,4 @@
-"""The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside. Clearances in operation, the chains solved at the pick, and what is wrong with a study before anything runs."""
+"""The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table to compare with. Clearances in operation, the chains solved at the pick, and what is wrong with a study before anything runs."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -281,7 +281,7 @@ def run_study(
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
     ``retry``: run those again that failed before. ``adaptive``: also search the front of the simulator
-    itself. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
+    itself. ``robust``: judge the pick over the unknown inputs, which is also done where something is declared so. ``agenda``:
     where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
@@ -363,7 +363,7 @@ def _with_its_categories(
 def _edge(
     study: Study, surfaces: list[Surface], chosen: Chosen, searched: Adaptive | None, simulations: Simulations
 ) -> Edge:
-    """Where the pick lies at the edge of what was searched; the simulator tells what is beyond where it was searched."""
+    """Where the pick lies at the edge of what was searched; the simulator shows what is beyond where it was searched."""
     pick, front = chosen.confirmed["pick"], chosen.front.points
     if searched is None:
         return edge_of(study, surfaces, pick, front, None, None)

@@ -207,7 +207,7 @@ def causes(rows: Sequence[Success]) -> list[str]:
 
 
 def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
-    """Which solver to take here: the fastest of those that are as sure as the surest, as far as so many scenes tell."""
+    """Which solver to take here: the fastest of those that are as sure as the surest, as far as so many scenes show."""
     reached: dict[str, float] = {}
     for attempt in attempts:
         if attempt.status == "ok":
@@ -218,7 +218,7 @@ def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
     rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
     times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
     solves = f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
-    beside = f"; so many scenes do not tell it from {rivals} in sureness" if rivals else ""
+    beside = f"; so many scenes do not separate it from {rivals} in sureness" if rivals else ""
     return f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {solves}{beside}."
 
 

@@ -2,7 +2,7 @@
 
 The truth is one long, settled, tightly integrated run with seeds of its own. The scene is then repeated with other seeds,
 and of every figure it is counted how often value and ``Quantity.error`` hold the truth, whose own error joins as root sum
-of squares. Beside it the same of the statistical error alone, the mean half-width and the mean offset: an interval that
+of squares. Next to it the same of the statistical error alone, the mean half-width and the mean offset: an interval that
 always holds the truth is too wide.
 """
 

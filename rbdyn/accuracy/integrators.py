@@ -24,7 +24,7 @@ from rbdyn.scene import Scene
 
 # Right-hand sides a turn past which a method counts as failed.
 BUDGET_PER_TURN = 4_000_000
-# The least relative tolerance that SciPy takes: beside the absolute ones it is round-off.
+# The least relative tolerance that SciPy takes: next to the absolute ones it is round-off.
 NO_RELATIVE_TOLERANCE = 2.3e-14
 
 

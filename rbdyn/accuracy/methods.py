@@ -1,7 +1,7 @@
 """Our method compared with others on one compiled right-hand side: error of the motion against time, at equal error.
 
 A stretch of motion starts where a replicate has settled; its end is what two references agree on. The motion is chaotic: two
-runs part about 500-fold a shaft turn, so a method can be told from another over part of a turn only, and every span has
+runs part about 500-fold a shaft turn, so a method can be distinguished from another over part of a turn only, and every span has
 its own floor below which the reference itself is not known.
 """
 

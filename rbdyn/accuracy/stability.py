@@ -1,7 +1,7 @@
 """How extreme variants of a scene end: with a finite answer whose power balance closes, or with the reason why not.
 
 A case is a few assignments to the scene. Each runs one replicate over few turns. Where the balance stays open, the case
-runs once more at a tenth of the tolerance, to see whether tightening mends it.
+runs once more at a tenth of the tolerance, to see whether tightening fixes it.
 """
 
 import math
@@ -51,7 +51,7 @@ class Ending(Record):
 
     @property
     def unexplained(self) -> bool:
-        """Whether the case neither closes nor tells why."""
+        """Whether the case neither closes nor shows why."""
         return self.status == OPEN
 
 
@@ -138,7 +138,7 @@ def report(rows: Sequence[Ending]) -> Report:
     """Table of the endings, and every reason."""
     unexplained = sum(row.unexplained for row in rows)
     written = records(rows)
-    why = f"{unexplained} of {len(rows)} cases neither close nor tell why"
+    why = f"{unexplained} of {len(rows)} cases failed without a diagnosis"
     status: dict[str, Any] = {"status": why} if unexplained else {}
     table = tabled(f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %", rows, columns_of(Ending))
     sentences = [f"{row.case}: {row.reason}" for row in rows if row.reason]

@@ -95,14 +95,14 @@ def percent(value: float) -> str:
 
 
 def undecided(hidden: Iterable[Difference], scene: Scene, sought: float = SOUGHT) -> str:
-    """What hides what, and the turns or replicates that would tell; the least known of ``hidden`` speaks for all."""
+    """What hides what, and the turns or replicates that would show; the least known of ``hidden`` speaks for all."""
     worst = max(hidden, key=lambda difference: difference.error)
     numerics = scene.numerics
     turns = turns_needed(worst.error, numerics.turns, sought)
     replicates = replicates_needed(worst.error, numerics.replicates, sought)
     hides = f"errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where})"
-    mend = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
-    return f"undecided: {hides}; to tell {percent(sought)} {mend}"
+    fix = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
+    return f"undecided: {hides}; to show {percent(sought)} {fix}"
 
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
@@ -123,7 +123,7 @@ class Bias(Record):
     bias_error: dict[str, float]
 
     def verdict_of(self, name: str, sought: float = SOUGHT) -> Verdict:
-        """Whether an output is off by more than ``sought``, as far as its error tells."""
+        """Whether an output is off by more than ``sought``, as far as its error shows."""
         return judged(self.bias[name], self.bias_error[name], sought)
 
     def verdict(self, sought: float = SOUGHT) -> Verdict:

@@ -1,4 +1,4 @@
-"""Faults in what a user typed: collected all at once, one sentence each, with file, key, value and mend."""
+"""Faults in what a user typed: collected all at once, one sentence each, with file, key, value and fix."""
 
 import difflib
 import math
@@ -39,7 +39,7 @@ class InputError(Exception):
         listed = list(faults)
         if len(listed) > MOST_FAULTS:
             more = len(listed) - MOST_FAULTS + 1
-            listed = [*listed[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
+            listed = [*listed[: MOST_FAULTS - 1], f"and {more} more faults; fix these first"]
         self.faults = [one_line(fault) for fault in listed]
         super().__init__("\n".join(self.faults))
 
@@ -119,8 +119,9 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except UnicodeDecodeError as error:
         line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        sentence = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
-        raise InputError([f"{sentence}; save the file as UTF-8"]) from None
+        raise InputError(
+            [f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8); save the file as UTF-8"]
+        ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
@@ -135,7 +136,7 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     try:
         return _parsed(read_text(path), str(path))
     except tomllib.TOMLDecodeError as error:
-        raise InputError([f"{path}: not valid TOML ({error}); mend that line"]) from None
+        raise InputError([f"{path}: not valid TOML ({error}); fix that line"]) from None
 
 
 def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
@@ -144,7 +145,7 @@ def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
     faults = []
     for place, value in waiting:
         if len(place) > DEEPEST:
-            raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; mend the brackets"])
+            raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; fix the brackets"])
         if isinstance(value, Mapping):
             waiting += [((*place, key), each) for key, each in value.items()]
         elif isinstance(value, list):
@@ -166,7 +167,7 @@ def _parsed(text: str, source: str) -> dict[str, Any]:
     try:
         return bounded(tomllib.loads(text), source)
     except RecursionError:
-        raise InputError([f"{source}: brackets nested more than {DEEPEST} deep; mend them"]) from None
+        raise InputError([f"{source}: brackets nested more than {DEEPEST} deep; fix them"]) from None
 
 
 def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model:
@@ -255,7 +256,7 @@ class Claims:
 def assignment_faults(name: str, assignments: Sequence[str], claims: Mapping[tuple[str, ...], str]) -> list[str]:
     """What is wrong with the ``key.path=value`` assignments of the key ``name``, whatever their values.
 
-    ``claims``: keys that they must leave alone, each with the reason and the mend. An assignment that a later one undoes is a
+    ``claims``: keys that they must leave alone, each with the reason and the fix. An assignment that a later one undoes is a
     fault too.
     """
     faults, claimed, before = list[str](), Claims(claims), set[tuple[str, ...]]()
@@ -278,7 +279,7 @@ def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] 
 
 def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
-    mends: dict[str, list[str]] = {}
+    fixes: dict[str, list[str]] = {}
     missing = {_place(fault, data) for fault in errors if fault["type"] == "missing"}
     for fault in errors:
         kind, value, place = fault["type"], fault["input"], _place(fault, data)
@@ -288,9 +289,9 @@ def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source:
             continue
         key = _dotted(place)
         if kind == "extra_forbidden":
-            # To look for the nearest key takes a millisecond; beyond what is told nobody reads it.
-            mend = _nearest(model, place, missing) if len(sentences) < MOST_FAULTS else "remove it"
-            sentences.append(f"{source}: {key}: unknown key; {mend}")
+            # To look for the nearest key takes a millisecond; beyond what is reported nobody reads it.
+            fix = _nearest(model, place, missing) if len(sentences) < MOST_FAULTS else "remove it"
+            sentences.append(f"{source}: {key}: unknown key; {fix}")
         elif kind == "missing":
             sentences.append(f"{source}: {key}: missing; add it")
         elif kind == "value_error":
@@ -303,8 +304,8 @@ def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source:
         elif isinstance(value, float) and not math.isfinite(value):
             sentences.append(f"{source}: {key} = {value}: is not a finite number; write a plain number")
         else:
-            mends.setdefault(f"{source}: {key} = {_shown(value)}", []).append(_mend(kind, fault))
-    return sentences + [f"{head}: {', or '.join(dict.fromkeys(mend))}" for head, mend in mends.items()]
+            fixes.setdefault(f"{source}: {key} = {_shown(value)}", []).append(_fix(kind, fault))
+    return sentences + [f"{head}: {', or '.join(dict.fromkeys(fix))}" for head, fix in fixes.items()]
 
 
 def _place(fault: Any, data: Any) -> tuple[int | str, ...]:
@@ -317,7 +318,7 @@ def _place(fault: Any, data: Any) -> tuple[int | str, ...]:
     return (*place, fault["loc"][-1]) if fault["type"] == "missing" else tuple(place)
 
 
-def _mend(kind: str, fault: Any) -> str:
+def _fix(kind: str, fault: Any) -> str:
     limits = fault.get("ctx", {})
     bounds = {
         "greater_than": "must be greater than {gt}",

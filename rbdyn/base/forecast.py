@@ -76,13 +76,15 @@ class Forecast(NamedTuple):
         longer = f", up to {duration(self.longest_s)} where figures drift" if self.longest_s > self.seconds[1] else ""
         long = max(self.seconds[1], self.longest_s) >= LONG_S
         remedy = f"; {self.remedy} to shorten it" if self.remedy and long else ""
-        time = f"{span(*self.seconds)}{steps}{longer}{remedy}"
         if not self.runs[1]:
             return f"no run is left; the steps to the report take {span(*self.seconds)}"
-        turns = f"{_between(*self.turns)} shaft {'turn' if self.turns[1] == 1 else 'turns'}"
         low, high = self.runs
         runs = counted(high, "run") if low == high else f"{low} to {counted(high, 'run')}"
-        return f"{runs} of {turns} in all {are(high)} left: {self.threads} at once, {'it takes' if high == 1 else 'they take'} {time}"
+        return (
+            f"{runs} of {_between(*self.turns)} shaft {'turn' if self.turns[1] == 1 else 'turns'} in all {are(high)} "
+            f"left: {self.threads} at once, {'it takes' if high == 1 else 'they take'} "
+            f"{span(*self.seconds)}{steps}{longer}{remedy}"
+        )
 
 
 def duration(seconds: float) -> str:

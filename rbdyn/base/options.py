@@ -44,7 +44,7 @@ def folder_option(says: str, default: str = "nothing is written") -> Any:
 
 
 def verbose_flag(says: str) -> Any:
-    """``--verbose`` of a command that tells other things than ``Verbose`` says."""
+    """``--verbose`` of a command that shows other things than ``Verbose`` says."""
     return flag("--verbose", "-v", says=says)
 
 
@@ -71,7 +71,7 @@ Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
 
 
-# Where a comment starts beside a key.
+# Where a comment starts next to a key.
 COLUMN = 35
 
 

@@ -12,14 +12,14 @@ MOST_VALUES = 10_000
 
 def axis_values(text: str, option: str) -> list[float]:
     """Values of ``start:stop:count`` (evenly spaced) or ``a,b,c``. Raises InputError naming ``option``."""
-    mend = "write start:stop:count or values with commas, rising"
-    values = listed(text, f"{option} {text}", mend, 0, MOST_VALUES)
+    fix = "write start:stop:count or values with commas, rising"
+    values = listed(text, f"{option} {text}", fix, 0, MOST_VALUES)
     if not values or not np.isfinite(values).all() or any(b <= a for a, b in pairwise(values)):
-        raise InputError([f"{option} {text}: the values must rise; {mend}"])
+        raise InputError([f"{option} {text}: the values must rise; {fix}"])
     return values
 
 
-def listed(text: str, named: str, mend: str, fewest: int, most: int) -> list[float]:
+def listed(text: str, named: str, fix: str, fewest: int, most: int) -> list[float]:
     """The same in any order, from ``fewest`` to ``most`` where they are counted. Raises InputError, nothing made yet."""
     try:
         if ":" not in text:
@@ -31,4 +31,4 @@ def listed(text: str, named: str, mend: str, fewest: int, most: int) -> list[flo
             return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
     except ValueError:
         pass
-    raise InputError([f"{named}: not a list of numbers; {mend}"])
+    raise InputError([f"{named}: not a list of numbers; {fix}"])

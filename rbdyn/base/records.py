@@ -47,7 +47,7 @@ def shown(heading: str, form: str = "", **options: Any) -> Any:
 
 
 def outside_json(**options: Any) -> Any:
-    """A field of which JSON does not tell."""
+    """A field that JSON leaves out."""
     return field(metadata={"path": None}, **options)
 
 
@@ -56,7 +56,7 @@ def outside_json(**options: Any) -> Any:
 class Record:
     """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only.
 
-    One that tells of itself in brief, before this base, keeps its own ``repr``.
+    One that states itself in brief, before this base, keeps its own ``repr``.
     """
 
     def __init_subclass__(cls, kw_only: bool = False) -> None:
@@ -97,7 +97,7 @@ class Record:
 
 
 def json_fields(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
-    """Fields of which JSON tells, each with its keys there from the outermost in; one that is spread has none of its own."""
+    """Fields that JSON holds, each with its keys there from the outermost in; one that is spread has none of its own."""
     paths = ((one, one.metadata.get("path", (one.name,))) for one in fields(record))
     return [(one, path) for one, path in paths if path is not None]
 

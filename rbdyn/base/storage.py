@@ -1,4 +1,4 @@
-"""Finished parts of a long command, a line each in a file beside its results: one that was stopped goes on from there.
+"""Finished parts of a long command, a line each in a file next to its results: one that was stopped goes on from there.
 
 A line is there whole or not at all: it begins with the SHA-256 of the rest, and what does not fit it is not read.
 """

@@ -1,7 +1,7 @@
 """How a command meets its streams and Ctrl-C: both commands run through here. Loads nothing heavy.
 
 What is written to a pipe whose reader has gone, or to a stream that is closed, is lost without a word: the command goes
-on, so that its files stand whole and its exit code is the usual one. A device that takes no more is told once.
+on, so that its files stand whole and its exit code is the usual one. A device that takes no more is reported once.
 """
 
 import codecs

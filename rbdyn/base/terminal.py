@@ -29,7 +29,7 @@ from rbdyn.result import read_json, write_json
 
 # Ends that are looked back on: what a run takes may change on the way.
 LOOK_BACK = 256
-# A first report that comes within this time [s] tells of runs that were there before.
+# A first report that comes within this time [s] counts runs that were there before.
 AT_ONCE_S = 0.2
 
 
@@ -112,8 +112,9 @@ def guarded(as_json: bool) -> Iterator[None]:
     except KeyboardInterrupt as error:
         _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was kept'}"])
     except MemoryError as error:
-        why = f"out of memory: {error or 'no more is left'}"
-        _leave(as_json, FAILED, [f"{why}; ask for fewer points, samples or turns"])
+        _leave(
+            as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
+        )
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
@@ -151,7 +152,7 @@ def hand_over(
 
 @contextmanager
 def keeping(path: Path | None) -> Iterator[None]:
-    """Let Ctrl-C tell that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
+    """Let Ctrl-C say that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
     try:
         yield
     except KeyboardInterrupt:
@@ -175,8 +176,12 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
         own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
         marked = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
         if marked["command"] != command or (own["file"] != marked["file"] and digest != marked["sha256"]):
-            whose = f"what {marked['command']} made of {os.path.normpath(path / marked['file'])}"
-            raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])
+            raise InputError(
+                [
+                    f"--out {path}: holds what {marked['command']} made of {os.path.normpath(path / marked['file'])}; "
+                    "name another folder or remove this one"
+                ]
+            )
         write_json(mark, own)
     except OSError as error:
         raise InputError([f"--out {path}: is no folder to write to ({error.strerror}); name another"]) from None

@@ -154,7 +154,7 @@ class Brief:
     """A result that a notebook shows as a line or a small table of figures, not as all that it holds."""
 
     def brief(self) -> tuple[str, list[Figure]]:
-        """What is to be known beside the figures, and these."""
+        """What is to be known next to the figures, and these."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

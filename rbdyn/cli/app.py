@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` stand beside."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` are modules of their own."""
 
 import sys
 from pathlib import Path
@@ -203,7 +203,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, given.folder_option("Write here.", "'show' beside the result")] = None,
+    out: Annotated[Path | None, given.folder_option("Write here.", "'show' next to the result")] = None,
     turns: Annotated[float | None, given.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, given.flag("--animate", says="Also a moving picture and a player.")] = False,

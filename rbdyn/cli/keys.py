@@ -8,7 +8,7 @@ from rbdyn.scene.keys import AsSchema, Word, run
 
 
 def command(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
-    """Tell what every key of a scene means, its unit, range and default."""
+    """Explain every key of a scene: its meaning, its unit, range and default."""
     with guarded(as_json):
         run(kinds(), word, as_schema, as_json)
 

@@ -27,7 +27,7 @@ LYAPUNOV_TURNS = 100.0
 # Fewer samples show no motion.
 FEWEST_SAMPLES = 32
 PEAKS = 5
-# Loads of which the largest is told.
+# Loads of which the largest is reported.
 LOADS = {"pocket": "pocket_load", "dry_land": "land_load", "outer_race": "outer_load", "inner_race": "inner_load"}
 
 

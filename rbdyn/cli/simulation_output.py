@@ -80,12 +80,12 @@ def _error(error: float | None) -> str:
 
 
 def _run_sentence(result: "SimulationResult") -> str:
-    loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
-    runs = f"{counted(result.replicates, 'replicate')}, seed {result.seed}"
-    took = (
-        f"{result.cost['wall_s']:.2f} s{_predicted(result.cost)}, {result.cost['compile_s']:.1f} s to load or compile"
+    return (
+        f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power "
+        f"balance closes to {100.0 * result.power_gap:.2g} %; {counted(result.replicates, 'replicate')}, seed "
+        f"{result.seed}; {result.cost['wall_s']:.2f} s{_predicted(result.cost)}, {result.cost['compile_s']:.1f} s to "
+        "load or compile"
     )
-    return f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}"
 
 
 def _predicted(cost: dict[str, float]) -> str:
@@ -96,11 +96,13 @@ def _predicted(cost: dict[str, float]) -> str:
 
 
 def _race_sentence(race: str, contact: dict[str, float]) -> str:
-    pressed = f"{contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} µm each way"
     film = ""
     if "lambda_ratio" in contact:
         film = f", film {contact['central_film_um']:.2g} µm, lambda {contact['lambda_ratio']:.2g}"
-    return f"{race} race at its largest load: {pressed}{film}"
+    return (
+        f"{race} race at its largest load: {contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} "
+        f"µm each way{film}"
+    )
 
 
 def _clearances(clearance: dict[str, Any]) -> list[Block]:
@@ -121,11 +123,11 @@ def _clearances(clearance: dict[str, Any]) -> list[Block]:
 def _friction_sentence(check: dict[str, float | None]) -> str:
     """The maker's friction in a line; [N mm] and [W]."""
     power, rolling, sliding, heat, ratio = check.values()
-    model = (
-        f"SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 heat {heat:.3g} W"
-    )
     share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
-    return f"maker's friction: {model}; {share}"
+    return (
+        f"maker's friction: SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 "
+        f"heat {heat:.3g} W; {share}"
+    )
 
 
 def _further(result: "SimulationResult") -> list[Block]:
@@ -149,10 +151,9 @@ def _target_sentence(target: dict[str, Any]) -> str:
     chosen, cost = target["chosen"], target["cost"]
     errors = target["relative_error"].items()
     reached = ", ".join(f"{label(name)} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
-    aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
-    runs = (
-        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol {chosen['rtol']:g}"
+    return (
+        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
+        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol "
+        f"{chosen['rtol']:g}; {cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
+        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
     )
-    spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
-    pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
-    return f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs"

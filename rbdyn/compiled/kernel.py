@@ -258,7 +258,7 @@ def keep_code(compiled: Any, folder: Path) -> None:
     try:
         compiled._cache = EntryCache(compiled.py_func, folder)
     except OSError:
-        return  # without a source file nothing tells old code from new
+        return  # without a source file nothing distinguishes old code from new
     except (ImportError, AttributeError) as error:
         warn_once(
             f"numba {numba.__version__} lacks what keeping compiled code needs ({error}): every run compiles anew"
@@ -343,7 +343,7 @@ def _payload(data: bytes, key: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _text(of: Any) -> str:
-    """Types of a signature by names that tell apart named tuples of one name from different modules."""
+    """Types of a signature by names that distinguish named tuples of one name from different modules."""
     if isinstance(of, types.NamedTuple | types.NamedUniTuple):
         kind = of.instance_class
         return f"{kind.__module__}.{kind.__qualname__}({', '.join(map(_text, of.types))})"

@@ -143,7 +143,7 @@ def wall_film(film, gap, closing, roller_surface, wall_surface):
     on the roller's surface [N], power lost [W]).
 
     ``gap`` [m] may be negative; ``closing`` [m/s]; surface speeds along the wall at the contact [m/s], the roller's
-    seen from the contact. Each surface is held back by the rolling force; on the round one the pressure pushes twice as
+    seen from the contact. Each surface is slowed by the rolling force; on the round one the pressure pushes twice as
     much the other way, through its centre.
     """
     h = max(gap, film.floor)

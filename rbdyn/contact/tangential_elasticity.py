@@ -9,7 +9,7 @@ has T and k the tangential stiffness, for plane contact of like materials the no
 
 On the straight part tau is the creep slope over k, the time of a way of about the contact's width; a fast slip, as in an impact,
 meets the spring alone and finds the limit of traction in the time T/(k s). ``omega``, that of a roller's vibration between its
-races, bounds the rate where a flat curve answers faster than anything moves. Material damping c beside the spring lets the share
+races, bounds the rate where a flat curve answers faster than anything moves. Material damping c next to the spring lets the share
 beta/(tau + beta), beta = c/k, of the steady traction act at once. The coefficient that acts stays within those of the steady
 law, and traction ends with the load. What the contact does on the slip counts as lost, the elastic energy that it stores, some
 microjoules, with it.

@@ -15,7 +15,7 @@ from typing import Generic, TypeVar
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
 
 T = TypeVar("T")
-# Told (done, total) as something goes on, where anybody asks.
+# Given (done, total) as something goes on, where anybody asks.
 Reporter = Callable[[int, int], None] | None
 
 # Ctrl-C is looked for as often as this [s].

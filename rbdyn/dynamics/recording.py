@@ -102,7 +102,7 @@ class Relaxation(NamedTuple):
 def slowest(rates: Array) -> Relaxation | None:
     """Slowest motion by decay rates (states, motions) [1/s]; None where no state was looked at or none of them decays.
 
-    Few states tell a rate roughly: it counts as one standard error larger, so that no run is lengthened for noise. A motion
+    Few states give a rate roughly: it counts as one standard error larger, so that no run is lengthened for noise. A motion
     that does not decay even so excites itself, and has no relaxation time.
     """
     count = len(rates)

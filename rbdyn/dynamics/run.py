@@ -33,7 +33,7 @@ COMPANION = (0.6, 1.5)
 
 
 def log(sentence: str) -> None:
-    """A sentence as a warning of the logger "rbdyn", which Python writes to standard error unless told otherwise."""
+    """A sentence as a warning of the logger "rbdyn", which Python writes to standard error unless stated otherwise."""
     logging.getLogger("rbdyn").warning(sentence)
 
 

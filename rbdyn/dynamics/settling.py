@@ -37,7 +37,7 @@ class Ensemble:
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
     ``since``: batch from which they count where nothing drifts; ``fault``: why there are no companions although asked for;
-    ``transient_turns``: shaft turns of the transient (None where it cannot be told); ``notes``: what a result has to say of
+    ``transient_turns``: shaft turns of the transient (None where it cannot be determined); ``notes``: what a result has to say of
     its length.
     """
 

@@ -39,7 +39,7 @@ POINTS = "map_points.jsonl"
 
 
 class Point(Record):
-    """One speed and load; ``figures`` is empty where ``status`` tells why the run could not go on."""
+    """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on."""
 
     inner_speed_rpm: float
     radial_load_N: float  # noqa: N815

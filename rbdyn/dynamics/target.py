@@ -37,12 +37,12 @@ LARGEST_TARGET = 0.5
 LADDER = (0.1, 0.03, 0.01, 0.003)
 PILOT_REPLICATES, PILOT_WINDOWS, PILOT_TURNS = 8, 2, 40.0
 TOLERANCES = (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 1e-5, 1e-6)
-# Replicates of the example differ for as long as they were watched, so more of them tell more than longer ones: they are
+# Replicates of the example differ for as long as they were watched, so more of them show more than longer ones: they are
 # as short as lets transients take no more than a sixth of the turns.
 FEWEST_REPLICATES, WARM_UPS = 4, 5.0
 # A first short run may misjudge the scatter; the next is no more than so many times as long.
 GROWTH = (1.2, 4.0)
-# The plan aims lower than it was asked, as pilots tell the scatter to a tenth or two.
+# The plan aims lower than it was asked, as pilots know the scatter to a tenth or two.
 MARGIN = 0.9
 MOST_RUNS = 3
 # Counted turns of one run at most: minutes.
@@ -50,7 +50,7 @@ MOST_TURNS = 100_000.0
 NORMAL = 1.96
 # A difference that is all scatter and its 95 % half-width together, over that half-width: sqrt(1 + 1 / 1.96^2).
 NOISY_DIFFERENCE = 1.123
-# What adds up over runs in the cost of a result; the rest of it tells of the run that is reported.
+# What adds up over runs in the cost of a result; the rest of it is that of the run that is reported.
 ADDED = ("wall_s", "compile_s", "cpu_s", "steps", "rejected_steps", "rhs_evaluations", "turns")
 
 
@@ -174,7 +174,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
 def measure(
     scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None, notice: Notice = None
 ) -> tuple[Model, dict[str, float]]:
-    """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
+    """Pilots over the ladder of tolerances: what they show, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
     bearing = roller_bearing(pilot)
@@ -290,7 +290,7 @@ def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> 
 
 def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turns: float) -> float:
     """Relative bias over rtol: the slope of the figure over the tolerance, where that stands
-    out of its scatter; none otherwise, as the run itself will tell. ``turns``: of all replicates of one pilot."""
+    out of its scatter; none otherwise, as the run itself will show. ``turns``: of all replicates of one pilot."""
     figure = FIGURES[name][0]
     values = [estimate([figure.moments(run) for run in runs], figure.of_sums).value for runs in series]
     if values[-1] == 0.0:

@@ -40,7 +40,7 @@ class Life:
     outer_capacity: float
 
     def as_record(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
-        """What a report tells of it, hours at ring speeds [rad/s]; None where nothing is loaded, or nothing turns."""
+        """What a report says of it, hours at ring speeds [rad/s]; None where nothing is loaded, or nothing turns."""
         return {"L10_Mrev": finite(self.million_turns), "L10_h": finite(self.hours(inner_speed, outer_speed))}
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:

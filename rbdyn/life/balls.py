@@ -45,8 +45,9 @@ def refuse_impossible(gamma: float, inner_groove_factor: float, outer_groove_fac
     if not 0.0 < gamma < 1.0:
         raise MethodError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
     if not min(inner_groove_factor, outer_groove_factor) > 0.5:
-        what = f"groove factors {inner_groove_factor:g} and {outer_groove_factor:g} must be above 0.5"
-        raise MethodError(f"{what}, or the ball jams")
+        raise MethodError(
+            f"groove factors {inner_groove_factor:g} and {outer_groove_factor:g} must be above 0.5, or the ball jams"
+        )
 
 
 def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:

@@ -124,7 +124,7 @@ class RingPair(NamedTuple):
 
 
 def mounted_of(scene: BallScene) -> MountedRings | None:
-    """Shaft, rings and housing of a mounted bearing; None where the scene tells no mounting."""
+    """Shaft, rings and housing of a mounted bearing; None where the scene has no mounting."""
     if scene.mounting is None:
         return None
     materials = scene.material("inner_ring"), scene.material("outer_ring")

@@ -34,8 +34,9 @@ class Ring:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.inner_radius < self.outer_radius:
-            what = f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall"
-            raise MethodError(f"{what}; mend its diameters")
+            raise MethodError(
+                f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall; fix its diameters"
+            )
 
     def pressure_growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
         """Growth at ``radius`` [m] under pressures on bore and outside [Pa] (Lamé)."""
@@ -80,8 +81,10 @@ def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
     Raises MethodError when the rings do not share the nominal radius.
     """
     if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
-        what = f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit"
-        raise MethodError(f"{what}; give the nominal radius to both and the rest as interference")
+        raise MethodError(
+            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit; give the "
+            "nominal radius to both and the rest as interference"
+        )
     radius = outer.inner_radius
     overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
     compliance = outer.pressure_growth(radius, inside=1.0) - inner.pressure_growth(radius, outside=1.0)

@@ -156,7 +156,7 @@ def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, sid
     turn = np.linspace(0.0, angle, 40)
     arc = 0.36 if race == "outer" else 0.3
     axis.plot(side * arc * np.sin(turn), side * arc * np.cos(turn), color=colour, linewidth=0.9, zorder=3)
-    # Beside the line, on the side away from the radial line.
+    # Next to the line, on the side away from the radial line.
     away, side_of = (1.0, "left") if reach[0] >= 0.0 else (-1.0, "right")
     words = f"{ball[f'{race}_angle_deg']:.2f}°\n{ball[f'{race}_load_N']:.4g} N"
     place = 0.66 * reach[0] + 0.02 * away, 0.63 * reach[1]

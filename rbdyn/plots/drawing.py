@@ -98,7 +98,7 @@ class Drawing:
 
     @property
     def references(self) -> list[Reference]:
-        """Arrows at the lower left that tell force from length."""
+        """Arrows at the lower left that separate force from length."""
         left = -0.97 * self.extent
         arrows = []
         for line, (role, words, longest, scale) in enumerate(

@@ -33,7 +33,7 @@ def logarithmic(axis: Axes, across: str, up: str) -> None:
 def biases_at_work(
     rows: Sequence[Any], path: Path, sought: float, labels: tuple[str, str], time: str, line: tuple[str, str], mark: str
 ) -> None:
-    """Bias of each output against the field ``time`` of the rows, beside a named line of another field, whose points bear
+    """Bias of each output against the field ``time`` of the rows, next to a named line of another field, whose points bear
     the field ``mark``."""
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     logarithmic(axis, *labels)
@@ -64,7 +64,7 @@ def method_lines(axis: Axes, lines: Mapping[str, Points]) -> tuple[list[Named], 
 
 
 def failed_at_the_edge(axis: Axes, failures: dict[str, tuple[list[float], str]]) -> None:
-    """Crosses at the right edge, at the time it took to fail; names beside them, one above the other."""
+    """Crosses at the right edge, at the time it took to fail; names next to them, one above the other."""
     edge = axis.get_yaxis_transform()
     lowest = 0.0
     for name, (times, colour) in sorted(failures.items(), key=lambda failure: max(failure[1][0])):

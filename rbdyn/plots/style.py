@@ -1,4 +1,4 @@
-"""How every picture looks: colours told apart by all eyes, axes, saving. matplotlib is set up here."""
+"""How every picture looks: colours that all eyes distinguish, axes, saving. matplotlib is set up here."""
 
 import itertools
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-# Okabe and Ito 2008: told apart with any common colour blindness, and in grey by lightness.
+# Okabe and Ito 2008: distinct with any common colour blindness, and in grey by lightness.
 BLUE, ORANGE, GREEN, VERMILION, SKY, PURPLE = (
     "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7",
 )  # fmt: skip
 GREY = "#555555"
 OUTER, INNER, POCKET = BLUE, VERMILION, GREEN
 
-# Where a label may stand beside the end of its line: offset [points] and alignment, best first.
+# Where a label may stand next to the end of its line: offset [points] and alignment, best first.
 SIDES: tuple[tuple[float, Literal["left", "center", "right"]], ...] = ((0.0, "center"), (7.0, "left"), (-7.0, "right"))
 PLACES = [((right, up), side) for up in (9.0, 0.0, -9.0, 14.0, -14.0, 20.0, -20.0, 27.0) for right, side in SIDES]
 

@@ -17,6 +17,6 @@ FOLDER = Path(__file__).parent
 
 @functools.cache
 def table(name: str) -> list[dict[str, str]]:
-    """Rows of a table, by column; lines that start with # tell its source."""
+    """Rows of a table, by column; lines that start with # show its source."""
     lines = (FOLDER / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))

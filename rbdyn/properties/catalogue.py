@@ -10,7 +10,7 @@ compared with what is known; its error stands with it, and with the bearing that
 Cylindrical rollers, over the 46 sizes of ``cylindrical_rollers.csv`` that list both raceways (d, D: bore, outside diameter):
 rollers fill half of what is between the raceways, D_w = 0.547 (D - d)/2; they stand 1.22 D_w apart (18 in a NU 215, as
 published); their effective length gives C0 by ISO 76, 44 (1 - D_w/d_m) Z L D_w. C by ISO 281 is then 1.00 of the classic
-ratings and 0.87 of those that a maker raised by 15 % for cleaner steel; it cannot tell Z, which one more moves by 0.2 %.
+ratings and 0.87 of those that a maker raised by 15 % for cleaner steel; it cannot identify Z, which one more moves by 0.2 %.
 
 Balls: read from the orders of the Timken catalogue's table A-9 (series 60, 62 and 63, 21 sizes: Z = BPFO + BPFI, and D_w/d_m
 from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO 281 and ISO 76).
@@ -156,9 +156,11 @@ def read_designation(text: str) -> Designation:
             suffixes = tuple(suffix for word in words for suffix in _read(word, kind))
             _check(suffixes)
             return Designation(kind, letters, series, code, words, suffixes)
-    rollers = "NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210)"
-    balls = "a deep groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one"
-    raise MethodError(f"is no designation known here; write {rollers}, {balls} of 70, 72, 73, 718, 719 (7208B)")
+    raise MethodError(
+        "is no designation known here; write NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210), a deep "
+        "groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one of 70, 72, 73, 718, "
+        "719 (7208B)"
+    )
 
 
 def _parts(word: str, kind: str) -> list[str]:
@@ -189,8 +191,10 @@ def _check(suffixes: tuple[Suffix, ...]) -> None:
     first: dict[str, Suffix] = {}
     for each in suffixes:
         if (other := first.setdefault(each.group, each)) is not each:
-            what = f"suffixes {other.text} and {each.text} both state the {GROUPS[each.group].partition(',')[0]}"
-            raise MethodError(f"{what}; leave one out")
+            raise MethodError(
+                f"suffixes {other.text} and {each.text} both state the {GROUPS[each.group].partition(',')[0]}; leave "
+                "one out"
+            )
 
 
 CLEARANCE_CLASSES = ("C2", "CN", "C3", "C4", "C5")
@@ -276,8 +280,10 @@ def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
     for row in listed:
         if bore <= float(row["bore"]):
             return float(row[f"{name}_min"]), float(row[f"{name}_max"])
-    reach = f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm"
-    raise MethodError(f"{reach}; take a smaller bearing or another class")
+    raise MethodError(
+        f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm; take a smaller bearing or "
+        "another class"
+    )
 
 
 class ClearanceClass(NamedTuple):

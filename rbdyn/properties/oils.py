@@ -2,7 +2,7 @@
 
 Viscosity: ASTM D341 (Walther) through two points, the second from the viscosity index by ASTM D2270 where a grade gives
 one. Pressure coefficient: Gold et al. 2001, alpha = s nu^t. What a base oil has by default is an estimate; ``BaseOil``
-tells how far off it may be.
+shows how far off it may be.
 """
 
 import functools
@@ -16,13 +16,13 @@ from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
 
 # ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 % of it.
 GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460)
-# Of all pressure coefficients of ``BaseOil`` beside those measured at 40 to 100 C [-].
+# Of all pressure coefficients of ``BaseOil`` next to those measured at 40 to 100 C [-].
 GOLD_SPREAD = 0.25
 DENSITY_C = 15.0  # of data sheets
 
 
 class BaseOil(NamedTuple):
-    """What an oil has by its base where its grade or data sheet does not tell.
+    """What an oil has by its base where its grade or data sheet does not give it.
 
     ``gold``: s [1e-8/Pa] and t of alpha = s nu^t, nu [mm^2/s] at temperature, within 25 % (31 % for naphthenic oils).
     ``density`` at 15 C [kg/m^3], within 3 %; it falls by ``expansion`` a kelvin, within 20 % of that. ``conductivity`` [W/(m K)], within
@@ -148,7 +148,7 @@ def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
 
 
 class NamedOil(NamedTuple):
-    """An oil as it is asked for: what the scene calls it, its base oil if told, and whether it is the oil of a grease."""
+    """An oil as it is asked for: what the scene calls it, its base oil if given, and whether it is the oil of a grease."""
 
     oil: str
     base_oil: str | None = None
@@ -172,9 +172,11 @@ def oil_named(text: str) -> NamedOil:
             return NamedOil(name)
     if re.fullmatch(r"(?:mobil )?jet (?:oil )?(?:ii|2)", plain, re.IGNORECASE):
         return NamedOil(next(iter(TURBINE_OILS)))
-    what = f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}"
-    why = f"with {', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II"
-    raise MethodError(f"{what}, {why}; own data go into [lubricant] as oil = 'data_sheet'")
+    raise MethodError(
+        f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}, with "
+        f"{', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II; own "
+        "data go into [lubricant] as oil = 'data_sheet'"
+    )
 
 
 # The maker's data sheet: 27.6 and 5.1 mm^2/s at 40 and 100 C, 1003.5 kg/m^3 at 15 C.

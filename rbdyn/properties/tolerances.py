@@ -51,8 +51,9 @@ def fit_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     """
     match = CODE.fullmatch(code)
     if match is None or f"IT{match[2]}" not in STANDARD_TOLERANCES:
-        letters = "letters known: d to h, j, js, k, m, n, p, r, s"
-        raise MethodError(f'is no tolerance class such as "h6", "k5" or "H7"; {letters}')
+        raise MethodError(
+            'is no tolerance class such as "h6", "k5" or "H7"; letters known: d to h, j, js, k, m, n, p, r, s'
+        )
     letter, width = match[1], grade_tolerances(nominal_mm)[f"IT{match[2]}"]
     if letter in ("js", "JS"):
         return -width / 2, width / 2

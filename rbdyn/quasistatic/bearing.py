@@ -63,7 +63,7 @@ def equilibrium(
     """Equilibrium of a ball bearing under its load: angles, loads, stiffness, stress and life.
 
     ``scene``: also the path of its file. ``start``: a result nearby, or the solutions of its rows, which saves time. The
-    result's ``status`` tells where there is none; nothing is raised for it. Raises InputError for what is no scene of balls
+    result's ``status`` shows where there is none; nothing is raised for it. Raises InputError for what is no scene of balls
     and no start of such a bearing.
     """
     scene = balls_only(scene)

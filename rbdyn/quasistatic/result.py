@@ -64,7 +64,7 @@ NO_LOAD = 1e-9
 
 
 class Rating(NamedTuple):
-    """What pressure, life and remarks need of a row beside its loads: capacities of both races [N], speeds of both rings [rad/s]."""
+    """What pressure, life and remarks need of a row next to its loads: capacities of both races [N], speeds of both rings [rad/s]."""
 
     drawing: BallRow
     model: RowModel
@@ -144,7 +144,7 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
     # fmt: off
     listed = [
         ("unloaded", clear == size, lambda k:
-            "no ball touches the inner race, so nothing tells where the ring is; load it or take away clearance"),
+            "no ball touches the inner race, so nothing shows where the ring is; load it or take away clearance"),
         ("clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
         ("inner dent", inner > BALLS, lambda k: dent_sentence(float(inner[k]), BALLS, "inner")),
         ("outer dent", outer > BALLS, lambda k: dent_sentence(float(outer[k]), BALLS, "outer")),
@@ -216,7 +216,7 @@ class DoubleDeckerReport(Record):
 class BallResult(Brief, SavedRecord, kw_only=True):
     """Equilibrium of a ball bearing, ``scene`` the resolved input; ``status``: "ok", or why there is none.
 
-    ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or tells
+    ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or gives
     a mounting. ``other_roots``: more equilibria of the same load, where they are looked for. ``runout``: of the turning ring,
     where the command has followed it. ``rows``: the solved rows in SI, one, or the inner and the outer one of a
     double-decker; empty for a result that was loaded or that found no equilibrium. ``ratings``: what their pressures and lives
@@ -368,7 +368,7 @@ def contact_record(contact: PointContact, load: float) -> dict[str, float]:
 def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:
     """Film of each race at its largest load, the thermal factor included, between ``rings``, the names of the inner and outer one.
 
-    Empty where the scene tells no oil, and where nothing turns or bears.
+    Empty where the scene has no oil, and where nothing turns or bears.
     """
     if scene.lubricant is None:
         return {}

@@ -49,7 +49,7 @@ class Scene(SceneFile):
     ``Scene.load("SCENE.toml")`` reads a file, ``Scene.from_dict(tables)`` or ``Scene(bearing={...}, cage={...}, ...)`` tables as
     TOML gives them, ``scene.changed({"cage.mass_g": 50.0})`` is the scene with other values. Of a ball bearing all of them give a
     BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. What is wrong is an InputError that names every key,
-    value and mend at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
+    value and fix at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
     its motion, ``rbdyn.equilibrium(scene)`` is for balls; each takes the path of a file too.
 
     bearing, cage, lubricant, operation : drawings, oil, speeds and loads; needed.
@@ -78,7 +78,7 @@ class Scene(SceneFile):
     numerics: Numerics = Numerics()
     """Tolerance, length and replication of a run."""
     uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
-    """What is not known of all this; no run depends on it."""
+    """Unknown inputs of the scene; no run depends on them."""
     calibrate: Annotated[Calibrate, Field(exclude=True)] = Calibrate()
     """How doe calibrate finds that out; no run depends on it."""
 
@@ -130,8 +130,10 @@ class Scene(SceneFile):
                     f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
                 )
         if self.traction.elasticity and self.numerics.method == "rosenbrock":
-            what = "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other"
-            yield f"{what}: the implicit method knows no traction coefficients as states; set the method to 'auto'"
+            yield (
+                "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other: the implicit "
+                "method knows no traction coefficients as states; set the method to 'auto'"
+            )
         touching = cage.pocket_contact_length_mm
         if touching is not None and touching > bearing.roller_length_mm:
             yield (
@@ -160,7 +162,7 @@ class Scene(SceneFile):
         inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
         outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
         if cage.guidance != "roller" and not inner < land < outer:
-            yield f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; mend it"
+            yield f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; fix it"
         numerics = self.numerics
         if numerics.turns * numerics.samples_per_turn < 2:
             yield f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run"
@@ -260,7 +262,7 @@ class Scene(SceneFile):
 
     @cached_property
     def mounted_clearance(self) -> "MountedClearance | None":
-        """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
+        """What fits, temperatures and rotation do to the clearance; None where the scene has no mounting."""
         if self.mounting is None:
             return None
         from rbdyn.mounting.fits import operating_clearance
@@ -409,8 +411,12 @@ def scene_of(given: Scene | BallScene | Path | str) -> Scene | BallScene:
         return given
     if isinstance(given, str | PathLike):
         return Scene.load(Path(given))
-    what = f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file"
-    raise InputError([f"{what}; Scene.from_dict makes one of tables"])
+    raise InputError(
+        [
+            f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file; "
+            "Scene.from_dict makes one of tables"
+        ]
+    )
 
 
 def rollers_only(given: Scene | BallScene | Path | str) -> Scene:

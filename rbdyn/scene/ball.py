@@ -71,7 +71,7 @@ class BallRow(Consistent):
         if self.ball_diameter_mm >= self.pitch_diameter_mm:
             circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm"
             yield f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on {circle}; make the ball smaller"
-        # Only a contact angle that is known tells where the races are.
+        # Only a contact angle that is known shows where the races are.
         yield from self._clearance_faults() or self._ring_faults()
 
     def _clearance_faults(self) -> list[str]:
@@ -181,8 +181,8 @@ class DoubleDecker(Consistent):
         below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
         if not below < above:
             why = f"leaves no middle ring between raceways of {below:.4g} and {above:.4g} mm"
-            mend = "make it larger, or the inner row smaller"
-            yield f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: {why}; {mend}"
+            fix = "make it larger, or the inner row smaller"
+            yield f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: {why}; {fix}"
 
     @property
     def pitch_ratio(self) -> float:
@@ -470,7 +470,7 @@ class BallMaterials(Strict):
 
 
 class BallScene(SceneFile):
-    """Everything the equilibrium of a ball bearing needs; made, checked, changed and read as ``Scene`` tells."""
+    """Everything the equilibrium of a ball bearing needs; made, checked, changed and read as in ``Scene``."""
 
     bearing: BallBearing | DoubleDecker
     """The drawing: one row, or two rows with a ring between."""
@@ -488,7 +488,7 @@ class BallScene(SceneFile):
     """Fits, temperatures, shaft and housing."""
 
     def faults(self) -> Iterable[str]:
-        """One sentence for each diameter or oil that is missing, and for each that is told twice in different ways."""
+        """One sentence for each diameter or oil that is missing, and for each that is stated twice in different ways."""
         if self.mounting is not None:
             yield from _mounted_faults(self.mounting, self)
         elif self.model.ring_expansion:
@@ -591,7 +591,7 @@ def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
             yield f"{what}: leave the bearing's out"
     for row in {id(row): row for row in (inner, outer)}.values():
         if row.clearance_change_um != 0.0:
-            what = f"clearance_change_um = {row.clearance_change_um:g} and [mounting] both tell what mounting changes"
+            what = f"clearance_change_um = {row.clearance_change_um:g} and [mounting] both give what mounting changes"
             yield f"{what}; leave one out"
     if scene.model.ring_expansion and scene.model.ring_expansion_form == "paper":
         yield "model.ring_expansion_form = 'paper' knows no fits; take [mounting] away or set it to 'thick_ring'"

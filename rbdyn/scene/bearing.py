@@ -138,20 +138,22 @@ class Bearing(Consistent):
     def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
         if chord <= self.roller_diameter_mm:
-            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
-            what = f"rollers of {self.roller_diameter_mm:g} mm do not fit on {circle}"
+            what = (
+                f"rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch circle of "
+                f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            )
             yield f"bearing.rollers = {self.rollers}: {what}; take fewer or smaller ones"
         if self.roller_diameter_mm >= self.pitch_diameter_mm:
             what = f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway"
             yield f"{what} on a pitch circle of {self.pitch_diameter_mm:g} mm; make the roller smaller"
         if self.effective_length_mm > self.roller_length_mm:
             why = f"contact longer than the roller of {self.roller_length_mm:g} mm"
-            mend = "shorten it or lengthen bearing.roller_length_mm"
-            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {mend}"
+            fix = "shorten it or lengthen bearing.roller_length_mm"
+            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {fix}"
         if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
             why = f"out of proportion to a roller of {self.roller_diameter_mm:g} mm"
-            mend = "give millimetres, below a tenth of the roller"
-            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {mend}"
+            fix = "give millimetres, below a tenth of the roller"
+            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {fix}"
         yield from self._profile_faults()
         yield from self._form_faults()
 
@@ -169,7 +171,7 @@ class Bearing(Consistent):
             yield f"{what} needs a radius above {half:g} mm, commonly metres; enlarge it"
         points = self.profile_table_mm_um or []
         if any(len(point) != 2 for point in points):
-            yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
+            yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; fix the list"
             return
         if any(b[0] <= a[0] for a, b in pairwise(points)):
             yield "bearing.profile_table_mm_um: positions must rise from point to point; sort them"
@@ -179,8 +181,10 @@ class Bearing(Consistent):
                 yield f"{what}; shorten the profile or lengthen bearing.roller_length_mm"
         reach = max((abs(x) for x, _ in points), default=math.inf)
         if reach < 0.5 * self.effective_length_mm:
-            contact = f"the contact of {0.5 * self.effective_length_mm:g} mm from the middle"
-            yield f"bearing.profile_table_mm_um: ends at {reach:g} mm, within {contact}; carry the table on"
+            yield (
+                f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "
+                f"{0.5 * self.effective_length_mm:g} mm from the middle; carry the table on"
+            )
 
     def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
@@ -188,8 +192,10 @@ class Bearing(Consistent):
             why = f"bearing.roller_diameter_errors_um: {counted(len(errors), 'value')} for {self.rollers} rollers"
             yield f"{why}; give one a roller"
         if errors is not None and self.roller_diameter_spread_um > 0.0:
-            what = "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other"
-            yield f"{what}: give the errors or their spread, not both"
+            yield (
+                "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other: "
+                "give the errors or their spread, not both"
+            )
         limit = 0.01 * self.roller_diameter_mm * 1e3
         if errors is not None and any(abs(error) > limit for error in errors):
             why = f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller"
@@ -260,9 +266,10 @@ class Cage(Consistent):
         if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
             yield "cage: clearances above 5 mm are not clearances; give millimetres"
         elif self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
-            what = f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other"
-            why = "lips hold the cage only under guidance by the rollers"
-            yield f"{what}: {why}; take away the one or set the other to 'roller'"
+            yield (
+                f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips "
+                "hold the cage only under guidance by the rollers; take away the one or set the other to 'roller'"
+            )
         missing = [f"cage.{key}_mm" for key in SECTION_KEYS if getattr(self, f"{key}_mm") is None]
         if 0 < len(missing) < len(SECTION_KEYS):
             yield f"{', '.join(missing)}: missing; the stiffness of a bar needs its whole section, so give all four or none"

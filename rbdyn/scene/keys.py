@@ -25,7 +25,7 @@ from rbdyn.base.words import quantity
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WIDTH = 100
-# Bounds that only keep products from overflowing are not told.
+# Bounds that only keep products from overflowing are not given.
 BOUNDLESS = 1e12
 Word = Annotated[str | None, typer.Argument(metavar="WORD", help="Only keys that have it in name or description.")]
 AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, by which an editor completes TOML.")]

@@ -157,7 +157,7 @@ class Numerics(Consistent):
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     """Longest run that extend makes, as a multiple of the turns asked for."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
-    """Runs of the same scene from different starts; they tell the statistical error."""
+    """Runs of the same scene from different starts; they show the statistical error."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all random starts and spreads: equal scenes of equal seed and version give equal bits."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
@@ -199,5 +199,7 @@ class Numerics(Consistent):
         if self.whirl_notches_hz and self.whirl_cutoff_hz is None:
             yield "numerics.whirl_notches_hz: without numerics.whirl_cutoff_hz nothing is filtered; give that too"
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            room = f"memory for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
-            yield f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have {room}"
+            yield (
+                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory "
+                f"for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
+            )

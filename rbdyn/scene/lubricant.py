@@ -24,7 +24,7 @@ GRADE = "ISO VG "
 HOTTEST_C = 350.0
 # Kinematic viscosity [mm^2/s] beyond that of any oil, even at its pour point.
 THICKEST = 1e7
-# Keys that tell a grade or a data sheet more closely; a scene without them is saved without them.
+# Keys that specify a grade or a data sheet; a scene without them is saved without them.
 DATA_KEYS = ("base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3")
 SAVED_IF_GIVEN = (*DATA_KEYS, "supply")
 # Keys of [traction] that ask for one curve for all loads.
@@ -86,24 +86,28 @@ class Lubricant(Consistent):
     roller_roughness, race_roughness = SI("um"), SI("um")
 
     def faults(self) -> Iterator[str]:
-        """Whether it is told once: by name, by grade with base oil and index, or by a data sheet."""
+        """Whether the oil is given once: by name, by grade with base oil and index, or by a data sheet."""
         sheet = self.oil == "data_sheet"
         alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
         given = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
         for key in (key for key in given if key in alien):
-            told = f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} tells that by itself"
-            yield f"{told}; leave it out or name another"
+            yield (
+                f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} sets that by itself; leave it out or "
+                "name another"
+            )
         for key in ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ():
             if key not in given:
                 yield f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it"
         points = self.viscosities_C_mm2_s or []
         if any(len(point) != 2 for point in points):
-            yield "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend it"
+            yield "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; fix it"
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
-                what = f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature"
-                yield f"{what}, from -60 to {HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
+                yield (
+                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to "
+                    f"{HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
+                )
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -126,7 +130,7 @@ class Lubricant(Consistent):
 
     @property
     def estimates(self) -> tuple[str, ...]:
-        """A sentence on what is estimated of the oil, where its name does not tell all."""
+        """A sentence on what is estimated of the oil, where its name does not give all."""
         if self.oil == "MIL-L-85734":
             return ("lubricant: MIL-L-85734 is taken as MIL-L-23699, of whose class it is",)
         if self.oil in OILS:
@@ -138,8 +142,10 @@ class Lubricant(Consistent):
             by_index = f" and its viscosity index of {index:g} (D2270)" if graded else ""
             parts.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
         if self.pressure_coefficient_1_GPa is None:
-            alpha = f"{1e9 * oil.pressure_coefficient:.3g} 1/GPa"
-            parts.append(f"pressure coefficient {alpha} by Gold, within {100.0 * GOLD_SPREAD:g} %")
+            parts.append(
+                f"pressure coefficient {1e9 * oil.pressure_coefficient:.3g} 1/GPa by Gold, within "
+                f"{100.0 * GOLD_SPREAD:g} %"
+            )
         if graded and self.density_kg_m3 is None:
             parts.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
         parts.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
@@ -161,7 +167,7 @@ class Lubricant(Consistent):
 def with_traction_of_oil(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     """Tables of a scene, with the traction that goes with its oil where [traction] leaves it out.
 
-    MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils that are told by a grade or a data sheet yield at the
+    MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils that are given by a grade or a data sheet yield at the
     limit of their base oil; other turbine oils are taken as MIL-L-23699 in a thermal film, of which they are the class.
     """
     oil, traction = (scene.get(table, {}) for table in ("lubricant", "traction"))
@@ -185,7 +191,7 @@ class Traction(Consistent):
     """Law of the traction. four_constant: one curve for all loads, as in the paper, too hard for lightly loaded
     rollers, so skidding is under-predicted; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
     coulomb: dry. Where left out limiting_shear for oils by grade or data sheet, thermal_newtonian for turbine oils
-    beside MIL-L-7808 and MIL-L-23699."""
+    next to MIL-L-7808 and MIL-L-23699."""
     mu_0: NonNegative = 0.0
     """Traction coefficient without slip, of an ADORE-style set for a turbine-engine oil."""
     mu_m: NonNegative = 0.050
@@ -209,7 +215,8 @@ class Traction(Consistent):
     elasticity: bool = False
     """Tangential elasticity of the races: their contacts give way before traction follows the steady law, by a spring as stiff as
     the contact is against approach. Loaded contacts with a steep traction curve then need no implicit method: most bearings of
-    "rbdyn new" run five to eight times faster, with the same figures."""
+    "rbdyn new" run five to ten times faster. Loss, slip and whirl stay the same; impacts may be lower, for a roller then gives way
+    between wall and race: by 5 % for the NU 210 at its defaults (137.8 +- 2.9 N against 144.5 +- 2.6 N, 60 replicates)."""
     friction: Literal["film", "mixed"] = "film"
     """film: the oil carries all; mixed: asperities carry the share exp(-b Lambda^c) of a load (Zhou and Hoeprich 1991)
     and rub dry."""
@@ -246,9 +253,9 @@ class Traction(Consistent):
             keys = " and ".join(f"traction.{key} = {getattr(self, key):g}" for key in rivals)
             yield f"{shown}: contradicts {keys}; give the constants or the peak, not both"
         if c <= 0.0:
-            yield f"{shown}: the third, C, must be greater than 0; mend it"
+            yield f"{shown}: the third, C, must be greater than 0; fix it"
         elif smallest_traction(a, b, c, d) < 0.0:
-            yield f"{shown}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; mend them"
+            yield f"{shown}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; fix them"
 
 
 def smallest_traction(a: float, b: float, c: float, d: float) -> float:

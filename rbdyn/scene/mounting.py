@@ -74,8 +74,10 @@ class Mounting(Consistent):
 
     def faults(self) -> Iterator[str]:
         if self.shaft_bore_mm >= self.bore_mm:
-            bore = f"a bearing bore of {self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
-            yield f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in {bore}"
+            yield (
+                f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in a bearing bore of "
+                f"{self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
+            )
         if self.outside_diameter_mm <= self.bore_mm:
             what = f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}"
             yield f"{what}: not above the bore of {self.bore_mm:g} mm; make it larger"

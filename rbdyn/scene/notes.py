@@ -41,7 +41,7 @@ def unit_notes(
     cage_material: Material,
     bar_stiffness: float | str,
 ) -> tuple[str, ...]:
-    """One sentence a suspicious value; ``cage_material``: its density tells a cage that fills half the rollers' height, its
+    """One sentence a suspicious value; ``cage_material``: its density shows a cage that fills half the rollers' height, its
     modulus how stiff a bar may be; ``bar_stiffness`` [N/m] or "rigid".
     """
     usual = [*_of_cage(bearing, cage, cage_material, bar_stiffness), *_of_section(bearing, cage)]
@@ -153,5 +153,9 @@ def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> tuple[str, .
         other.append(f"bearing.roller_length_mm = {bearing.roller_length_mm:g} (below {sizes.width:g}, the width)")
     if not other:
         return ()
-    what = f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(other)}"
-    return (f"{what}; correct the designation or these keys",)
+    return (
+        (
+            f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(other)}; "
+            "correct the designation or these keys"
+        ),
+    )

@@ -33,8 +33,10 @@ class Schedule(Consistent):
         times = self.time_s
         for i, (a, b) in enumerate(pairwise(times)):
             if b <= a:
-                what = f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s"
-                yield f"{what}; sort them"
+                yield (
+                    f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s; sort "
+                    "them"
+                )
         for key in ("inner_speed_rpm", "radial_load_N"):
             values = getattr(self, key)
             if values is not None and len(values) != len(times):
@@ -61,7 +63,7 @@ class Operation(Consistent):
     unbalance_g_mm: NonNegative = 0.0
     """Unbalance of the shaft; its force grows with the square of the speed."""
     gravity_m_s2: NonNegative = 0.0
-    """Acceleration of gravity; off unless given, for beside centrifugal forces weight is small. 9.81 where it counts.
+    """Acceleration of gravity; off unless given, for weight is small compared with centrifugal forces. 9.81 where it counts.
     """
     gravity_direction_deg: float = 0.0
     """Direction of gravity, from that of the load."""
@@ -71,8 +73,10 @@ class Operation(Consistent):
 
     def faults(self) -> Iterator[str]:
         if max(abs(self.inner_speed_rpm), abs(self.outer_speed_rpm)) < SLOWEST_RPM:
-            what = f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns"
-            yield f"{what}; give at least {SLOWEST_RPM:g}, or turn the outer ring"
+            yield (
+                f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns; give at "
+                f"least {SLOWEST_RPM:g}, or turn the outer ring"
+            )
 
     @property
     def speeds(self) -> tuple[float, float]:

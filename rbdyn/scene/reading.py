@@ -24,8 +24,12 @@ class Checked(ModelMetaclass):
     def __call__(self, *given: Any, **tables: Any) -> Any:
         """The scene of these tables. Raises InputError with all faults at once."""
         if given:
-            what = f"{self.__name__}({one_line(repr(given[0]), LONGEST_NAME)}): takes tables by keyword"
-            raise InputError([f"{what}; {self.__name__}.load reads a file, {self.__name__}.from_dict a dict"])
+            raise InputError(
+                [
+                    f"{self.__name__}({one_line(repr(given[0]), LONGEST_NAME)}): takes tables by keyword; "
+                    f"{self.__name__}.load reads a file, {self.__name__}.from_dict a dict"
+                ]
+            )
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
@@ -61,8 +65,9 @@ class SceneFile(Consistent, metaclass=Checked):
         file does.
         """
         if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
-            what = f"changes = {one_line(repr(changes), LONGEST_NAME)}"
-            raise InputError([f'{what}: must be a dict such as {{"cage.mass_g": 50.0}}'])
+            raise InputError(
+                [f'changes = {one_line(repr(changes), LONGEST_NAME)}: must be a dict such as {{"cage.mass_g": 50.0}}']
+            )
         data = deepcopy(self._tables)
         for key, value in changes.items():
             put_key(data, key, plain(value), f"changed {key!r}")

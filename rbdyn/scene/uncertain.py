@@ -1,7 +1,7 @@
 """Inputs that nobody knows: how a scene or a study declares them, and the documented ranges of what drawings leave open.
 
-``[uncertain]`` holds a law a key; ``unknown_inputs.toml`` beside this module the ranges of keys with their reasons. Neither
-changes a run: they tell how the scenes around it differ.
+``[uncertain]`` holds a law a key; ``unknown_inputs.toml`` next to this module the ranges of keys with their reasons. Neither
+changes a run: they show how the scenes around it differ.
 """
 
 import functools
@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from rbdyn.base.faults import LONGEST_NAME, Claims, Strict, assignment_faults, key_path, one_line
 from rbdyn.base.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
 
-# What each law needs beside its name, and what it may have.
+# What each law needs next to its name, and what it may have.
 NEEDS = {
     "uniform": ("low", "high"),
     "log_uniform": ("low", "high"),
@@ -27,7 +27,7 @@ NEEDS = {
 MAY = {"normal": ("low", "high"), "choices": ("weights",)}
 NUMBERS = ("low", "high", "mode", "mean", "sd", "values", "weights")
 MOST_CHOICES = 6
-# How an input set is run: one window of the impact a replicate, for sets tell more than turns.
+# How an input set is run: one window of the impact a replicate, for sets show more than turns.
 RUNS = (
     "numerics.turns=20",
     "numerics.discard_turns=20",
@@ -103,7 +103,7 @@ class Law(Strict):
         if self.weights is not None and len(self.weights) != len(values):
             yield f"weights = {self.weights}: not one for each of the values; give as many"
         if any(value in values[:place] for place, value in enumerate(values)):
-            yield f"values = {values}: name each value once; weights tell how likely it is"
+            yield f"values = {values}: name each value once; weights give how likely it is"
         if self.times is not None:
             yield f"times = '{self.times}': choices are no numbers to multiply; leave it out"
         if self.measurable is not None:
@@ -115,7 +115,7 @@ class Law(Strict):
             if not low < high:
                 yield f"low = {low:g}: not below high = {high:g}; exchange them"
             elif high - low < FINEST * max(abs(low), abs(high)):
-                yield f"low = {low!r}: high = {high!r} is too near to it to be told from it; widen the range"
+                yield f"low = {low!r}: high = {high!r} is too near to it; widen the range"
             elif mode is not None and not low <= mode <= high:
                 yield f"mode = {mode:g}: not between low = {low:g} and high = {high:g}; put it there"
         if self.law == "log_uniform" and low is not None and low < SMALLEST:
@@ -127,7 +127,7 @@ class Law(Strict):
         if self.law != "normal" or mean is None or sd is None:
             return
         if sd < FINEST * abs(mean):
-            yield f"sd = {sd:g}: is lost in rounding beside mean = {mean:g}; raise it"
+            yield f"sd = {sd:g}: is lost in rounding next to mean = {mean:g}; raise it"
         for name, end, beyond in (("low", low, 1.0), ("high", high, -1.0)):
             if end is not None and beyond * (end - mean) > FARTHEST * sd:
                 yield f"{name} = {end:g}: is more than {FARTHEST:g} sd beyond mean = {mean:g}, where nothing is left; move it"
@@ -146,7 +146,7 @@ class Sampled:
     measurable: None = None
 
     def model_dump(self, **_: Any) -> dict[str, Any]:
-        """As a declared law is told in a record."""
+        """A declared law in a record."""
         return {"law": self.law, "rows": len(self.values), "low": self.values[0], "high": self.values[-1]}
 
 
@@ -160,14 +160,14 @@ class Correlation(Strict):
 
 
 class Uncertain(Strict):
-    """What is not known: "table.key" = {law = ...} of any key of a scene, and how much of the rest varies."""
+    """Unknown inputs: "table.key" = {law = ...} of any key of a scene, and how much of the rest varies."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Law] = Field(init=False)
 
     defaults: Literal["documented", "none"] = "documented"
     """documented: keys left at their default, or named in estimated, vary over their documented range where their law is
-    switched on (rbdyn keys tells the ranges); none: only what is named here, in estimated or with a law."""
+    switched on (rbdyn keys lists the ranges); none: only what is named here, in estimated or with a law."""
     estimated: list[str] = []
     """Keys of the scene whose values are estimates: they vary over their documented range, whatever defaults says."""
     points: Annotated[int, Field(ge=16, le=4096)] = 128

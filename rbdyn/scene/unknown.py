@@ -123,7 +123,7 @@ def _key_faults(keys: Iterable[str]) -> list[str]:
         elif key in known:
             faults.append(f"uncertain: {name}: holds more than one value; name a key of a single one")
         else:
-            # To look for the nearest key takes a millisecond; beyond what is told nobody reads it.
+            # To look for the nearest key takes a millisecond; beyond what is reported nobody reads it.
             alike = [each for each in known if each.startswith(f"{table}.")] or known
             near = difflib.get_close_matches(name, alike, n=1) if len(faults) < MOST_FAULTS else []
             faults.append(f"uncertain: {name}: unknown key; {f'did you mean {near[0]}?' if near else 'take it out'}")

@@ -117,7 +117,7 @@ def test_a_directory_is_no_table_and_a_flood_of_faults_is_told_by_its_count(tmp_
     assert "cannot be read" in faults_of(read_table, tmp_path, ["a", "b"], ["y"], Path("S.toml"))[0]
     start = time.process_time()
     faults = faults_of(table, tmp_path, "a,b,y\n" + "1,2,x\n" * 100_000)
-    assert len(faults) == MOST_FAULTS and faults[-1] == "and 99951 more faults; mend these first"
+    assert len(faults) == MOST_FAULTS and faults[-1] == "and 99951 more faults; fix these first"
     assert time.process_time() - start < 5.0
 
 
@@ -203,7 +203,7 @@ def study(folder: Path, *changes: tuple[str, str]) -> Path:
     [
         ("cage.guide_clearance_mm", "bearing.radial_clearance_mm", "factor.key = 'bearing.radial_clearance_mm': used more than"),
         ("step = 0.005", "step = 1e-300", "factor[1].step = 1e-300: must be at least 1e-12"),
-        ("step = 0.005", "step = 1e-12", "factor[1].step = 1e-12: is lost in rounding beside centre = 0.02; widen it"),
+        ("step = 0.005", "step = 1e-12", "factor[1].step = 1e-12: is lost in rounding next to centre = 0.02; widen it"),
         ("step = 0.005", "step = 1e300", "factor[1].step = 1e+300: must be at most"),
         ("resolution = 0.001", "resolution = 5e-12", "factor[1].resolution = 5e-12: makes more than 1e+09 steps"),
         ('name = "guide"', 'name = "pocket"', "chain.name = 'pocket': used more than once"),

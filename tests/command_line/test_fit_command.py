@@ -135,7 +135,7 @@ HEADER = ",".join(TABLE.columns)
             "to one of run, radial_clearance_mm, guide_clearance_mm, pocket",
         ),
         (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
-        (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot tell B from the other terms"),
+        (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot separate B from the other terms"),
         (TABLE.assign(power_loss_W=9.0), ("", ""), "power_loss_W: all 20 values are 9, so there is nothing to fit"),
         (TABLE, (MODEL, f"weighting = 'replicates'\n{MODEL}"), 'weighting = "replicates" needs'),
         (
@@ -251,7 +251,7 @@ def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeyp
         shown.exit_code == 0
         and "note: 12 runs are not compared with a rival: a Gaussian process of more than 11" in shown.stdout
     )
-    assert "left out in turn" not in shown.stdout
+    assert "leave-one-out" not in shown.stdout
 
 
 def test_unit_a_block_a_run_is_refused_before_its_columns_are_made(tmp_path):

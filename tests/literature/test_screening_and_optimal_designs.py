@@ -216,7 +216,7 @@ def test_seeds_and_settings_fix_the_bits():
         (lambda: optimal(3, criterion="d", runs=9), "runs = 9: too few for a model of 10 terms; give at least 11"),
         (
             lambda: optimal(3, criterion="i", runs=4, centre_replicates=3),
-            "runs = 4: beside 3 given or at the centre too few for a model of 10 terms; give at least 8",
+            "runs = 4: with 3 given or at the centre too few for a model of 10 terms; give at least 8",
         ),
         (
             lambda: optimal(2, criterion="d", runs=501),

@@ -69,7 +69,7 @@ def test_unit_open_balance_is_unexplained(outer, monkeypatch):
     monkeypatch.setattr(stability, "LARGEST_GAP", 1e-12)
     row = ending(outer, "as given", ())
     assert row.status == OPEN and row.unexplained and "even at rtol 0.001" in row.reason
-    assert stability.report([row]).record["status"] == "1 of 1 cases neither close nor tell why"
+    assert stability.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
 
 
 def test_unit_record_and_files(rows, tmp_path):

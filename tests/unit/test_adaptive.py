@@ -13,7 +13,7 @@ from scipy import special
 from doe.adaptive import Batch, Border, Plan, adaptive_front
 from doe.adaptive.acquisition import Known, Region, batch, candidates, dominated, levels_of, worth_it
 from doe.adaptive.emulators import Runs, embedded, fit_emulators, shares_of
-from doe.adaptive.search import as_foretold, missed, nothing_gained
+from doe.adaptive.search import as_predicted, missed, nothing_gained
 from doe.pareto.goals import Goals
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
 
@@ -121,15 +121,15 @@ def test_fresh_runs_must_lie_where_they_were_foretold():
     points = np.random.default_rng(5).uniform(-0.5, 0.5, (8, 2))
     ones = np.ones(8, dtype=np.int64)
     fresh = Runs(points, *noisy(bowls, 9, 0.01)(points, ones), ones)
-    assert as_foretold(found, fresh)
-    assert not as_foretold(found, fresh._replace(values=fresh.values + 0.05))
-    assert not as_foretold(found, fresh._replace(values=fresh.values * np.nan))
+    assert as_predicted(found, fresh)
+    assert not as_predicted(found, fresh._replace(values=fresh.values + 0.05))
+    assert not as_predicted(found, fresh._replace(values=fresh.values * np.nan))
     assert missed(found, fresh).std() < 2.0
 
 
 def test_it_stops_before_the_budget_is_spent_only_when_the_front_is_found():
     found = search(bowls, 1, budget=150, first=12, factors=2, noise=0.005)
-    assert "as foretold" in found.stopped
+    assert "as predicted" in found.stopped
     assert len(found.spent) < 90
     assert found.history[-1].why == "check"
     mean = bowls(found.front.points).sum(axis=1)

@@ -97,7 +97,7 @@ def test_what_no_response_transforms_to_is_at_the_limit():
         (np.ones((3, 1)), [1.0, 0.0, 2.0], "run 2 is 0, but a power transform needs positive values"),
         (np.ones((3, 1)), [1.0, 2.0, -0.5], "run 3 is -0.5"),
         (np.ones((3, 1)), [2.0, 2.0, 2.0], "all values are equal"),
-        (np.eye(3), [1.0, 2.0, 3.0], "no residual beside 3 terms"),
+        (np.eye(3), [1.0, 2.0, 3.0], "no residual for 3 terms"),
     ],
 )
 def test_data_without_an_answer_are_refused(matrix, values, words):

@@ -116,7 +116,7 @@ def test_record_is_plain_json_without_residual_degrees_of_freedom_too():
 def test_terms_that_cannot_be_told_are_named():
     two_levels = full_factorial(3, levels=2, centre_replicates=2).coded
     assert lost_terms(two_levels, QUADRATIC) == ["B^2", "C^2"]
-    with pytest.raises(ValueError, match=r"cannot tell B\^2, C\^2 from"):
+    with pytest.raises(ValueError, match=r"cannot separate B\^2, C\^2 from"):
         evaluate(two_levels, QUADRATIC)
 
 

@@ -116,7 +116,7 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
     [
         ('kind = "sobol"\nruns = 10', "quadratic", "the 10 runs of the design are too few; it needs 11 (10 terms and"),
         ('kind = "sobol"\nruns = 4', "linear", "it needs 5 (4 terms and one to judge the fit)"),
-        ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot tell B^2, C^2 from"),
+        ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot separate B^2, C^2 from"),
         (
             'kind = "d_optimal"\nruns = 10',
             "quadratic",
@@ -127,7 +127,7 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
             "quadratic",
             "it needs 11 (10 terms and one to judge the fit): enlarge the design or",
         ),
-        ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot tell C^2 from the other terms"),
+        ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot separate C^2 from the other terms"),
     ],
 )
 def test_runs_that_do_not_suffice_are_named_for_every_response(tmp_path, lines, model, words):

@@ -103,7 +103,7 @@ def test_impossible_tables_are_named(tmp_path, old, new, words):
 def test_a_study_does_not_read_what_it_writes(tmp_path):
     study = augmented(tmp_path, lines=PLACED.replace("made.csv", "out/design_runs.csv"))
     check_given(study, tmp_path / "elsewhere")
-    with pytest.raises(InputError, match=r"the study writes its own runs there; copy it beside the study"):
+    with pytest.raises(InputError, match=r"the study writes its own runs there; copy it next to the study"):
         check_given(study, tmp_path / "out")
 
 
@@ -111,5 +111,5 @@ def test_a_row_that_is_no_whole_number_is_named(tmp_path):
     study = augmented(tmp_path, table_of([[0.015, 0.15, 0.3], [0.025, 0.1, 0.25]]))
     whole = study.file.factor[0].model_copy(update={"whole": True, "centre": 0.0, "step": 1.0})
     study.file.factor[0] = whole
-    with pytest.raises(InputError, match=r"radial_clearance_mm in row 1 = 0.015: whole = true has no such value; mend"):
+    with pytest.raises(InputError, match=r"radial_clearance_mm in row 1 = 0.015: whole = true has no such value; fix"):
         design_of(study)

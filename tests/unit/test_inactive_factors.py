@@ -117,7 +117,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
     ("old", "new", "words"),
     [
         ('["guide_clearance_mm"]}', '["guide"]}', "factor.inactive of guidance = 'guide': no such factor; name one of radial_c"),
-        ("{roller =", "{rollers =", "inactive.rollers: is none of the categories; write one of outer, roller"),
+        ("{roller =", "{rollers =", "inactive.rollers: unknown category; write one of outer, roller"),
     ],
 )  # fmt: skip
 def test_unknown_names_of_inactive_factors(tmp_path, old, new, words):

@@ -80,7 +80,7 @@ def test_words_and_figures_of_it():
     # With the repeats at the centre, which the model meets by a term of its own, the share is one a run of the rest.
     assert surface.model_error.variance == pytest.approx(lack["ss"] / lack["df"] - pure["ms"], rel=0.05)
     assert surface.as_dict()["model_error"]["dof"] == lack["df"] == surface.interval_dof
-    assert sum("told by repeats" in line for line in describe(surface)) == 1
+    assert sum("shown by repeats" in line for line in describe(surface)) == 1
 
 
 def test_field_is_alike_nearby_and_strange_far_away():

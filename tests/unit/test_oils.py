@@ -163,10 +163,10 @@ def test_unit_unknown_oils(text):
     [
         (
             {"oil": "MIL-L-7808", "base_oil": "PAO"},
-            "lubricant.base_oil = PAO: lubricant.oil = 'MIL-L-7808' tells that by itself",
+            "lubricant.base_oil = PAO: lubricant.oil = 'MIL-L-7808' sets that by itself",
         ),
         ({"oil": "Mobil Jet Oil II", "density_kg_m3": 900.0}, "lubricant.density_kg_m3 = 900.0"),
-        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "tells that by itself; leave it out or name another"),
+        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "sets that by itself; leave it out or name another"),
         ({"oil": "data_sheet"}, "lubricant.density_kg_m3: missing"),
         ({"oil": "data_sheet"}, "lubricant.viscosities_C_mm2_s: missing"),
         ({"oil": "data_sheet", "viscosity_index": 95.0}, "lubricant.viscosity_index = 95.0: lubricant.oil"),

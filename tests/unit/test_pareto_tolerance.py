@@ -199,7 +199,7 @@ def test_region_ends_what_no_limit_ends():
     found = widest_tolerances(first_factor, [9.0, 0.0], [99.0], [1.0, 1.0], names=["x"], **BOX)
     assert found.half_widths.tolist() == [1.0, 10.0]
     assert found.limited_by == RIM and found.probability == 1.0
-    assert "no run tells" in found.sentence
+    assert "no run shows" in found.sentence
 
 
 def test_pick_that_fails_or_just_keeps_leaves_no_tolerance():

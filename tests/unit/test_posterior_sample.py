@@ -77,7 +77,7 @@ def test_unit_a_sample_of_choices_gives_scenes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("cage.mass_g\n45\n4S\n46\n", "cage.mass_g in row 2 = '4S': is no value of that key; rbdyn keys cage.mass_g tells which are"),
+        ("cage.mass_g\n45\n4S\n46\n", "cage.mass_g in row 2 = '4S': is no value of that key; rbdyn keys cage.mass_g lists which are"),
         ("cage.mass_g\n45\n-5\n46\n", "cage.mass_g in row 2 = -5: is no value of that key"),
         ("cage.mass_g\n45\n\"\"\n46\n", "cage.mass_g in row 2 = '': is empty; fill it in or remove the row"),
         ("cage.mass_g\n45\n1e400\n", "cage.mass_g in row 2 = 1e400: is no value of that key"),

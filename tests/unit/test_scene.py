@@ -203,7 +203,7 @@ def test_unit_files(tmp_path):
         Scene.load(tmp_path)
     path = tmp_path / "bad.toml"
     path.write_text("[bearing\nrollers = 10\n")
-    with pytest.raises(InputError, match=r"bad\.toml: not valid TOML .*line 1.*mend that line"):
+    with pytest.raises(InputError, match=r"bad\.toml: not valid TOML .*line 1.*fix that line"):
         Scene.load(path)
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match="cannot be read"):

@@ -62,7 +62,7 @@ def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     study, outcome, record, _ = studied
     goals, emulators = goals_of(study), outcome.adaptive.found.emulators
     told = record["adaptive"]["compared"]
-    costs = goals.costs(outcome.adaptive.found.foretold)
+    costs = goals.costs(outcome.adaptive.found.predictions)
     front = [row for row in costs if not ((costs <= row).all(axis=1) & (costs < row).any(axis=1)).any()]
     scale = np.min(front, axis=0), np.max(front, axis=0)
     assert list(told["ideal"].values()) == pytest.approx(scale[0])
@@ -70,7 +70,7 @@ def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     drawn = np.array([study.rounded(point) for point in outcome.front.points])
     on_surfaces, _ = emulators.predict((drawn - study.centre) / record["adaptive"]["emulators"]["half_range"])
     for mine, costs in (
-        (told["search"][-1], goals.costs(outcome.adaptive.found.foretold)),
+        (told["search"][-1], goals.costs(outcome.adaptive.found.predictions)),
         (told["surfaces"], goals.costs(on_surfaces)),
         (told["fresh"]["hypervolume"], outcome.adaptive.found.front.costs),
     ):
@@ -134,7 +134,7 @@ def foretelling(predict, faces=()):
     emulators = SimpleNamespace(predict=lambda at: (predict(at), None), runs=SimpleNamespace(values=predict(corners)))
     found = SimpleNamespace(
         emulators=emulators, region=Region(-one, one, 0.0 * one, np.nan * one, 0.01 * one), faces=faces,
-        foretold=predict(corners), front=SimpleNamespace(goals=goals),
+        predictions=predict(corners), front=SimpleNamespace(goals=goals),
     )  # fmt: skip
     half = 1.681792830507429 * study.step
     edges = np.column_stack([study.centre - half, study.centre + half])
@@ -161,7 +161,10 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
     )  # fmt: skip
     told = held_sentence(outcome)
     assert "where impact_force_N turns" in told
-    assert "whirl_deviation_ratio would gain with more and impact_force_N would gain with less" in told
+    assert (
+        "whirl_deviation_ratio would improve with a larger value and impact_force_N would improve with a smaller value"
+        in told
+    )
     assert "(the front goes on beyond with a probability of 0.97), beyond it the bearing would lose" in told
     assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
     assert "dimension chain pocket cannot" in told and "guide cannot" not in told

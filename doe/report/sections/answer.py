@@ -268,7 +268,7 @@ def _wish(response: Record) -> tuple[str, str, str, str]:
 
 
 def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Simulated responses at every confirmed point beside what the surfaces said."""
+    """Simulated responses at every confirmed point next to what the surfaces predicted."""
     points = part(summary, "confirmation")
     if not points:
         return None
@@ -289,7 +289,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
     if predicted := part(summary, "front", "predicted_gains"):
-        # The surfaces foretell the gains of their own pick, which another may have overtaken.
+        # The surfaces predict the gains of their own pick, which another may have overtaken.
         name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
         found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [

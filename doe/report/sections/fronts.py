@@ -165,7 +165,7 @@ MOST_POINTS = 400
 
 
 def fronts(summary: Record) -> list[Front]:
-    """The front on the surfaces and those beside it, each sorted by the first response and thinned."""
+    """The front on the surfaces and those compared with it, each sorted by the first response and thinned."""
     names = [each["name"] for each in responses(summary)]
     found: list[Front] = []
     for role, words, points in (
@@ -212,7 +212,7 @@ def picks(summary: Record) -> dict[str, Record]:
 
 
 def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Pictures that answer to the pointer, the picks, and what stands beside."""
+    """Pictures that answer to the pointer, the picks, and what they are compared with."""
     record = part(summary, "front")
     if not record:
         return None

@@ -29,7 +29,7 @@ def part(record: Record, *keys: str) -> Any:
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor as asked. Without a study beside, only its name is known."""
+    """A factor as asked. Without a study next to it, only its name is known."""
 
     name: str
     letter: str

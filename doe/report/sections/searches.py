@@ -1,4 +1,4 @@
-"""The search in few runs: how far its front came, run by run, beside other fronts, and where each run was spent and why."""
+"""The search in few runs: how far its front came, run by run, compared with other fronts, and where each run was spent and why."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -75,7 +75,7 @@ def curves(adaptive: Record) -> list[Curve]:
     compared, history = adaptive["compared"], adaptive["history"]
     runs, doubt = ([float(each[key]) for each in history] for key in ("runs", "deviation"))
     search, fresh = compared["search"], compared["fresh"]
-    told = f"search, foretold by its last emulators: {search[-1]:.3f} in the end; bars: what they doubted then"
+    told = f"search, predicted by its last emulators: {search[-1]:.3f} in the end; bars: their uncertainty then"
     words = f"its points by their fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"
     beside = f"front on the surfaces, by the same emulators: {compared['surfaces']:.3f}"
     return [

@@ -31,10 +31,10 @@ SHOWN, END = 8, 1e-3
 
 
 def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
-    """JSON record of ``doe calibrate``; ``made_of`` tells what it was asked of."""
+    """JSON record of ``doe calibrate``; ``made_of`` states what it was asked of."""
     keys = [each.key for each in found.inputs]
     posterior = found.found.sampled
-    taught, judgement = found.learnt, found.judgement
+    learnt, judgement = found.learnt, found.judgement
     tried = None if judgement is None else judgement.trial
     taus = [] if posterior is None else np.quantile(found.found.errors(posterior.points).level, TAUS, axis=0).T.tolist()
     return {
@@ -44,14 +44,14 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
         "data": str(found.rig.path),
         "verdict": found.verdict,
         "reasons": found.reasons,
-        "learned": {} if taught is None else dict(zip(keys, taught.contraction.tolist(), strict=True)),
+        "learned": {} if learnt is None else dict(zip(keys, learnt.contraction.tolist(), strict=True)),
         "combinations": [
             {
                 "powers": {keys[place]: power for place, power in each.powers.items()},
                 "sd_percent": 100.0 * each.after,
                 "sd_percent_before": 100.0 * each.before,
             }
-            for each in (taught.combinations if taught else ())
+            for each in (learnt.combinations if learnt else ())
         ],
         "discrepancy": dict(zip(found.rig.outputs, taus, strict=False)),
         "outputs": _outputs(found),

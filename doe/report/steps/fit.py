@@ -52,7 +52,7 @@ def print_csv(record: dict[str, Any]) -> None:
 
 
 def blocks(record: dict[str, Any]) -> list[Block]:
-    """The runs in actual values, the same in coded ones, what they can tell; for who asks for all seeds and leverages."""
+    """The runs in actual values, the same in coded ones, how good they are; for who asks for all seeds and leverages."""
     evaluation, runs = record["evaluation"], record["runs"]
     blocked = evaluation["blocks"] is not None
     actual = [

@@ -93,8 +93,8 @@ def _why(study: Study, pull: Pull) -> str:
     if pull.face is not None:
         return _end(study, pull.factor) if pull.face.held == "allowed" else HELD[pull.face.held]
     ways = [f"where {_listed(pull.turn)} {'turns' if len(pull.turn) == 1 else 'turn'}"] if pull.turn else []
-    gaining = (pull.more, "more"), (pull.less, "less")
-    ways += [f"{_listed(names)} would gain with {way}" for names, way in gaining if names]
+    gaining = (pull.more, "larger"), (pull.less, "smaller")
+    ways += [f"{_listed(names)} would improve with a {size} value" for names, size in gaining if names]
     return " and ".join(ways) or "where nothing changes much"
 
 
@@ -125,7 +125,7 @@ def trust_sentence(study: Study, adaptive: Adaptive) -> str:
 
 
 def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
-    """The hypervolumes of the front and of those beside it."""
+    """The hypervolumes of the front and of those that it is compared with."""
     predicted, (fresh, error) = float(compared.search[-1]), compared.fresh
     points = len(adaptive.found.front.points)
     share = f" ({100.0 * compared.surfaces / predicted:.0f} % of the first)" if predicted > 0.0 else ""
@@ -148,13 +148,13 @@ def _listed(parts: Sequence[str]) -> str:
 
 def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     """``front``: finalists by their fresh runs, with 95 % half widths; ``runs`` of design and search, ``fresh`` ones apart;
-    ``hypervolume`` of the front foretold, on the scale of its own ideal and nadir; ``foretold``: the 200 points of that front that have most of its hypervolume; ``points``: every run of design and search with its replicates and why it was made."""
+    ``hypervolume`` of the predicted front, on the scale of its own ideal and nadir; ``foretold``: the 200 points of that front that have most of its hypervolume; ``points``: every run of design and search with its replicates and why it was made."""
     found, front = adaptive.found, adaptive.found.front
     rows = zip(front.points, front.values, front.half_widths, strict=True)
     points = [
         point_record(study, at[: len(study.factors)], *rest) | {"factors": _factors(study, at)} for at, *rest in rows
     ]
-    costs = front.goals.costs(found.foretold)
+    costs = front.goals.costs(found.predictions)
     scale = costs.min(axis=0), costs.max(axis=0)
     fresh = noisy_hypervolume(front.costs, front.cost_errors, *scale, DRAWS, front.seed)
     return {
@@ -206,7 +206,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
 
 
 def compared_record(study: Study, adaptive: Adaptive, compared: Compared) -> dict[str, Any]:
-    """Hypervolumes between one ``ideal`` and ``nadir``, in costs: of the fronts foretold in the course of the ``search`` and of
+    """Hypervolumes between one ``ideal`` and ``nadir``, in costs: of the predicted fronts in the course of the ``search`` and of
     the ``surfaces``' front by the last emulators; of the search's points, ``fresh``, by their fresh runs, with 95 % half
     widths."""
     names = [study.responses[index] for index in adaptive.front.goals.objectives]
@@ -229,10 +229,10 @@ def _factors(study: Study, point: Array, drawn: bool = True) -> dict[str, Any]:
 
 
 def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:
-    """The front that the emulators foretell, whole or some ``rows``, with 95 % half widths."""
+    """The front that the emulators predict, whole or some ``rows``, with 95 % half widths."""
     found = adaptive.found
     errors = [f"{name}_error" for name in study.responses]
-    table = np.hstack([found.foretold, 1.96 * found.deviations])[rows].tolist()
+    table = np.hstack([found.predictions, 1.96 * found.deviations])[rows].tolist()
     names = [*study.responses, *errors]
     return [
         _factors(study, at) | dict(zip(names, row, strict=True))

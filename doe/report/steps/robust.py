@@ -15,7 +15,7 @@ NEARLY_ALL, LEAST = 0.9, 1e-3
 # Inputs named where it is undecided which decides; pairs that a study may ask for at most.
 CANDIDATES, MOST_PAIRS = 4, 1024
 # Share of a gain's variance that inputs must explain before the lack of a deciding one means anything.
-FORETOLD = 0.5
+EXPLAINED = 0.5
 
 
 def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
         "pair": _pair(robust),
         "halved": _halved(robust),
         "front": None if robust.front is None else _front(robust.front, robust.responses, factors),
-        "foretold": dict(zip(robust.responses, robust.foretold, strict=True)),
+        "foretold": dict(zip(robust.responses, robust.explained, strict=True)),
         "inputs": [
             {"key": each.key, "law": each.law.model_dump(exclude_none=True), "reason": each.reason}
             for each in robust.inputs
@@ -109,7 +109,7 @@ def _of_front(robust: Robust, factors: Sequence[str]) -> list[str]:
         return [] if front is None else [f"Robust front: {front.note}."]
     pick, *others = front.confirmed.values()
     best = max(others, key=lambda each: each.better.all.value)
-    lost = [quantity(name)[0] for name, q2 in zip(robust.responses, front.q2, strict=True) if q2 < FORETOLD]
+    lost = [quantity(name)[0] for name, q2 in zip(robust.responses, front.q2, strict=True) if q2 < EXPLAINED]
     loose = f"; the emulators predict little of {' and '.join(lost)}, so a better one may exist" if lost else ""
     if best.better.all.value <= pick.better.all.value:
         return [f"No point of the robust front that was simulated gains in all in more cases than the pick{loose}."]
@@ -187,8 +187,8 @@ def _nothing(robust: Robust) -> str:
 
 def _lost(robust: Robust) -> str:
     """Which gains follow no input, so that none that decides would show."""
-    foretold = zip(robust.responses, robust.foretold, strict=True)
-    lost = [quantity(name)[0] for name, share in foretold if share < FORETOLD]
+    explained = zip(robust.responses, robust.explained, strict=True)
+    lost = [quantity(name)[0] for name, share in explained if share < EXPLAINED]
     return f"; the inputs explain less than half of the gain in {' and '.join(lost)}" if lost else ""
 
 

@@ -76,7 +76,7 @@ def _bounds(study: Study, name: str) -> list[float]:
 
 
 def adaptive_search(record: Record, path: Path) -> None:
-    """Hypervolume against runs beside other fronts, and where each run was spent and why, of the record of a study."""
+    """Hypervolume against runs compared with other fronts, and where each run was spent and why, of the record of a study."""
     progress, places = search_stills(record)
     still.save([*progress, *places], WIDEST, path)
 
@@ -89,7 +89,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
         clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))
     if outcome.adaptive is not None:
         found = outcome.adaptive.found
-        clouds.append(("front foretold by emulators", found.foretold[found.shown], "tab:olive"))
+        clouds.append(("front predicted by emulators", found.predictions[found.shown], "tab:olive"))
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
     for axis, (i, j) in _pairs(len(surfaces), path, 6):
         for words, values, color in clouds:
@@ -112,10 +112,10 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
-    """Every pair of gains that are kept over what is not known: foretold of the front, and simulated."""
+    """Every pair of gains that are kept over the unknown inputs: predicted of the front, and simulated."""
     for axis, (i, j) in _pairs(len(responses), path, 2):
         gains = 100.0 * front.gains
-        axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="foretold by emulators")
+        axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="predicted by emulators")
         for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
             x, y = 100.0 * each.gains[[i, j]]
             words = f"{name}, simulated: better in all in {100.0 * each.better.all.value:.0f} %"

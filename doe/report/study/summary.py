@@ -104,7 +104,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
 
 
 def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]:
-    """The search, its fronts beside others, and all in ``sentences``, of which ``held`` is one."""
+    """The search, its fronts compared with others, and all in ``sentences``, of which ``held`` is one."""
     sentences = search_sentences(outcome)
     told = {"held": held_sentence(outcome), "sentences": sentences, "sentence": " ".join(sentences)}
     beside = {} if outcome.compared is None else compared_record(outcome.study, adaptive, outcome.compared)
@@ -136,7 +136,7 @@ def settings_record(study: Study) -> dict[str, Any]:
 
 
 def design_record(outcome: StudyResult) -> dict[str, Any]:
-    """Points with what they gave, what the design can tell, and which runs failed."""
+    """Points with what they gave, how good the design is, and which runs failed."""
     study, design, runs = outcome.study, outcome.design, outcome.runs
     rows = {place: row for row, place in enumerate(runs.places)}
     return {

@@ -25,7 +25,7 @@ PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : ", re.MULTILINE)
 
 
 class Source(NamedTuple):
-    """A module: what it says, and its lines, for comments stand beside the fields of a class."""
+    """A module: what it says, and its lines, for comments stand next to the fields of a class."""
 
     tree: ast.Module
     lines: list[str]
@@ -121,7 +121,7 @@ def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
 
 
 def _signature(node: Named, lines: list[str]) -> str:
-    """What is called, as code; of a class its fields, with what stands beside them."""
+    """What is called, as code; of a class its fields, with what stands next to them."""
     if isinstance(node, ast.FunctionDef):
         return f"```python\n{node.name}({ast.unparse(node.args)}){_gives(node)}\n```\n\n"
     fields = (each for each in node.body if isinstance(each, ast.AnnAssign))

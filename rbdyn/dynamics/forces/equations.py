@@ -167,7 +167,7 @@ def touching_rollers(bearing, cage, y, scratch):
     z = roller_count(bearing)
     for j in range(z):
         scratch.gap[j] = roller_gap(bearing, y, cage, j)
-    # Counted without a branch, which could not be foretold.
+    # Counted without a branch, which could not be predicted.
     touching = 0
     for j in range(z):
         scratch.touching[touching] = j

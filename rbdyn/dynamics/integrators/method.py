@@ -118,7 +118,7 @@ def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:
 
 
 def stiffness_cost(runs: Sequence[Replicate]) -> dict[str, float]:
-    """What the cost of a result tells of stiffness: share of steps, |eigenvalue| [1/s], runs by the implicit method."""
+    """What the cost of a result says about stiffness: share of steps, |eigenvalue| [1/s], runs by the implicit method."""
     total = np.sum([run.stiffness for run in runs], axis=0)
     return {
         "held_by_stability": held_by_stability(total),
@@ -140,9 +140,9 @@ def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> tuple[str, ...]:
     if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return ()
     time_s = 1.0 / cost["eigenvalue_1_s"]
-    mend = "numerics.method = 'auto' tries the implicit one; " if scene.numerics.method in EXPLICIT else ""
+    fix = "numerics.method = 'auto' tries the implicit one; " if scene.numerics.method in EXPLICIT else ""
     return (
         f"steps are held by stability, not accuracy, in {100.0 * cost['held_by_stability']:.0f} % of the run: the fastest "
-        f"motion takes {time_s:.2g} s, a shaft turn {scene.turn_s:.2g} s; {mend}looser tolerances save nothing, "
+        f"motion takes {time_s:.2g} s, a shaft turn {scene.turn_s:.2g} s; {fix}looser tolerances save nothing, "
         "softening the stiffest law (traction slope, film floor, light cage) does",
     )

@@ -1,4 +1,4 @@
-"""What a history tells about cage and contacts: whirl, sections, spectra, loads and sliding around the bearing.
+"""What a history shows about cage and contacts: whirl, sections, spectra, loads and sliding around the bearing.
 
 Functions of a ``History``; SI throughout. All work on its samples, so nothing faster than half the sampling rate is
 seen, and the largest forces are those of this one replicate, not those of a result (which keeps every step).

@@ -20,7 +20,7 @@ from rbdyn.scene import Scene
 
 # Largest contact speed by which errors are measured, as a share of that of the faster race. Held at its limit of
 # stability, the explicit method leaves the whole tolerance in every contact in every step, and contacts lose it: in a
-# slow bearing that must stay small beside what rolling loses. The implicit method damps it.
+# slow bearing that must stay small compared with what rolling loses. The implicit method damps it.
 SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
 # Tolerance of the cage's speeds over that of a contact's. Only impacts change them, in two or three explicit steps each,
 # which damp an impact where the races alone rule the steps: with it impact and whirl of the bearing of Chen et al. 2022

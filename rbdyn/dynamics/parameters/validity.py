@@ -175,7 +175,7 @@ def cylinder_moment(density: float, viscosity: float, speed: float, radius: floa
 
 
 def spin_windage(scene: Scene) -> float:
-    """Power of rollers that spin and a cage that turns in the oil-air mixture, beside the rollers' orbital drag [W].
+    """Power of rollers that spin and a cage that turns in the oil-air mixture, next to the rollers' orbital drag [W].
 
     Ends and surfaces of rollers, which turn against pockets that turn with the cage; side faces of the cage, and its rim
     off the land over the width of its lands. The mixture has the density X rho_oil + (1 - X) rho_air and the viscosity

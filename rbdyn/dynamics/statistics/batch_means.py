@@ -35,7 +35,7 @@ ENOUGH_REPLICATES = 8
 
 class Estimate(NamedTuple):
     """A figure, the half-width of its 95 % interval (None for fewer than two batches), how many independent batches
-    would tell as much, and the degrees of freedom of Student's t in the half-width (None without one)."""
+    would carry as much, and the degrees of freedom of Student's t in the half-width (None without one)."""
 
     value: float
     half_width: float | None

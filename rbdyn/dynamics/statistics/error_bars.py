@@ -9,7 +9,7 @@ stationary noise the rule would still drop a little; so a head counts as a trans
 of the rest beyond their scatter.
 
 Cages have slow regimes: loose ones change the way they whirl over 20 to 400 shaft turns, jumping at random moments, so no
-curve fitted to a start tells where it leads. What can be tested is whether the counted turns drift. Each replicate
+curve fitted to a start shows where it leads. What can be tested is whether the counted turns drift. Each replicate
 gives one difference between the figure of the later half and that of the earlier half; replicates are independent,
 so Student's t of these differences needs no memory of the series (Heidelberger and Welch 1983, *Operations Research* 31,
 1109, test a single series against its spectrum). The test is made on each figure and on the mean speed of the cage's
@@ -61,7 +61,7 @@ BIAS_OF_DRIFT = 1.5
 
 
 def find_transient(series: Array) -> int | None:
-    """Batches of the transient of one series, a multiple of five; None where it is too short to tell."""
+    """Batches of the transient of one series, a multiple of five; None where it is too short to decide."""
     groups = len(series) // GROUP
     if groups < FEWEST_GROUPS:
         return None
@@ -110,7 +110,7 @@ def start_of_counting(scene: Scene, runs: Runs) -> Start:
     if scene.operation.schedule is not None:
         return Start(run.first, None, ())
     known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
-    transient = max(known, default=None)  # the longest; None where the run is too short to tell
+    transient = max(known, default=None)  # the longest; None where the run is too short to decide
     if transient is None:
         fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
         note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"
@@ -165,7 +165,7 @@ class Drift(NamedTuple):
 
 
 def drift_of(figure: Figure, runs: Runs) -> Drift | None:
-    """Drift of a figure over what is counted; None where that is too short to tell."""
+    """Drift of a figure over what is counted; None where that is too short to decide."""
     moments = [figure.moments(run) for run in runs]
     rows = min(len(part) for part in moments)
     half = rows // 2
@@ -249,7 +249,7 @@ FIGURES = {
     "cage_speed_rpm": (metrics.CAGE_SPEED, 30.0 / math.pi),
     "cage_slip": (metrics.CAGE_SLIP, 1.0),
 }
-# A slip near nothing has no relative error worth a word; the cage speed tells of it.
+# A slip near nothing has no relative error worth a word; the cage speed shows it.
 JUDGED = {
     "impact_force_N": "impact force",
     "whirl_deviation_ratio": "whirl deviation ratio",
@@ -316,5 +316,5 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | 
         return None
     rtol = scene.numerics.rtol
     longer = "it is mostly scatter, so raise numerics.turns or numerics.replicates"
-    mend = f"tighten numerics.rtol = {rtol:g} to {tighter or 0.1 * rtol:.1g}" if biased else longer
-    return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {mend}"
+    fix = f"tighten numerics.rtol = {rtol:g} to {tighter or 0.1 * rtol:.1g}" if biased else longer
+    return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {fix}"

@@ -17,7 +17,7 @@ ORDER = 4
 NOTCH_QUALITY = 10.0
 # A notch this many times above the cutoff has nothing left to take out.
 NOTCHED = 2.0
-# Periods of a notch in a record below which it cannot be told from slow motion, and its filter rings to the end.
+# Periods of a notch in a record below which it cannot be distinguished from slow motion, and its filter rings to the end.
 NOTCH_PERIODS = 10.0
 # Periods of the cutoff at either end where the filter, which sees one side, lets through what is fast: three times the
 # speed of the bearing of Chen et al. 2022 at 1 kHz in the last sample, less than a hundredth two periods before.
@@ -28,7 +28,7 @@ def filtered_speed(place: Array, rate: float, cutoff: float, notches: Sequence[f
     """Speed (samples,) [m/s] of what is at ``place`` (2, samples) [m], sampled at ``rate``, below ``cutoff`` and without
     the frequencies ``notches`` [Hz] that have ``NOTCH_PERIODS`` in the record. Nothing of fewer than two samples.
 
-    The ends are given the speeds beside them, mirrored.
+    The ends are given the speeds next to them, mirrored.
     """
     from scipy.interpolate import CubicSpline
     from scipy.signal import butter, iirnotch, sosfiltfilt, tf2sos

@@ -9,7 +9,7 @@ as large: from rtol 0.1 to 0.01 the impact of the bearing of Chen et al. 2022 go
 from -4.0 to +0.1 +- 0.4 %, its loss from +0.025 to 0.000 +- 0.008 %. Of a difference d with the 95 % half-width w the bias
 left at the tolerance of the run is d / 9 (Richardson, first order), known to w / 9; both count, as root sum of squares.
 Where stability rules the steps, companions resolve more, and 10 d / 9 counts (``rbdyn.dynamics.companions``).
-Companions scatter as the replicates do, and there are too few of them to tell: w is the half-width of the replicates
+Companions scatter as the replicates do, and there are too few of them to decide: w is the half-width of the replicates
 times sqrt(1 + n/m), for n turns counted of these and m of companions.
 
 To the error of the power loss comes, likewise, what the power balance misses: input less losses less change of energy,
@@ -34,7 +34,7 @@ from rbdyn.result import JITTER, Quantity
 from rbdyn.scene import Scene
 
 FACTOR = 10.0
-# The loosest tolerance that a scene may have; beyond it the power balance no longer tells anything.
+# The loosest tolerance that a scene may have; beyond it the power balance no longer shows anything.
 LOOSEST = 0.1
 
 

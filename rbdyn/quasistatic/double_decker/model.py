@@ -2,7 +2,7 @@
 reported of that ring.
 
 Nothing drives the middle ring but the friction of the layers: it turns at the speed at which the torque that the inner
-layer hands on equals the one with which the outer layer holds it back. Friction after Palmgren:
+layer hands on equals the one with which the outer layer brakes it. Friction after Palmgren:
 M = M0 + M1, M0 of the oil, M1 of the load. His formulas are in N mm, mm, rpm and mm^2/s; everything here is in SI.
 
 Factors as commonly cited after Palmgren and Harris (Rolling Bearing Analysis), from memory and not checked against the

@@ -239,7 +239,7 @@ def ball_forces(
 ) -> Any:
     """A ball with its centre at (x, y), the inner groove centre at (a_axial, a_radial), contacts ``di`` and ``do`` deep [m].
 
-    The depths are unknowns of their own: the lines between the centres tell the angles only. Derivatives by place count a
+    The depths are unknowns of their own: the lines between the centres give the angles only. Derivatives by place count a
     change along a line as a change of depth.
 
     ``strength``: 0 to 1, how far the race control rules orbit and moment; the rest is the common cage speed.

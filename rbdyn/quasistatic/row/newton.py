@@ -210,7 +210,7 @@ SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
 # Largest turn of a contact line in one whole step [rad], and steps without progress that are waited for.
 FURTHEST, PATIENCE = 0.5, 8
-# Share of the largest diagonal entry below which a pivot of the ring's matrix tells nothing.
+# Share of the largest diagonal entry below which a pivot of the ring's matrix shows nothing.
 LEAST_PIVOT = 1e-13
 
 
@@ -337,7 +337,7 @@ def march(task: Any, strength: float, enough: float, limit: int, at: Any) -> boo
     """Newton's method with whole steps, bounded in angle, that need not improve at once; whether it ends in an equilibrium.
 
     A ball that slides along its groove leaves the stiff normal direction by the square of its step: forces rise, and the next
-    step mends them. A search along the step for smaller forces would creep. ``enough``: residual at which to
+    step fixes them. A search along the step for smaller forces would creep. ``enough``: residual at which to
     stop already [N].
     """
     row, free, sums = task.row, task.free, at.sums

@@ -170,7 +170,7 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, ball
         scale, moved = 1.0, False
         while scale > SHORTEST and not moved:
             trial, held_, fa_, fr_, aa_, ar_, rr_ = balance(row, j, a_axial, a_radial, x + scale * da, y + scale * dr)
-            # Near the bottom the energy no longer tells better from worse, the forces still do.
+            # Near the bottom the energy no longer distinguishes better from worse, the forces still do.
             if trial < energy or abs(fa_) + abs(fr_) < 0.5 * lacking:
                 x, y, moved = x + scale * da, y + scale * dr, True
                 energy, held, fa, fr, aa, ar, rr = trial, held_, fa_, fr_, aa_, ar_, rr_
@@ -199,7 +199,7 @@ LEFT = 0.2
 
 @kernel
 def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> None:
-    """Set the depths of ball j to what its place tells."""
+    """Set the depths of ball j to what its place gives."""
     x, y = balls[j, AXIAL], balls[j, RADIAL]
     balls[j, INNER_DEPTH] = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
     balls[j, OUTER_DEPTH] = deflection(x, y, row.outer_reach[j])
@@ -207,7 +207,7 @@ def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> No
 
 @kernel
 def diverging(convex: bool, forces: Any) -> bool:
-    """Whether a ball is so far from balance that it is better settled by itself: Newton's step would tell nothing."""
+    """Whether a ball is so far from balance that it is better settled by itself: Newton's step would show nothing."""
     (ra, rr), (fa, fr, _) = forces[0], forces[1]
     lacking, held = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
     return lacking > 0.3 * held if convex else held == 0.0
@@ -252,7 +252,7 @@ def ahead(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
 def close_gaps(
     row: Any, j: int, a_axial: float, a_radial: float, forces: Any, springs: Any, balls: Any, work: Any, sums: Any
 ) -> Any:
-    """Residual and ring forces with what the places of ball j tell beyond its depths, which goes into the step only."""
+    """Residual and ring forces with what the places of ball j add beyond its depths, which goes into the step only."""
     (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, _, _ = forces
     x, y = balls[j, AXIAL], balls[j, RADIAL]
     one_i, si, ci = line(a_axial - x, a_radial - y)
@@ -333,7 +333,7 @@ def add_to_ring(c: float, s: float, force: Any, stiffness: Any, matrix: Any, vec
 def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
     """Ring forces at ``at.q`` and ``at.balls``, with the balls eliminated.
 
-    ``mixed``: whether the depths in ``at.balls`` are unknowns of their own; else they are set to what the places tell.
+    ``mixed``: whether the depths in ``at.balls`` are unknowns of their own; else they are set to what the places give.
     Fills ``at.matrix``, the derivative of the load that the ring takes by q where every ball stays in balance [N/m];
     ``at.vector``, the load less what the ring takes once the balls have moved into balance to first order [N];
     ``at.work`` for ``follow``; ``at.sums``: energy [J], the squared length of the balls' residuals [N^2], the largest of them [N],

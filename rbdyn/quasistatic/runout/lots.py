@@ -4,7 +4,7 @@ Each bearing of a lot has races of a given height (roundness and side-sway, peak
 and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_response``) reach the ring,
 each as one wave: a bearing's reading is the real part of a short sum, and a lot is a product of two matrices.
 
-Under a purely axial load all balls are alike, so one ball tells all: an error e of the ball at the azimuth psi moves
+Under a purely axial load all balls are alike, so one ball represents all: an error e of the ball at the azimuth psi moves
 the ring by e g_x along psi, by e g_z axially, and tilts it by e g_tilt about the axis 90 degrees ahead of psi. Around
 Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and tilt, and n = kZ, which moves axially.
 

@@ -1,6 +1,6 @@
 """Runout of the path that a ring takes, circles about a set of points in a plane, and limits by tolerance class (ISO 492).
 
-Three ways to put the radial motion into a number, none of which tells another:
+Three ways to put the radial motion into a number, none of which gives another:
 - ``indicator``: what a fixed indicator reads (its largest range over all directions). Class limits K_ia mean this. An
   eccentric groove shows wholly, as twice its eccentricity.
 - ``minimum_zone``, ``least_squares``: distance between the circles that hold the orbit of the ring's centre between
@@ -107,7 +107,7 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
     steps, left = divmod(len(path), turns)
     if left or steps < 3:
         what = f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps"
-        raise MethodError(f"{what}; mend the number of turns")
+        raise MethodError(f"{what}; fix the number of turns")
     orbit, axial = path[:, :2], path[:, 2]
     # Far from the origin, digits of the small motion would be lost.
     orbit = orbit - orbit.mean(axis=0)

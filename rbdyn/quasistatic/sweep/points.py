@@ -17,7 +17,7 @@ from rbdyn.base.ranges import listed
 from rbdyn.scene.ball import BallScene
 
 MOST_POINTS = 100_000
-MEND = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
+FIX = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
 Path = tuple[str | int, ...]
 
 
@@ -43,7 +43,7 @@ def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
             raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
         if key in keys:
             raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
-        keys[key] = listed(values, f"--sweep {text}", MEND, 2, MOST_POINTS)
+        keys[key] = listed(values, f"--sweep {text}", FIX, 2, MOST_POINTS)
     return keys
 
 
@@ -108,8 +108,8 @@ def _now(data: Any, path: Path, key: str) -> Any:
         elif isinstance(data, dict) or data is None:
             place += f".{step}" if place else step
         else:
-            mend = "write it out as a table of numbers first" if isinstance(data, str) else "check the key"
-            raise InputError([f"{key}: {place} = {data!r} is not a table; {mend}"])
+            fix = "write it out as a table of numbers first" if isinstance(data, str) else "check the key"
+            raise InputError([f"{key}: {place} = {data!r} is not a table; {fix}"])
         data = data[step] if isinstance(step, int) else (data or {}).get(step)
     if isinstance(data, dict):
         raise InputError([f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}"])

@@ -26,7 +26,7 @@ OK = "ok"
 class SweepResult:
     """Equilibria over a grid of scene keys, in the order of ``keys``, the last one running fastest.
 
-    ``keys``: values of each key; ``columns``: a figure a point, units in the names, NaN where ``statuses`` tells why there is no
+    ``keys``: values of each key; ``columns``: a figure a point, units in the names, NaN where ``statuses`` shows why there is no
     equilibrium. ``figures``: by row of balls, those of each ball in SI as (points, (points, Z, 6)), a pair a number Z of balls;
     empty in a loaded sweep. ``notes``: "about" what, the "note" of the first point and all "points" that it is about, counted from 0 in
     the order of the table. ``cold``: points not started from their neighbour. ``wall_s``: what they took.

@@ -82,7 +82,7 @@ def sweep(
     key = run_key(given, code_version(__name__)) if kept_in else ""
     solved = _walk(scenes(scene, axes, order), len(order), progress or (lambda done, total: None), Kept(kept_in), key)
     if kept_in is not None:
-        # One that cannot be removed does no harm: the key tells what it is of.
+        # One that cannot be removed does no harm: the key shows what it is of.
         with suppress(OSError):
             kept_in.unlink(missing_ok=True)
     shape = tuple(len(axis.values) for axis in axes)
