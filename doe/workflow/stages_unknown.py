@@ -9,10 +9,10 @@ from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.study_file import Study
 from doe.unknown import inputs
 from doe.unknown.calibration import TRIED, sets_a_wave
+from doe.workflow import uncertainty
 from doe.workflow.calibration import Question, cases_of
 from doe.workflow.input_sets import Case, read_case
 from doe.workflow.robust import CONFIRMED, POINTS, case_of_study, fresh_rows
-from doe.workflow.uncertainty import MOST, MOST_EFFORT, OUTPUTS
 from rbdyn.scene import Scene
 
 # Wall time [s] that the emulators of a robust judgement take about.
@@ -38,11 +38,13 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
 
     Raises InputError.
     """
-    case = read_case(path, OUTPUTS, overrides)
+    case = read_case(path, uncertainty.OUTPUTS, overrides)
     count = case.uncertain.points if points is None else points
     return [
         Stage.of("as the scene says", 1, work_of(case.scene)),
-        Stage.of("input sets", count, _work_of_a_set(case), most=MOST_EFFORT * max(count, MOST)),
+        Stage.of(
+            "input sets", count, _work_of_a_set(case), most=uncertainty.MOST_EFFORT * max(count, uncertainty.MOST)
+        ),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 
