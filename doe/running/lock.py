@@ -143,5 +143,5 @@ def _notes() -> Iterator[_Note]:
         with suppress(OSError, ValueError, TypeError, KeyError):
             content = read_json(path)
             study, store = content["study"], content["store"]
-            if isinstance(study, str) and isinstance(store, str) and "\0" not in store:
+            if isinstance(study, str) and isinstance(store, str) and "\0" not in store and Path(store).name:
                 yield _Note(path, study, store)

@@ -63,7 +63,7 @@ def test_own_bearing_runs_as_told(tmp_path):
                 words, numbers = told(line)
                 assert len(lines[words]) == len(numbers), line
                 # The front is flat in some clearances, where another machine may pick others: its verdicts are words.
-                sure = numbers if program == "rbdyn" else numbers[: 2 if "<=" in line else 1]
+                sure = numbers if program == "rbdyn" else numbers[: 2 if "≤" in line else 1]
                 assert all(map(agrees, lines[words], sure)), line
                 quoted += 1
     assert quoted > 15

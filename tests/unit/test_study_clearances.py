@@ -61,7 +61,7 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
     plays = record["operating_clearances_mm"]
     scene = clearance.confirmation_scene(outcome.study, outcome.pick.point)
     assert plays["guide_clearance_mm"]["pick"] == pytest.approx(1e3 * scene.clearances["guide"].operating)
-    assert "baseline in operation" in text and f"{plays['pocket_clearance_mm']['pick']:.4g}" in text
+    assert "baseline in operation" in text and f"{plays['pocket_clearance_mm']['pick']:.3f}" in text
     assert record["clearance_class"].startswith("ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of ")
     assert record["clearance_class"] in text
 
