@@ -54,8 +54,7 @@ def front(
 
             record["point"] = given_point_record(loaded, surfaces, found, np.array(values))
         save(out, path, "front.json", record)
-        summary = {key: value for key, value in record.items() if key == "direct"}
-        summary |= {"asked": asked_record(loaded), "front": record}
+        summary = {"asked": asked_record(loaded), "front": record}
         hand_over(lambda: record, as_json, lambda: show(_answer(summary), Detail.of(quiet, verbose)))
 
 

@@ -38,7 +38,6 @@ def advice(summary: Record) -> list[Block]:
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     why = f"Why this point: {reason}." if reason else ""
     return [
-        *_direct(summary),
         Paragraph(searched[0], "statement"),
         Bullets(searched[1:]),
         *_clearances(summary),
@@ -58,16 +57,6 @@ def _parts_to_make(summary: Record) -> list[Block]:
     chains = part(summary, "chains") or {}
     whole = [block for name, chain in chains.items() for block in chain_blocks(name, chain)]
     return [block for block in whole if block.detail < Detail.ALL]
-
-
-def _direct(summary: Record) -> list[Block]:
-    """What a direct front cost, and what the surfaces lose against it."""
-    direct = part(summary, "direct") or {}
-    spent = ""
-    if direct.get("evaluations") is not None and direct.get("seconds") is not None:
-        spent = f"Direct front: {direct['evaluations']} simulations in {direct['seconds']:.0f} s. "
-    run = f"A run of the direct search: {direct['run']}" if direct.get("run") else ""
-    return [Paragraph(f"{spent}{direct.get('sentence') or ''}"), Paragraph(run)]
 
 
 def _clearances(summary: Record) -> list[Block]:
