@@ -202,9 +202,15 @@ def share_vectors(outer, inner):
 
 
 @kernel
+def whole_vectors(count):
+    """``count`` rounded up to whole vectors: a scalar rest would cost as much as one more."""
+    return (count + VECTOR - 1) // VECTOR * VECTOR
+
+
+@kernel
 def lanes_to_fill(race, count):
-    """Whole vectors, where contacts run in vectors and a scalar rest would cost as much; else just ``count``."""
-    return (count + VECTOR - 1) // VECTOR * VECTOR if runs_in_vectors(race) else count
+    """Whole vectors, where contacts run in vectors; else just ``count``."""
+    return whole_vectors(count) if runs_in_vectors(race) else count
 
 
 @kernel
@@ -504,7 +510,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     for start in range(0, rollers, LANES):
         count = min(LANES, rollers - start)
         # Whole vectors: behind the last roller stand other numbers of the state, and lanes past ``count`` hold nothing.
-        for i in range((count + VECTOR - 1) // VECTOR * VECTOR):
+        for i in range(whole_vectors(count)):
             j = start + i
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y
             dvx, dvy = y[2 * rollers + j] - ring.vx, y[3 * rollers + j] - ring.vy
