@@ -22,7 +22,8 @@ import numpy as np
 from studies import main
 
 from rbdyn.accuracy.ball_solvers import WHOLE, Problem, Solver, Success, causes, fared, success_table
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, records, reported
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
+from rbdyn.base.blocks import Table
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns

@@ -11,8 +11,9 @@ from dataclasses import replace
 
 from studies import EXAMPLES, main
 
-from rbdyn.accuracy.report import Report, Reporter, Table, records, reported
+from rbdyn.accuracy.report import Report, Reporter, records, reported
 from rbdyn.accuracy.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery
+from rbdyn.base.blocks import Table
 from rbdyn.scene import Scene
 
 OTHERS = ("all_options.toml", "published/nu215.toml")

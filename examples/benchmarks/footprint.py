@@ -106,7 +106,8 @@ def study(
 ) -> "Report":
     """A row an option that the scene allows, the plain scene first. Raises RunError, KeyboardInterrupt."""
     from rbdyn.accuracy.options import OPTIONS, lawful
-    from rbdyn.accuracy.report import Progress, Table, reported
+    from rbdyn.accuracy.report import Progress, reported
+    from rbdyn.base.blocks import Table
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
 

@@ -116,9 +116,9 @@ def _run(line: str, progress: Reporter) -> str:
 def _markdown(report: Report) -> str:
     tables = []
     for table in report.tables:
-        rows = (table.header, ["---"] * len(table.header), *table.cells)
+        rows = (table.header, ["---"] * len(table.header), *table.rows)
         lines = (f"| {' | '.join(each.replace('|', BAR) for each in row)} |" for row in rows)
-        tables.append("\n".join((f"**{table.title}**\n", *lines)))
+        tables.append("\n".join((f"**{table.caption}**\n", *lines)))
     return "\n\n".join((*tables, *report.sentences))
 
 

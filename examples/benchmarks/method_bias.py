@@ -13,7 +13,7 @@ import numpy as np
 from studies import main
 
 from rbdyn.accuracy.integrators import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.tolerances import (
     NEGLIGIBLE,
     SOUGHT,
@@ -24,6 +24,7 @@ from rbdyn.accuracy.tolerances import (
     percent,
     undecided,
 )
+from rbdyn.base.blocks import Table
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop

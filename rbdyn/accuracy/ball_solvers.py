@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.base.arrays import Array
+from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton

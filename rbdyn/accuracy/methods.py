@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.integrators import DOP853, METHODS, OURS, Method, NotInstalledError, Stretch, compiled
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop

@@ -4,23 +4,17 @@ import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
+from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.records import save_table
+from rbdyn.base.render import terminal
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.result import versions, write_json
 
 T = TypeVar("T")
 # Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
-
-
-class Table(NamedTuple):
-    """A table for the terminal; cells are text."""
-
-    title: str
-    header: Sequence[str]
-    cells: Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -127,15 +121,9 @@ def write(report: Report, folder: Path) -> list[str]:
 
 def show(report: Report, verbose: bool = False) -> None:
     """Print tables, conclusions and the machine."""
-    from rbdyn.base.terminal import print_table
-
-    for table in report.tables:
-        print_table(*table)
-    for sentence in report.sentences:
-        print(sentence)
-    print(report.record["machine"])
-    if verbose:
-        print(", ".join(f"{name} {text}" for name, text in report.record["versions"].items()))
+    used = ", ".join(f"{name} {text}" for name, text in report.record["versions"].items())
+    sentences = map(Paragraph, (*report.sentences, report.record["machine"]))
+    terminal.show([*report.tables, *sentences, Paragraph(used, detail=Detail.ALL)], Detail.of(False, verbose))
 
 
 def processor() -> str:

@@ -13,13 +13,15 @@ follow the turns or the replicates that would decide.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from rbdyn.accuracy import methods
 from rbdyn.accuracy.integrators import COMPILED
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
+from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import signed_with_error
@@ -240,7 +242,7 @@ def table(biases: StatisticsBias, sought: float = SOUGHT) -> Table:
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
     ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(sought, reference)})
     failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in biases.failures]
-    return ran._replace(cells=[*ran.cells, *failed])
+    return replace(ran, rows=[*ran.rows, *failed])
 
 
 def bias_columns(sought: float, reference: Bias | None = None) -> dict[str, Callable[[Bias], str]]:

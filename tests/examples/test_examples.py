@@ -142,7 +142,7 @@ def test_unit_extremes_of_several_scenes(outer, monkeypatch):
     names = ("as given", "no load")
     monkeypatch.setattr(stability, "cases", lambda scene: {name: every(scene)[name] for name in names})
     report = module.study(outer, others=("cylindrical_roller.toml",))
-    assert [row[:3] for row in report.tables[0].cells] == [["scene", "2", "0"], ["cylindrical_roller.toml", "2", "0"]]
+    assert [row[:3] for row in report.tables[0].rows] == [["scene", "2", "0"], ["cylindrical_roller.toml", "2", "0"]]
     assert [row["of"] for row in report.record["cases"]] == ["scene"] * 2 + ["cylindrical_roller.toml"] * 2
     assert not report.failed and max(row["power_gap"] for row in report.record["cases"]) < stability.LARGEST_GAP
 

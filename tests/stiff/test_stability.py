@@ -82,9 +82,7 @@ def test_unit_record_and_files(rows, tmp_path):
     assert [case["case"] for case in saved["cases"]] == list(rows)
     assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
     (table,) = report.tables
-    assert [line[0] for line in table.cells] == list(rows) and {len(line) for line in table.cells} == {
-        len(table.header)
-    }
+    assert [line[0] for line in table.rows] == list(rows) and {len(line) for line in table.rows} == {len(table.header)}
 
 
 @pytest.mark.parametrize(

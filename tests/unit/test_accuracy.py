@@ -51,8 +51,8 @@ def test_unit_failed_tolerances_stay_in_the_table(make_scene):
         accuracy.statistics_bias(make_scene("numerics.step_budget_per_turn=400"), (1e-4, 1e-2))
     rows = accuracy.statistics_bias(make_scene(), (1e-2,)).rows
     table = tolerances.table(tolerances.StatisticsBias(rows, {0.1: "step budget used up"}))
-    assert [len(cells) for cells in table.cells] == [len(table.header)] * 2
-    assert table.cells[1][:2] == ("0.1", "failed")
+    assert [len(cells) for cells in table.rows] == [len(table.header)] * 2
+    assert table.rows[1][:2] == ("0.1", "failed")
 
 
 def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path, drawn):

@@ -12,7 +12,8 @@ from pathlib import Path
 import measured_page as page
 import pytest
 
-from rbdyn.accuracy.report import Report, Table
+from rbdyn.accuracy.report import Report
+from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 
 ROOT = Path(__file__).parents[2]
