@@ -1,6 +1,6 @@
-"""The bearing behind the factors: builds scenes, runs them, and gives back responses.
+"""The bearing of a study: scenes from factors, their simulations, and the responses of these.
 
-The only module of this package that runs bearing simulations.
+It is the only module of this package that runs bearing simulations.
 """
 
 import json
@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from doe.running.keeper import AgendaKeeper
-from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
+from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
 from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
@@ -29,27 +28,27 @@ from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
-    from rbdyn.dynamics.motion.history import History
+    from rbdyn.dynamics.motion import History
 
 
-# What gets the key of a run under way, its share that is done, and the time that this took [s]; None where nobody asks.
+# Receiver of the key of a run under way, its finished share and the time [s] of that; None without a receiver.
 Hear = Callable[[str, float, float], None] | None
-# What simulates a run: its code decides whether a stored one is still good.
+# Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
-# Seeds that no design run has; the input sets are those of an uncertainty.
+# Offsets of seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
 INPUT_SEEDS = 3_000_000
 ADAPTIVE_SEEDS = 4_000_000
 CALIBRATION_SEEDS = 5_000_000
-# Times as long as asked for that a run of an adaptive search gets at most where it drifts: 8 cost twice, for no better a front.
+# Most turns of a drifting run of an adaptive search over those asked for; 8 cost twice as much without a better front.
 ADAPTIVE_EXTENDED = 2.0
-# Of a motion that goes into a report.
+# Points of the orbit, frames and shaft turns of a motion in a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 
 def check_responses(study: Study) -> None:
-    """Raises InputError for a response that the simulation does not give."""
+    """Raises InputError for a response that is no figure of the simulation."""
     refuse(
         f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
         for name in study.responses
@@ -58,55 +57,55 @@ def check_responses(study: Study) -> None:
 
 
 def read_scene(study: Study) -> dict[str, Any]:
-    """Tables of the study's scene file. Raises InputError when the file is not there or a factor's key is none of a scene."""
-    path = study.beside(study.scene.file)
+    """Tables of the study's scene file. Raises InputError for a missing file, or a factor's key that no scene has."""
+    path = study.path_of(study.scene.file)
     data = read_toml(path)
-    named = (*(factor.key for factor in study.file.factor), *(each.key for each in study.file.category))
+    keys = (*(factor.key for factor in study.file.factor), *(category.key for category in study.file.category))
     left_out = [
-        whole
-        for whole in named
-        for table, _, key in (whole.rpartition("."),)
+        dotted
+        for dotted in keys
+        for table, _, key in (dotted.rpartition("."),)
         if not isinstance(data.get(table), dict) or key not in data[table]
     ]
-    known: Mapping[str, Any] = {}
+    scene_values: Mapping[str, Any] = {}
     with suppress(InputError):
-        known = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else {}
+        scene_values = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else {}
     refuse(
         f"{study.path}: factor.key = {key!r}: no such key in {path}; write table.key as in that file"
         for key in left_out
-        if key not in known
+        if key not in scene_values
     )
     return data
 
 
 def declares_unknowns(study: Study) -> bool:
-    """Whether the study or its scene declares unknown inputs; to name values as estimates alone is not to ask for it."""
+    """Whether the study or its scene declares unknown inputs; values that are only named as estimates are none."""
     if study.file.uncertain is not None:
         return True
     return bool(set(read_scene(study).get("uncertain", {})) - {"estimated"})
 
 
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
-    """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
-    path = study.beside(study.scene.file)
+    """The study's scene at factor values, with a seed. Raises InputError for an impossible value."""
+    path = study.path_of(study.scene.file)
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
 
 
 def assignments(study: Study, factors: Array) -> list[str]:
-    """Keys of the scene at factor values (k,) and at the study's categories, as "key=value"; of factors that mean something."""
+    """Overrides "key=value" of the scene at factor values (k,) and at the study's categories, without inactive factors."""
     numbers = zip(study.file.factor, map(float, factors), strict=True)
-    values, idle = study.categories, [study.factors[place] for place in study.inactive]
+    values, inactive = study.categories, [study.factors[place] for place in study.inactive]
     return [
-        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers if factor.name not in idle),
-        *(f"{each.key}={values[each.name]}" for each in study.file.category),
+        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers if factor.name not in inactive),
+        *(f"{category.key}={values[category.name]}" for category in study.file.category),
     ]
 
 
 def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError, which names the point where a
-    factor has a value that is impossible there.
+    """Scenes of the design runs (n, k); runs at one point differ only by their seed.
 
-    ``order``: place of each run in the standard order, which sets its seed; as given by default.
+    ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. Raises
+    InputError, which names the point with an impossible value of a factor.
     """
     data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
@@ -120,12 +119,12 @@ def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int
     except InputError as error:
         keys = [factor.key for factor in study.file.factor]
         place = ", ".join(f"{name} = {value:.4g}" for name, value in study.by_factor(point).items())
-        where = f"{study.path}: the region of the design reaches {place}, where "
-        faults = [str(fault) for fault in error.faults]
         raise InputError(
             [
-                f"{where}{fault}, or narrow the region" if any(key in fault for key in keys) else fault
-                for fault in faults
+                f"{study.path}: the region of the design reaches {place}, where {fault}, or narrow the region"
+                if any(key in fault for key in keys)
+                else fault
+                for fault in map(str, error.faults)
             ]
         ) from None
 
@@ -138,7 +137,7 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
 
 
 def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
-    """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
+    """Scenes of runs (n, k) of an adaptive search, numbered from ``first``, each with its own replicates and seed."""
     data, adaptive = read_scene(study), study.file.adaptive
     usual = scene_at(study, data, study.baseline, adaptive.seed, study.scene.set).numerics.extend_limit
     shared = ["numerics.companion=false", f"numerics.extend_limit={min(usual, ADAPTIVE_EXTENDED)!r}", *adaptive.set]
@@ -149,11 +148,11 @@ def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], firs
 
 @dataclass(frozen=True)
 class Simulations:
-    """Runs scenes once each and keeps them in ``store``.
+    """Simulations of scenes, each once, with their results in ``store``.
 
-    ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
-    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage. ``agenda``: where the
-    runs of the command are counted. ``turns_of``: shaft turns of each run asked for, by its key.
+    ``workers``: threads, by default all processors; ``scheduler``: address of a cluster to run on instead. ``retry``:
+    repeat runs that failed before. ``progress(title)`` gives the progress of a stage. ``agenda``: counts the runs of the
+    command. ``turns_of``: shaft turns of each requested run, by its key.
     """
 
     store: Store
@@ -166,7 +165,7 @@ class Simulations:
 
     @property
     def turns(self) -> float:
-        """Shaft turns of all runs asked for, whether made now or found in the store."""
+        """Shaft turns of all requested runs, whether simulated now or stored before."""
         return sum(self.turns_of.values())
 
     def run(
@@ -178,8 +177,8 @@ class Simulations:
     ) -> list[SimulationResult | Failure]:
         """Results or failures of scenes, in their order, from the store or simulated.
 
-        ``factors``: of design runs, which are numbered then. Raises RunError when the store cannot be written, InputError
-        when the cluster is not there, KeyboardInterrupt on Ctrl-C, always with all finished runs stored.
+        ``factors``: those of design runs, which are then numbered. Raises RunError if the store cannot be written, InputError
+        without the cluster, KeyboardInterrupt on Ctrl-C, always with all finished runs stored.
         """
         points = points_of(scenes, labels, factors)
         if self.scheduler is None:
@@ -204,7 +203,7 @@ class Simulations:
 
 
 def work_of(scene: Scene) -> float:
-    """Shaft turns that a run of a scene takes at least, its companions' included."""
+    """Least shaft turns of a run of a scene, with those of its companions."""
     numerics = scene.numerics
     return (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
 
@@ -218,11 +217,11 @@ def points_of(
     if factors is None:
         return [Point(key, label) for key, label in zip(keys, labels, strict=True)]
     numbers = range(1, len(keys) + 1)
-    return [Point(*each) for each in zip(keys, labels, numbers, factors, strict=True)]
+    return [Point(*fields) for fields in zip(keys, labels, numbers, factors, strict=True)]
 
 
 def sound(result: dict[str, Any]) -> bool:
-    """Whether a stored result is one of a simulation."""
+    """Whether a stored result is that of a simulation."""
     with suppress(KeyError, TypeError, ValueError):
         return bool(SimulationResult.from_dict(result))
     return False
@@ -237,72 +236,74 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
 def _in_threads(
     scenes: Mapping[str, Scene], workers: int | None, hear: Hear, points: Sequence[Point], ledger: Ledger
 ) -> None:
-    """Engine of this process. The thread that runs a point notes that it begins, and stores it after. ``hear`` gets how far each
-    point under way is."""
-    from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+    """Engine of this process: the thread of a point notes its begin and stores its outcome.
+
+    ``hear`` gets the finished share of each point under way.
+    """
+    from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
 
     stop, threads = Stop(), workers or os.cpu_count() or 1
 
-    def run(point: Point, inside: int) -> Ran:
+    def run(point: Point, inside: int) -> RunOutcome:
         ledger.begin(point)
-        ran = attempt(scenes[point.key], stop, inside, None if hear is None else partial(_heard, hear, point.key))
-        ledger.keep(point, ran)
-        return ran
+        outcome = attempt(scenes[point.key], stop, inside, None if hear is None else partial(_heard, hear, point.key))
+        ledger.keep(point, outcome)
+        return outcome
 
-    def runs() -> Iterator[Callable[[], Ran]]:
-        # Compiled once here, lest every thread wait for the same compilation; the run itself reports faults.
+    def runs() -> Iterator[Callable[[], RunOutcome]]:
+        # One compilation here spares every thread the wait for it; the run itself reports faults.
         with suppress(Exception):
             prepare(scenes[points[0].key], roller_bearing(scenes[points[0].key]))
-        for left, point in zip(range(len(points), 0, -1), points, strict=True):
-            # Of the last points the replicates go side by side too, lest threads wait for the longest point.
-            yield partial(run, point, threads if left < 2 * threads else 1)
+        for remaining, point in zip(range(len(points), 0, -1), points, strict=True):
+            # Replicates of the last points run in parallel too, so that no thread waits for the longest point.
+            yield partial(run, point, threads if remaining < 2 * threads else 1)
 
-    def end(one: Ended[Ran]) -> None:
-        if one.fault is not None:
-            raise one.fault
-        if one.found is not None:
-            ledger.give(points[one.place], one.found)
+    def end(outcome: Outcome[RunOutcome]) -> None:
+        if outcome.fault is not None:
+            raise outcome.fault
+        if outcome.value is not None:
+            ledger.give(points[outcome.place], outcome.value)
 
     run_all(runs(), workers, stop, end)
 
 
 def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], ledger: Ledger) -> None:
-    """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
+    """Engine of a cluster: its scheduler gets all points at once and distributes them."""
     from doe.running.cluster import run_on_cluster
 
     work = partial(attempt_text, version=code_version(SIMULATION))
 
-    def end(place: int, ran: Ran) -> None:
-        ledger.keep(points[place], ran)
-        ledger.give(points[place], ran)
+    def end(place: int, outcome: RunOutcome) -> None:
+        ledger.keep(points[place], outcome)
+        ledger.give(points[place], outcome)
 
     run_on_cluster(
         scheduler, work, [texts[point.key] for point in points], end, lambda place: ledger.begin(points[place])
     )
 
 
-def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, done: int, total: int) -> None:
-    hear(key, done / total, seconds)
+def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, count: int, total: int) -> None:
+    hear(key, count / total, seconds)
 
 
 def attempt(
     scene: Scene, stop: "Stop | None" = None, workers: int = 1, heard: Callable[[float, int, int], None] | None = None
-) -> Ran:
-    """Simulate a scene in one thread, or so many; whatever is wrong with it is the cause of a failure.
+) -> RunOutcome:
+    """Simulate a scene in ``workers`` threads; any fault of it is the cause of a failure.
 
-    ``heard(seconds, done, total)`` is called whenever one more of its replicates has ended.
+    ``heard(seconds, done, total)`` is called at the end of each replicate.
     """
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
 
-    started = time.perf_counter()
+    start_s = time.perf_counter()
     result, cause = None, None
 
-    def progress(done: int, total: int) -> None:
+    def progress(count: int, total: int) -> None:
         if heard is not None:
-            heard(time.perf_counter() - started, done, total)
+            heard(time.perf_counter() - start_s, count, total)
 
     try:
         result = simulate(scene, workers, progress, stop, notice=None).as_dict()
@@ -312,40 +313,45 @@ def attempt(
         cause = str(error)
     except Exception as error:
         cause = f"unexpected {type(error).__name__}: {error}"
-    return Ran(result, cause, time.perf_counter() - started)
+    return RunOutcome(result, cause, time.perf_counter() - start_s)
 
 
-def attempt_text(text: str, version: str) -> Ran:
-    """The same on a worker of a cluster, of a scene in JSON. Raises InputError where the worker runs other code."""
+def attempt_text(text: str, version: str) -> RunOutcome:
+    """The same on a worker of a cluster, for a scene in JSON. Raises InputError if the worker runs other code."""
     host, pid = socket.gethostname(), os.getpid()
     if code_version(SIMULATION) != version:
-        where = f"worker {host}, process {pid}"
-        raise InputError([f"{where}: runs another version of rbdyn or of its sources; install the same"])
+        raise InputError(
+            [f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"]
+        )
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
 def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-    """Values, 95 % statistical half-widths (NaN where there is none), and how many independent values are behind each
-    (0: unknown), each of shape (runs, responses)."""
+    """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
+
+    Each has the shape (runs, responses).
+    """
     quantities = [[record[name] for name in names] for record in (result.as_dict() for result in results)]
     keys = "value", "statistical_error", "degrees_of_freedom"
     values, errors, freedom = ([[quantity.get(key) for quantity in row] for row in quantities] for key in keys)
     # Student's t of a mean of n independent values has n - 1 degrees of freedom.
-    behind = np.nan_to_num(np.array(freedom, dtype=float) + 1.0).astype(np.int64)
-    return np.array(values), np.array(errors, dtype=float), behind
+    samples = np.nan_to_num(np.array(freedom, dtype=float) + 1.0).astype(np.int64)
+    return np.array(values), np.array(errors, dtype=float), samples
 
 
 def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str, History]":
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
-    from rbdyn.dynamics.motion.history import history
+    from rbdyn.dynamics.motion import history
 
-    original = study.at(())
-    scenes = {name: confirmation_scene(original if name == "baseline" else study, at) for name, at in points.items()}
+    original = study.with_levels(())
+    scenes = {
+        name: confirmation_scene(original if name == "baseline" else study, point) for name, point in points.items()
+    }
     return {name: history(scene, min(turns, scene.numerics.turns), notice=None) for name, scene in scenes.items()}
 
 
 def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
-    """Draw cage orbits and pocket forces; returns the names of the pictures."""
+    """Draw cage orbits and pocket forces. Returns the names of the pictures."""
     from rbdyn import plots
 
     plots.cage_orbit(motions, folder / "cage_orbit.png")
@@ -354,11 +360,11 @@ def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
 
 
 def motion_record(motions: "Mapping[str, History]") -> dict[str, Any]:
-    """Motions small enough to be mailed, by name: the orbit of the cage in its guide, and frames to be played.
+    """Motions by name, small enough for a mail: the orbit of the cage in its guide, and frames of a film.
 
-    Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;
-    ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the
-    largest pocket force, as rbdyn.plots.drawing.motion_record keeps them.
+    Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS points;
+    ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the largest
+    pocket force, as by rbdyn.plots.drawing.motion_record.
     """
     from rbdyn.plots.drawing import drawing
     from rbdyn.plots.drawing import motion_record as frames

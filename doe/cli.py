@@ -5,18 +5,13 @@ from rbdyn.base.loading import Loading
 with Loading():
     import typer
 
-    from doe.commands.calibrate import calibrate
-    from doe.commands.chain import chain
-    from doe.commands.design import design
-    from doe.commands.fit import fit
-    from doe.commands.front import front
     from doe.commands.keys import keys
     from doe.commands.new import new
-    from doe.commands.status import status
-    from doe.commands.study import study
-    from doe.commands.uncertainty import uncertainty
+    from doe.commands.steps import chain, design, fit, front
+    from doe.commands.study import status, study
+    from doe.commands.unknown import calibrate, uncertainty
     from rbdyn.base import streams
-    from rbdyn.base.options import Version, refusing
+    from rbdyn.base.command import Version, refusing
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 

@@ -1,4 +1,4 @@
-"""Linear algebra on one thread: its last bits depend on how many threads share a sum, and matrices here are too small to gain."""
+"""Linear algebra on one thread: its last bits depend on the number of threads, and the matrices here are too small to gain."""
 
 import functools
 from collections.abc import Callable
@@ -12,14 +12,14 @@ R = TypeVar("R")
 
 @functools.cache
 def _controller() -> ThreadpoolController:
-    # numpy and scipy bring a library each; what is not loaded yet would not be limited.
+    # numpy and scipy have a library each, and only a loaded one can be limited.
     import scipy.linalg  # noqa: F401
 
     return ThreadpoolController()
 
 
 def one_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, within which linear algebra takes one thread; simulations keep theirs."""
+    """The same function with linear algebra on one thread; simulations keep their threads."""
 
     @functools.wraps(function)
     def limited(*arguments: P.args, **named: P.kwargs) -> R:

@@ -28,12 +28,12 @@ from scipy.stats import spearmanr
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.steps.calibrate import blocks, files_of, record_of, write
+from doe.report.sections.calibration import blocks, files_of, record_of, write
 from doe.running.store import Failure, Store
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
 from doe.workflow.calibration import Calibration, Question, find_calibration, question_of, read_question
-from rbdyn.base.render.terminal import show
+from rbdyn.base.terminal import show
 from rbdyn.scene.unknown import put
 
 HERE = Path(__file__).parent
@@ -117,7 +117,7 @@ def told(frame: pd.DataFrame) -> list[str]:
 
 def simulated_sets(found: Calibration) -> np.ndarray:
     """Outputs (n, 15, 3) of every input set that ran at all designs."""
-    batches = [found.found.batch.values, *([] if found.found.tried is None else [found.found.tried.values])]
+    batches = [found.match.batch.values, *([] if found.match.tried is None else [found.match.tried.values])]
     return np.exp(np.concatenate(batches)).reshape(-1, len(table()[0]), len(RESPONSES))
 
 
@@ -164,7 +164,7 @@ def main(arguments: list[str] | None = None) -> None:
         frame.to_csv(given.out / "agreement.csv", index=False)
         print("\nof all input sets that were simulated at the 15 designs:")
         print("\n".join(told(frame)))
-        if found.found.sampled is not None:
+        if found.match.sampled is not None:
             print("\nover the posterior, which is no calibration unless the verdict says so:")
             print("\n".join(survival(found, simulations)))
     print(f"written to {given.out}: {', '.join([*files_of(record), 'agreement.csv'])}")

@@ -211,7 +211,7 @@ def main(
     turns: Annotated[float, typer.Option(help="Shaft turns to integrate, at most 1.")] = 0.25,
 ) -> None:
     """Print error and time of SciPy's RK45 on the numpy right-hand side, and how many times faster rbdyn is."""
-    from rbdyn.base.terminal import guarded
+    from rbdyn.base.command import guarded
 
     with guarded(as_json=False):
         compare(scene, turns)
@@ -220,9 +220,11 @@ def main(
 def compare(scene: Path, turns: float) -> None:
     """Measure both and print. Raises InputError, RunError."""
     from rbdyn import Scene
-    from rbdyn.accuracy.integrators import OURS, Method, by_scipy
     from rbdyn.accuracy.methods import (
+        OURS,
+        Method,
         attempts_of,
+        by_scipy,
         compiling,
         curve,
         reference,
@@ -231,7 +233,7 @@ def compare(scene: Path, turns: float) -> None:
         times_faster,
     )
     from rbdyn.accuracy.report import processor
-    from rbdyn.base.terminal import print_table
+    from rbdyn.base.command import print_table
 
     stretches = starts_after_transient(Scene.load(scene), turns)
     ready = by_scipy("RK45", lambda stretch: NumpyRightHandSide(stretch.bearing))

@@ -26,18 +26,17 @@ import numpy as np
 import pandas as pd
 import typer
 from numpy.typing import NDArray
+from published import double_decker_search
+from published.double_decker_search import SearchEnd
 
 from rbdyn.accuracy.ball_solvers import Problem, problem_of, timed
-from rbdyn.base.terminal import print_table
-from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, solve_double_decker
-from rbdyn.quasistatic.double_decker.model import double_decker_of
-from rbdyn.quasistatic.rivals import double_decker_search, finite_search, plain_newton
-from rbdyn.quasistatic.rivals.double_decker_search import SearchEnd
-from rbdyn.quasistatic.rivals.finite_search import Search, offset_distances, search_points
-from rbdyn.quasistatic.rivals.levenberg_marquardt import Damping
+from rbdyn.base.command import print_table
+from rbdyn.quasistatic import finite_search, full_system
+from rbdyn.quasistatic.double_decker import DoubleDeckerSolution, double_decker_of, solve_double_decker
+from rbdyn.quasistatic.finite_search import Damping, Search, offset_distances, search_points
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.model import given_of, load_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
@@ -209,7 +208,7 @@ def table_4() -> tuple[DoubleOutcome, ...]:
         scene = double_decker_scene(axial, speed)
         model, load = double_decker_of(scene), load_of(scene)
         searched, search_s = _fastest(double_decker_search.solve, model.stack, load)
-        task = (model.stack, load, given_of(scene), model.middle_given)
+        task = (model.stack, load, constraint_of(scene), model.middle_constraint)
         convex, convex_s = _fastest(solve_double_decker, *task)
         outcomes.append(
             DoubleOutcome(axial, speed, their_searches, their_seconds, searched, search_s, convex, convex_s)
@@ -279,7 +278,7 @@ def what_is_left_out() -> list[tuple[str, int, int, int, int]]:
     for name, search, damping in choices:
         found = [finite_search.solve(*problem, search=search, damping=damping) for problem in problems]
         searches = [solution.searches or 0 for solution in found]
-        solved = sum(solution.found for solution in found)
+        solved = sum(solution.is_equilibrium for solution in found)
         rows.append((name, solved, min(searches), max(searches), sum(solution.steps for solution in found)))
     return rows
 
@@ -288,7 +287,7 @@ def angles(solve: Callable[..., Solution], problem: Problem) -> NDArray[np.float
     """Inner and outer contact angle (2, Z) [deg] of a problem; NaN where the solver fails."""
     found = solve(*problem)
     both = np.degrees([found.inner_angle, found.outer_angle])
-    return both if found.found else np.full_like(both, np.nan)
+    return both if found.is_equilibrium else np.full_like(both, np.nan)
 
 
 def figure_7() -> dict[str, Any]:
@@ -301,7 +300,7 @@ def figure_7() -> dict[str, Any]:
     for condition in FIGURE_7:
         unsigned, signed = problem_of(scene(condition)), problem_of(scene(condition, True))
         curves["search"][condition.speed] = angles(finite_search.solve, unsigned)
-        curves["newton"][condition.speed] = angles(plain_newton.solve, unsigned)
+        curves["newton"][condition.speed] = angles(full_system.plain_newton, unsigned)
         curves["signed"][condition.speed] = angles(equilibrium.solve, signed)
     gaps = {
         name: [float(np.abs(curve - curves["search"][speed]).max()) for speed, curve in curves[name].items()]

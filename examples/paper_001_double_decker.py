@@ -50,7 +50,7 @@ def point(speed: float, rings: str, form: str, load: tuple[float, float] = LOADS
     if form != "none":
         changes.append(f"model.ring_expansion_form='{form}'")
     result = equilibrium(BallScene.load(SCENE, changes))
-    if not result.found:
+    if not result.is_equilibrium:
         raise RuntimeError(f"{rings}, {form}, {speed:g} rpm: {result.status}")
     record = result.as_dict()
     found = {

@@ -26,8 +26,7 @@ from rbdyn.base.words import with_error
 from rbdyn.quasistatic.runout.lots import Bench, Lot, RaceLimits, design, draw_parts, linear_response, readings, runouts
 from rbdyn.quasistatic.runout.measures import running_accuracy
 from rbdyn.quasistatic.runout.model import bench_of
-from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.turn import Followed, follow
+from rbdyn.quasistatic.runout.turn import RaceErrors, RingPath, ball_path, follow, perfect, waviness
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"
@@ -133,14 +132,14 @@ def bench() -> Bench:
 HELD = np.array([math.nan, math.nan, math.nan, 0.0, 0.0])
 
 
-def solved(errors: RaceErrors, steps: int = STEPS, turns: int = TURNS, given: np.ndarray | None = None) -> Followed:
+def solved(errors: RaceErrors, steps: int = STEPS, turns: int = TURNS, given: np.ndarray | None = None) -> RingPath:
     """Equilibria of the bearing with its errors through ``turns`` turns of the inner ring."""
     test = bench()
     balls = ball_path(errors, test.turning, steps, turns)
     return follow(test.row, test.control, test.load, balls, turns, given)
 
 
-def simulated(steps: int = STEPS, turns: int = TURNS) -> tuple[pd.DataFrame, dict[str, Followed]]:
+def simulated(steps: int = STEPS, turns: int = TURNS) -> tuple[pd.DataFrame, dict[str, RingPath]]:
     """Runouts of every case and reading [um] with the coefficients of eqs 23-26, and the paths.
 
     ``held_um``: ours with the ring's tilt held, as a stiff spindle holds it.
@@ -269,7 +268,7 @@ CONCLUSION = (
 )
 
 
-def draw_orbits(frame: pd.DataFrame, paths: dict[str, Followed], file: Path) -> None:
+def draw_orbits(frame: pd.DataFrame, paths: dict[str, RingPath], file: Path) -> None:
     """Orbit of the ring's centre in each case, a line a reading; case 3 as the face sees it over the turns."""
     figure, axes = canvas(2, 3)
     for axis, (number, part) in zip(axes.ravel(), frame.groupby("case"), strict=True):

@@ -21,11 +21,11 @@ from published.common import Check, Table, canvas, percent, save, tell
 from published.lundberg_palmgren import plain_capacities
 
 from rbdyn import BallScene
-from rbdyn.contact.hertz_point import peak_pressure
+from rbdyn.contact.point_contact import peak_pressure
 from rbdyn.life.balls import row_life
 from rbdyn.quasistatic import preload, result
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 
 SPEED_RPM = 63000.0
 RADIAL_N = 150.0
@@ -120,8 +120,8 @@ def bearing(
 def solved(scene: Any) -> dict[str, float]:
     """Stress on both races [MPa], greatest load [N] and its angle [deg], life by Lundberg and Palmgren [h]."""
     model = row_of(scene)
-    solution = solve(model.row, model.control, load_of(scene), given_of(scene))
-    if not solution.found:
+    solution = solve(model.row, model.control, load_of(scene), constraint_of(scene))
+    if not solution.is_equilibrium:
         raise RuntimeError(solution.status)
     most = int(np.argmax(solution.inner_load))
     life = row_life(solution.inner_load, solution.outer_load, plain_capacities(scene.bearing), "inner")
@@ -198,7 +198,7 @@ def table3() -> pd.DataFrame:
 
 
 @functools.cache
-def optima() -> dict[str, preload.Sweep]:
+def optima() -> dict[str, preload.Scan]:
     """Preload on top of the working 40 N, for each model."""
     return {
         name: preload.over_preload(
@@ -214,7 +214,7 @@ def tilted_loads() -> pd.DataFrame:
     for tilt in TILTS_MRAD:
         scene = bearing(WORKING_AXIAL_N, radial=TILTED_RADIAL_N, tilt_mrad=-tilt)
         model = row_of(scene)
-        solution = solve(model.row, model.control, load_of(scene), given_of(scene))
+        solution = solve(model.row, model.control, load_of(scene), constraint_of(scene))
         columns[f"{tilt:g} mrad"] = solution.inner_load
     return pd.DataFrame(columns)
 

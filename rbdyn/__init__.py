@@ -7,7 +7,7 @@ Names are fetched when first used: importing the package loads neither numba nor
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
     from rbdyn.base.faults import InputError, RunError
-    from rbdyn.dynamics.motion.history import History, history
+    from rbdyn.dynamics.motion import History, history
     from rbdyn.dynamics.simulate import simulate
     from rbdyn.quasistatic.bearing import equilibrium
     from rbdyn.quasistatic.result import BallResult
@@ -25,8 +25,8 @@ _HOMES = {
     "equilibrium": "rbdyn.quasistatic.bearing",
     "BallResult": "rbdyn.quasistatic.result",
     "simulate": "rbdyn.dynamics.simulate",
-    "history": "rbdyn.dynamics.motion.history",
-    "History": "rbdyn.dynamics.motion.history",
+    "history": "rbdyn.dynamics.motion",
+    "History": "rbdyn.dynamics.motion",
     "SimulationResult": "rbdyn.result",
     "InputError": "rbdyn.base.faults",
     "RunError": "rbdyn.base.faults",

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from rbdyn.base.faults import InputError, bounded, path_of, read_text
+from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
 from rbdyn.base.records import Record, derived, json_fields, keyed
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
@@ -26,8 +26,8 @@ version_of = functools.cache(version)
 class Quantity(Record):
     """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
 
-    ``effective_samples``: how many independent batches would carry as much of it as the correlated ones of the run.
-    ``degrees_of_freedom`` of Student's t in the statistical error; None without one.
+    ``effective_samples``: number of independent batches that would carry as much information as those of the run;
+    ``degrees_of_freedom``: of Student's t in the statistical error, None without one.
     """
 
     value: float
@@ -42,30 +42,30 @@ class Quantity(Record):
 
         They err independently, and a sum would be too wide. None where neither was estimated.
         """
-        known = [error for error in (self.statistical_error, self.numerical_error) if error is not None]
-        return math.hypot(*known) if known else None
+        errors = [error for error in (self.statistical_error, self.numerical_error) if error is not None]
+        return math.hypot(*errors) if errors else None
 
     def __str__(self) -> str:
         parts = {"statistical": self.statistical_error, "numerical": self.numerical_error}
         errors = [f"{error_alone(error)} ({kind})" for kind, error in parts.items() if error is not None]
-        return " ".join((self.shown, *errors))
+        return " ".join((self.value_text, *errors))
 
     @property
     def stated_error(self) -> float | None:
-        """The error that people read next to the value; None where the statistical one is unknown.
+        """The error to print next to the value; None where the statistical one is unknown.
 
-        An error of the time steps alone bears no digits of a figure that scatters.
+        An error of the time steps alone says nothing of a figure that scatters.
         """
         return None if self.statistical_error is None else self.error
 
     @property
-    def shown(self) -> str:
+    def value_text(self) -> str:
         """The value to the digits that its stated error bears; to five without one."""
         return value_alone(self.value, self.stated_error)
 
 
 class SavedRecord(Record):
-    """A record that a file holds: ``FORMAT`` stands in it, and ``WHAT`` it is in messages."""
+    """A record in a file: ``FORMAT`` is in the file, ``WHAT`` names it in messages."""
 
     FORMAT: ClassVar[str]
     WHAT: ClassVar[str]
@@ -77,31 +77,33 @@ class SavedRecord(Record):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Read a saved record. Raises InputError when the file is missing or not such a one."""
+        """Read a saved record. Raises InputError when the file is missing or another one."""
         return read_record(path, cls.FORMAT, cls.WHAT, cls.from_dict)
 
 
-# Share of the cage's radial play below which the radius of its orbit is that of a jitter. Of five catalogue bearings at 1700 to
-# 12000 rpm, 0.1 to 10 % of C and all guidances, and of the example: cages that a film holds at one place move by 0.01 to 0.1 of
-# their play and none goes round its guide (whirl rate within 0.015 of 0), those that rollers throw about by 0.1 to 0.36, and the
-# two that go round (rates of 0.15 and 0.84 of the cage speed) by 0.51 and 0.25.
+# Radius of the cage's orbit over its radial play below which the cage only jitters. From the example and five catalogue
+# bearings at 1700 to 12000 rpm, 0.1 to 10 % of C and all guidances: cages that a film keeps at one place move by 0.01 to 0.1 of
+# their play, and none goes round its guide (whirl rate within 0.015 of 0). Those that rollers throw about move by 0.1 to 0.36.
+# The two that go round (rates of 0.15 and 0.84 of the cage speed) move by 0.51 and 0.25.
 JITTER = 0.1
 
 
 class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
-    ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
-    the contact alone; ``rolling_resistance``: the loss of that name by race, "outer" and "inner"; ``races``: pressure,
-    half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and operating diametral clearance
-    [um], with what fits, temperature and rotation take of it where a mounting is given, and under "radial", "guide" and
-    "pocket" the drawn, fit, temperature, rotation and operating share of each;
-    ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's,
-    None where the scene states no designation;
-    ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not show it;
-    ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
-    ``target``: what a run to a target accuracy chose, reached and cost, None for any other; ``cage_orbit_radius_share``:
-    root mean square distance of the cage's centre from its mean place over the cage's radial play, None where nothing guides it.
+    - ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of the
+      contact alone
+    - ``rolling_resistance``: the loss of that name by race, "outer" and "inner"
+    - ``races``: pressure, half-width and film at the largest load of "inner" and "outer"
+    - ``clearance``: drawn and operating diametral clearance [um], with the changes by fits, temperature and rotation where a
+      mounting is given. "radial", "guide" and "pocket" have the drawn, fit, temperature, rotation and operating share of each
+    - ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's.
+      None where the scene states no designation
+    - ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not show it
+    - ``counted_turns``: turns counted of each replicate, more than asked for where it was lengthened
+    - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
+    - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
+      play, None where nothing guides the cage
     """
 
     FORMAT = "rbdyn.simulation/4"
@@ -136,7 +138,7 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def jitters(self) -> bool:
-        """Whether the cage's orbit is a jitter, so that the whirl deviation ratio is none of a whirl."""
+        """Whether the cage only jitters, so that the whirl deviation ratio shows no whirl."""
         return self.cage_orbit_radius_share is not None and self.cage_orbit_radius_share.value < JITTER
 
     @property
@@ -148,8 +150,8 @@ class SimulationResult(Brief, SavedRecord):
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""
         figures = [
-            Figure(words, each.value, each.stated_error, unit)
-            for key, each in self.quantities.items()
+            Figure(words, figure.value, figure.stated_error, unit)
+            for key, figure in self.quantities.items()
             for words, unit in (quantity(key),)
         ]
         return (
@@ -166,8 +168,9 @@ class SimulationResult(Brief, SavedRecord):
 
 
 def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[str, Any]], Saved]) -> Saved:
-    """A ``what`` saved as JSON in the format ``form``, as ``restore`` makes it of that. Raises InputError when the file is
-    missing or holds no such, or none that is whole.
+    """A ``what`` saved as JSON in the format ``form``, made by ``restore``.
+
+    Raises InputError when the file is missing, has another format or is not whole.
     """
     if not path_of(path).is_file():
         raise InputError([f"{path}: cannot be read (no such file); check the path"])
@@ -176,19 +179,21 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
         data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
-    given = data.get("format") if isinstance(data, dict) else None
-    if given != form:
-        same = isinstance(given, str) and given.partition("/")[0] == form.partition("/")[0]
-        old = f"format is {given}, not {form}; {'run the scene again' if same else f'name a saved {what}'}"
-        raise InputError([f"{path}: {old if isinstance(given, str) else f'not a saved {what}; check the path'}"])
+    saved = data.get("format") if isinstance(data, dict) else None
+    if saved != form:
+        same = isinstance(saved, str) and saved.partition("/")[0] == form.partition("/")[0]
+        if not isinstance(saved, str):
+            raise InputError([f"{path}: not a saved {what}; check the path"])
+        fix = "run the scene again" if same else f"name a saved {what}"
+        raise InputError([f"{path}: format is {saved}, not {form}; {fix}"])
     try:
-        return restore(bounded(data, str(path)))
+        return restore(check_bounds(data, str(path)))
     except (AttributeError, KeyError, TypeError, ValueError):
         raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
 
 
 def read_json(path: Path | str) -> Any:
-    """What a file holds as JSON. Raises OSError, and ValueError where it holds none or nests it too deep."""
+    """JSON of a file. Raises OSError, and ValueError where it is no JSON or nested too deep."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except RecursionError:
@@ -196,16 +201,16 @@ def read_json(path: Path | str) -> Any:
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:
-    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never half of it."""
+    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never a part of it."""
     with whole_file(path) as new:
         new.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A file to write, which then takes the place of ``path``: whoever reads that finds the old one or the new one.
+    """A file to write, which then replaces ``path``: a reader gets the old one or the new one.
 
-    What fails, or is interrupted, leaves no part of the new one.
+    A failure or an interruption leaves no part of the new one.
     """
     path = Path(path)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")

@@ -79,11 +79,11 @@ EVERYTHING = (
 # Files that take longest begin, so that no process works on one of them while the other has nothing left; the first of them
 # compiles most, the second nothing.
 DEAREST = (
-    "test_accuracy", "test_study_survival", "test_adaptive", "test_uncertainty", "test_streams", "test_equations",
-    "test_study_adaptive", "test_golden", "test_ball_command", "test_leave_out", "test_study", "test_search_report",
-    "test_unknown_worth", "test_invariants", "test_map_and_options", "test_unknown_spread", "test_ball_solvers",
-    "test_study_status", "test_calibrate", "test_manual", "test_rolling_resistance", "test_unknown_calibration",
-    "test_ball_sweep", "test_surroundings", "test_examples",
+    "test_accuracy", "test_adaptive", "test_uncertainty", "test_streams", "test_map_and_options", "test_equations",
+    "test_study_survival", "test_study_adaptive", "test_golden", "test_rosenbrock", "test_surroundings", "test_runge_kutta",
+    "test_study", "test_calibrate", "test_unknown_calibration", "test_unknown_worth", "test_ball_sweep", "test_ball_solvers",
+    "test_manual", "test_unknown_spread", "test_leave_out", "test_study_status", "test_invariants", "test_ball_command",
+    "test_doe_command_line", "test_search_report", "test_filtered_whirl", "test_show", "test_line_contact", "test_examples",
 )  # fmt: skip
 
 
@@ -102,6 +102,9 @@ def fuzz_cases(request: pytest.FixtureRequest) -> int:
 def pytest_cmdline_main(config: pytest.Config) -> None:
     """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one, but for slow
     ones, which share nothing and go where there is room."""
+    # Hundreds of processes import the same modules, and the next session too: the first keeps what it compiles of them.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     if not config.pluginmanager.hasplugin("xdist") or hasattr(config, "workerinput"):
         return
     # Two processes whose linear algebra spins on two threads each wait for each other. Before any of them loads numpy.

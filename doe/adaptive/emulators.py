@@ -1,4 +1,4 @@
-"""Runs of a noisy simulator with what their replicates say, an emulator for each response, and what they say together of costs and limits."""
+"""Runs of a noisy simulator, an emulator for each response, and what these predict of costs and limits."""
 
 from __future__ import annotations
 
@@ -12,6 +12,16 @@ from scipy import special
 from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.pareto.goals import Goals
 from rbdyn.base.arrays import Array, Mask, Whole
+
+# Prior of the logarithm of a length scale in half ranges. The bearing's whirl turns several times between two levels of a
+# design: the emulators' own prior, of longer lengths, lost 1.5 % of its front in 5 of 5 searches.
+PRIOR = (0.0, 1.0)
+# Factors that mean nothing at a level of a category: places of the category, of its level, and of the factors.
+Inactive = tuple[tuple[int, int, tuple[int, ...]], ...]
+# Ratio of the ends of a factor up to which its logarithm may be emulated: of a wider one, an end may lie at a zero that means
+# nothing. Where the runs prefer logarithms, these gained 1 % of the front of a table of the bearing in 100 runs.
+LARGEST_RATIO = 10.0
+LEAST_DEVIATION = 1e-12  # of a response's scale: an exact response still lies on a side of a level
 
 
 class Runs(NamedTuple):
@@ -29,7 +39,7 @@ class Runs(NamedTuple):
 
     @property
     def good(self) -> Mask:
-        """Whether each run gave all its values, (n,)."""
+        """Whether each run has all its values, (n,)."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def rows(self, which: Any) -> Runs:
@@ -41,74 +51,39 @@ class Runs(NamedTuple):
         return Runs(*(np.concatenate(both) for both in zip(self, more, strict=True)))
 
 
-class Border(NamedTuple):
-    """How far the faces of a region may be moved: to ``low`` and ``high`` (k,) in coded units, as long as runs are ``possible``
-    at all corners (c, k) of it."""
-
-    low: Array
-    high: Array
-    possible: Callable[[Array], bool]
-
-
-class Face(NamedTuple):
-    """A face that the pick lies ``at`` (coded): of a ``factor``, upper (``side`` 1) or lower (-1); ``better`` is the chance that
-    the front goes on beyond. ``held`` by "allowed", "scene" (no run is possible beyond), "moves" (no more are made) or, "",
-    by that chance alone."""
-
-    factor: int
-    side: int
-    at: float
-    better: float
-    held: str
-
-
 # Runs points (n, k) in factor units with (n,) replicates each, every row with a seed of its own: values, errors, freedom.
 Evaluate = Callable[[Array, Whole], tuple[Array, Array, Whole]]
 
 
-# Prior of the logarithm of a length in half ranges. On the bearing's whirl, which turns several times between two levels of a
-# design, the emulators' own prior believed in 5 of 5 searches in lengths that no run had told, and lost 1.5 % of the front.
-PRIOR = (0.0, 1.0)
-# Factors that mean nothing at a level of a category: places of the category, of its level, and of the factors.
-Inactive = tuple[tuple[int, int, tuple[int, ...]], ...]
-# Ends of a factor whose logarithm is told: farther apart, one may lie at a zero that means nothing. A clearance acts by its
-# shares: where the runs say so, logarithms found 1 % more of the front of a table of the bearing in 100 runs.
-WIDEST = 10.0
-LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still has a side of a level
-
-
 @dataclass(frozen=True, eq=False)
 class Emulators:
-    """Emulators of m responses from runs that went well.
+    """Emulators ``by_response`` (m) from the runs that went well.
 
-    The last coordinates of points are of categories of so many ``levels``, at which ``inactive`` factors mean nothing;
-    ``shares`` (m) of factors are those that each emulator knows by their logarithms. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
+    The last coordinates of points are of categories of so many ``levels``, at which ``inactive`` factors mean nothing.
+    ``shares`` (m) are of the factors whose logarithms an emulator takes. Deviations are multiplied by ``stretch`` (m,), at
+    least 1, so that runs left out one at a time lie within them.
     """
 
     goals: Goals
     runs: Runs
-    each: Sequence[Emulator]
+    by_response: Sequence[Emulator]
     stretch: Array
     levels: tuple[int, ...] = ()
     inactive: Inactive = ()
     shares: tuple[tuple[float, ...], ...] = ()
 
-    def _told(self, points: Array) -> list[Array]:
-        known = settled(points, self.levels, self.inactive)
-        return [embedded(known, self.levels, each) for each in self.shares]
-
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
-        told = zip(self.each, self._told(points), strict=True)
-        means, deviations = zip(*(one.predict(at) for one, at in told), strict=True)
+        pairs = zip(self.by_response, self._coordinates(points), strict=True)
+        means, deviations = zip(*(emulator.predict(places) for emulator, places in pairs), strict=True)
         stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
         """Covariances (n, m) of the uncertainty of each response at points (n, k) and at one point (k,)."""
-        told = zip(self.each, self._told(points), self._told(point[None]), strict=True)
-        columns = [one.covariance(at, other)[:, 0] for one, at, other in told]
+        parts = zip(self.by_response, self._coordinates(points), self._coordinates(point[None]), strict=True)
+        columns = [emulator.covariance(places, place)[:, 0] for emulator, places, place in parts]
         return np.column_stack(columns) * self.stretch**2
 
     def scatter(self, points: Array) -> Array:
@@ -117,18 +92,19 @@ class Emulators:
 
     def nuggets(self) -> Array:
         """Variances (m,) that the replicates of a run share and do not show."""
-        return np.array([one.hyperparameters.nugget for one in self.each])
+        return np.array([emulator.hyperparameters.nugget for emulator in self.by_response])
 
     def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
         """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
-        drawn = [one.draw(count, random) for one in self.each]
+        draws = [emulator.draw(count, random) for emulator in self.by_response]
 
         def functions(points: Array) -> Array:
-            return np.stack([each(at) for each, at in zip(drawn, self._told(points), strict=True)], axis=-1)
+            pairs = zip(draws, self._coordinates(points), strict=True)
+            return np.stack([draw(places) for draw, places in pairs], axis=-1)
 
         return functions
 
-    def kept(self, means: Array, deviations: Array) -> Array:
+    def feasibility(self, means: Array, deviations: Array) -> Array:
         """Probability (n,) that a point keeps all limits, the responses as independent."""
         chance = np.ones(len(means))
         for index, sense, limit in self.goals.limited:
@@ -146,85 +122,101 @@ class Emulators:
             elif self.goals.kinds[index] == "max":
                 chance *= special.ndtr((mean + level) / deviation)
             else:
-                off = mean - self.goals.target[index]
-                ends = (special.ndtr((side * level - off) / deviation) for side in (1.0, -1.0))
+                distance = mean - self.goals.target[index]
+                ends = (special.ndtr((side * level - distance) / deviation) for side in (1.0, -1.0))
                 chance *= np.subtract(*ends).clip(0.0)
         return chance
 
+    def _coordinates(self, points: Array) -> list[Array]:
+        """Coordinates of points (n, k) for the emulator of each response."""
+        active = without_inactive(points, self.levels, self.inactive)
+        return [coordinates(active, self.levels, shares) for shares in self.shares]
 
-def settled(points: Array, levels: tuple[int, ...], inactive: Inactive) -> Array:
+
+def fit_emulators(
+    goals: Goals,
+    runs: Runs,
+    previous: Emulators | None = None,
+    levels: tuple[int, ...] = (),
+    inactive: Inactive = (),
+    shares: tuple[float, ...] = (),
+) -> Emulators:
+    """Emulators of all responses; ``previous`` ones, of nearly the same runs, shorten the search for their hyperparameters.
+
+    Each takes the logarithms of the factors that have ``shares`` where that makes its runs likelier.
+    """
+    good = runs.rows(runs.good)
+    variances = _pooled(good, good.points) / good.replicates[:, None]
+    responses = good.values.shape[1]
+    starts = [None] * responses if previous is None else [one.hyperparameters for one in previous.by_response]
+    numbers, choices = good.points.shape[1] - len(levels), [(), shares] if any(shares) else [()]
+    points = without_inactive(good.points, levels, inactive)
+    by_response, shares_by_response = [], []
+    for values, variance, start in zip(good.values.T, variances.T, starts, strict=True):
+        rivals = [
+            fit_emulator(
+                coordinates(points, levels, choice), values, variance, start=start, prior=PRIOR, trended=numbers
+            )
+            for choice in choices
+        ]
+        best = max(range(len(choices)), key=lambda place: rivals[place].likelihood)
+        by_response.append(rivals[best])
+        shares_by_response.append(choices[best])
+    stretch = np.array([_stretch(emulator) for emulator in by_response])
+    return Emulators(goals, good, by_response, stretch, levels, inactive, tuple(shares_by_response))
+
+
+def without_inactive(points: Array, levels: tuple[int, ...], inactive: Inactive) -> Array:
     """Points (n, k) with the factors at 0 that mean nothing at their levels: all values of these are the same point."""
-    found, numbers = points.copy() if inactive else points, points.shape[1] - len(levels)
+    active, numbers = points.copy() if inactive else points, points.shape[1] - len(levels)
     for category, place, factors in inactive:
         there = np.rint(0.5 * (points[:, numbers + category] + 1.0) * (levels[category] - 1)) == place
-        found[np.ix_(there, factors)] = 0.0
-    return found
+        active[np.ix_(there, factors)] = 0.0
+    return active
 
 
 def shares_of(centre: Array, step: Array, low: Array, high: Array) -> tuple[float, ...]:
-    """What ``step`` is of ``centre`` (k,) for factors that have the same sign from ``low`` to ``high`` (k,), in steps from the
-    centre, and whose ends are not too far apart; 0 for others."""
+    """Shares (k,) of ``step`` in ``centre`` for factors whose logarithms may be emulated, 0 for others.
+
+    Those keep their sign from ``low`` to ``high`` (k,), in steps from the centre, and their ends are not too far apart.
+    """
     ends = np.sort(np.abs([centre + step * low, centre + step * high]), axis=0)
-    told = (ends[0] * WIDEST > ends[1]) & ((centre + step * low) * (centre + step * high) > 0.0)
-    return tuple(np.divide(step, centre, out=np.zeros(len(step)), where=told).tolist())
+    one_sign = (centre + step * low) * (centre + step * high) > 0.0
+    where = (ends[0] * LARGEST_RATIO > ends[1]) & one_sign
+    return tuple(np.divide(step, centre, out=np.zeros(len(step)), where=where).tolist())
 
 
-def embedded(points: Array, levels: tuple[int, ...], shares: tuple[float, ...] = ()) -> Array:
-    """Points (n, k) whose last coordinates are of categories, with a coordinate for every level in the place of each of these,
-    and the logarithms of the factors that have ``shares``, which have the slope of the points where these are 0.
+def coordinates(points: Array, levels: tuple[int, ...], shares: tuple[float, ...] = ()) -> Array:
+    """Coordinates of points (n, k) for an emulator.
 
-    Any two levels of a category are so as unlike as the lengths of their coordinates say. Source: Garrido-Merchan and
-    Hernandez-Lobato, Dealing with categorical and integer-valued variables in Bayesian optimization with Gaussian processes,
-    Neurocomputing 380 (2020). Logarithms: Snoek, Swersky, Zemel and Adams, Input warping for Bayesian optimization of
-    non-stationary functions, ICML (2014).
+    A category, one of the last coordinates of a point, has a coordinate for every level: any two levels are as unlike as
+    the lengths of their coordinates say. A factor that has a share is given by its logarithm, with slope 1 where it is 0.
+
+    Sources: Garrido-Merchan and Hernandez-Lobato, Dealing with categorical and integer-valued variables in Bayesian
+    optimization with Gaussian processes, Neurocomputing 380 (2020); Snoek, Swersky, Zemel and Adams, Input warping for
+    Bayesian optimization of non-stationary functions, ICML (2014).
     """
     share, numbers = np.array(shares), points.shape[1] - len(levels)
-    told = np.flatnonzero(share)
-    if told.size:
+    logarithmic = np.flatnonzero(share)
+    if logarithmic.size:
         points = points.copy()
-        points[:, told] = np.log1p(share[told] * points[:, told]) / share[told]
+        points[:, logarithmic] = np.log1p(share[logarithmic] * points[:, logarithmic]) / share[logarithmic]
     parts = [points[:, :numbers]]
     for count, column in zip(levels, points[:, numbers:].T, strict=True):
         parts.append(np.eye(count)[np.rint(0.5 * (column + 1.0) * (count - 1)).astype(np.int64)])
     return np.hstack(parts) if levels else points
 
 
-def fit_emulators(
-    goals: Goals,
-    runs: Runs,
-    known: Emulators | None = None,
-    levels: tuple[int, ...] = (),
-    inactive: Inactive = (),
-    shares: tuple[float, ...] = (),
-) -> Emulators:
-    """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters.
-
-    Each knows the factors that have ``shares`` by their logarithms where that makes its runs likelier.
-    """
-    good = runs.rows(runs.good)
-    variances = _pooled(good, good.points) / good.replicates[:, None]
-    starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
-    numbers, ways = good.points.shape[1] - len(levels), [(), shares] if any(shares) else [()]
-    points = settled(good.points, levels, inactive)
-    each, told = [], []
-    for value, variance, start in zip(good.values.T, variances.T, starts, strict=True):
-        found = [
-            fit_emulator(embedded(points, levels, way), value, variance, start=start, prior=PRIOR, trended=numbers)
-            for way in ways
-        ]
-        best = max(range(len(ways)), key=lambda way: found[way].restricted_likelihood)
-        each.append(found[best])
-        told.append(ways[best])
-    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels, inactive, tuple(told))
-
-
 def _stretch(emulator: Emulator) -> float:
-    """Root mean square of what runs left out one at a time miss the others' forecast by, in standard deviations; at least 1."""
-    foretold, deviation = emulator.leave_one_out()
-    return max(float(np.sqrt(np.mean(((emulator.values - foretold) / deviation) ** 2))), 1.0)
+    """Root mean square, at least 1, of the residuals of runs left out one at a time, in standard deviations."""
+    mean, deviation = emulator.leave_one_out()
+    return max(float(np.sqrt(np.mean(((emulator.values - mean) / deviation) ** 2))), 1.0)
 
 
 def _pooled(runs: Runs, points: Array) -> Array:
+    """Variances (n, m) of single replicates at points (n, k), by the replicates of runs."""
     single = runs.errors**2 * runs.replicates[:, None]
     columns = zip(single.T, runs.freedom.T, strict=True)
-    return np.column_stack([pooled_variances(runs.points, each, behind, points) for each, behind in columns])
+    return np.column_stack(
+        [pooled_variances(runs.points, variances, freedom, points) for variances, freedom in columns]
+    )

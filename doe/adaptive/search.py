@@ -1,9 +1,8 @@
-"""The search: design, batches where most is to be gained, a check of the predictions, fresh runs at the finalists; whether it is to go
-beyond the border of its region, when it may stop, and what it gives.
+"""The search: design, batches where most is to be gained, a check of the predictions, fresh runs at the finalists; when it moves
+a face of its region, when it stops, and its result.
 
-What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
-made afresh at the finalists and alone are reported, which had no part in their choice; what they show helps to choose
-the finalists that are left, but has no say in what was chosen.
+Predictions at the points that a search chooses are optimistic: their errors made it choose them. So only fresh runs at the
+finalists are reported, which had no part in the choice of their points. A batch of them helps to choose the finalists after it.
 """
 
 from __future__ import annotations
@@ -18,121 +17,106 @@ import numpy as np
 from scipy import special
 from scipy.stats import qmc
 
-from doe.adaptive.acquisition import DRAWS, WORTH, Levels, Region, batch, candidates, front_rows, known_of, levels_of
-from doe.adaptive.emulators import Border, Emulators, Evaluate, Face, Runs, fit_emulators, shares_of
+from doe.adaptive.acquisition import (
+    DRAWS,
+    WORTH,
+    Levels,
+    Region,
+    batch,
+    candidates,
+    dominance_of,
+    front_rows,
+    levels_of,
+)
+from doe.adaptive.emulators import Emulators, Evaluate, Runs, fit_emulators, shares_of
+from doe.pareto.front import Samples, SimulatedFront
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, hypervolume, spread
-from doe.pareto.simulated import Samples, SimulatedFront
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
 
+FRESH = 0.2  # of the budget: fresh runs at the finalists
+TESTED = 4  # last batches that show how right the emulators' deviations are
+ROUNDS = 3  # of candidates for a front that is reported
+SHOWN, FEW = 200, 2048  # points that represent a predicted front, and levels by which its hypervolume is computed
+SHARE = 0.25  # of the deviation of the hypervolume over the fronts drawn: a batch that gains less gains nothing
+LEAST = 0.0025  # of the hypervolume: the error by the choice of the points that represent a front
+BATCHES = 3  # that gain nothing in a row; with the first alone prototypes stopped with 2 % still to gain
+CHECKS = 8  # fresh runs on the front
+DOUBT = 0.05  # chance of calling right emulators wrong
 NEAR = 0.05  # of the range of a factor: as near to a face a pick lies at it
-AHEAD, BETTER = 0.1, 0.9  # of the range beyond a face; chance there of what no point of the front dominates
+AHEAD, BETTER = 0.1, 0.9  # of the range beyond a face; chance there of a response that no point of the front dominates
 GROWTH, MOST_MOVES = 0.5, 3  # of the range a move; moves of a search
-DRAWN = 64  # functions
+FUNCTIONS = 64  # drawn for that chance
 
 
-class Place(NamedTuple):
-    """Where a search is looked at: what it knows, its region, points (n, k) of it, and how many faces it has moved."""
+@dataclass(frozen=True)
+class Plan:
+    """How a search goes: ``budget`` of runs, those of the design and the fresh ones included; runs a ``batch``; ``seed``.
 
-    emulators: Emulators
-    region: Region
-    points: Array
-    moves: int
+    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule. Two replicates
+    are too few: both may miss a regime that the bearing is in for half of the time, and then agree.
+    """
 
+    budget: int
+    batch: int = 8
+    seed: int = 1
+    least: int = 4
+    most: int = 16
+    usual: int = 8
+    pick: Rule = "knee"
 
-def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator) -> list[Face]:
-    """Faces of the region at which the pick of the predicted front lies."""
-    emulators, region, points, moves = place
-    rows, costs = front_rows(emulators, points)
-    pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
-    span, draws = region.high - region.low, emulators.draws(DRAWN, random)
-    found = []
-    for factor, side in product(range(pick.size - len(region.levels)), (-1, 1)):
-        face = (region.high if side > 0 else region.low)[factor]
-        if abs(pick[factor] - face) > NEAR * span[factor]:
-            continue
-        beyond = pick.copy()
-        beyond[factor] = face + side * AHEAD * span[factor]
-        drawn = emulators.goals.costs(draws(np.vstack([beyond, points[rows]])))
-        better = 1.0 - float(dominates(drawn[:, 1:], drawn[:, :1]).any(axis=1).mean())
-        found.append(
-            Face(
-                factor,
-                side,
-                float(face),
-                better,
-                "moves" if moves == MOST_MOVES else _held(border, region, factor, side),
-            )
-        )
-    return found
-
-
-def outermost(found: list[Face]) -> Face | None:
-    """The face to be moved: of those that nothing holds and that the front goes on beyond, the surest."""
-    free = [face for face in found if not face.held and face.better > BETTER]
-    return max(free, key=lambda face: face.better, default=None)
-
-
-def grown(border: Border, region: Region, factor: int, side: int) -> Region:
-    """The region with a face moved outward, as far as the border permits."""
-    low, high = region.low.copy(), region.high.copy()
-    by = GROWTH * (high - low)[factor]
-    if side > 0:
-        high[factor] = max(min(high[factor] + by, border.high[factor]), high[factor])
-    else:
-        low[factor] = min(max(low[factor] - by, border.low[factor]), low[factor])
-    return region._replace(low=low, high=high)
-
-
-def _held(border: Border, region: Region, factor: int, side: int) -> str:
-    wider = grown(border, region, factor, side)
-    if (
-        np.ptp([wider.low, wider.high], axis=0)[factor]
-        < (1.0 + AHEAD) * np.ptp([region.low, region.high], axis=0)[factor]
-    ):
-        return "allowed"
-    return "" if border.possible(np.array(list(product(*zip(wider.low, wider.high, strict=True))))) else "scene"
+    @property
+    def fresh(self) -> int:
+        """Fresh runs."""
+        return round(FRESH * self.budget)
 
 
 @dataclass(frozen=True)
 class Batch:
     """State of the search after ``runs`` runs that went well, those of the design included.
 
-    ``hypervolume`` of the predicted front and its standard deviation over the functions drawn from the emulators; ``gained``
-    by the last batch (NaN before the first); ``left`` to be gained if all were known. All on the scale of the predicted front
-    at that time; ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front. ``why``
-    the next batch was made: "improvement", or "check" of the predicted front; "" after the last.
+    ``hypervolume`` of the predicted front and its standard ``deviation`` over the functions drawn from the emulators; ``gained``
+    by the last batch (NaN before the first); ``remaining`` to be gained if all were known. All are on the scale of the predicted
+    front at that time. ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front.
+    ``why`` the next batch was made: "improvement", "check" of the predicted front, or "extension"; "" after the last.
     """
 
     runs: int
     hypervolume: float
     deviation: float
     gained: float
-    left: float
+    remaining: float
     why: str
     reached: float = float("nan")
+
+
+# Takes the state after a batch, the finished runs and those of the whole search.
+Watch = Callable[[Batch, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class AdaptiveFront:
     """A front found by emulators and confirmed by fresh runs.
 
-    ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
-    whole front that the emulators predict, of which the rows ``shown`` have the largest hypervolume, with its predicted responses ``predictions`` (a, m) and their ``deviations`` (a, m).
-    ``region`` that was searched in the end. ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that stand for the predicted front at each; ``searched`` (n,) are all runs of design and search, in factor units,
-    ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
-    and where to (coded); ``faces`` that the pick lies at in the end.
-    ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
-    emulators by, in standard deviations. ``fresh``: number of the fresh runs. ``stopped``: why the search ended. ``seconds``
-    of the emulators and of the choice of runs.
+    - ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search
+    - ``archive`` (a, k): the whole front that the emulators predict, with its ``predictions`` and their ``deviations`` (a, m);
+      the rows ``representatives`` of it have the largest hypervolume
+    - ``emulators`` and ``region`` in the end
+    - ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that represent the predicted front at each
+    - ``searched`` (n,): all runs of design and search, in factor units, ``why`` each was made ("design", "improvement", "check",
+      "extension") and the replicates ``spent`` on it (n,)
+    - ``moves``: faces moved and where to (coded); ``faces`` that the pick lies at in the end
+    - ``bias`` and ``spread`` (m,): mean of the residuals of the fresh runs at the finalists to the predictions, in standard
+      deviations, and root mean square about it
+    - ``fresh``: number of the fresh runs; ``stopped``: why the search ended; ``seconds`` of the emulators and of the choice of runs
     """
 
     front: SimulatedFront
     archive: Array
-    shown: Rows
+    representatives: Rows
     predictions: Array
     deviations: Array
     emulators: Emulators
@@ -151,68 +135,6 @@ class AdaptiveFront:
     seconds: float
 
 
-SHARE = 0.25  # of the deviation of the hypervolume over the fronts drawn: a batch that gains less gains nothing
-LEAST = 0.0025  # of the hypervolume: what the choice of the points that stand for a front may make of it
-BATCHES = 3  # that gain nothing in a row; with the first alone prototypes stopped with 2 % still to gain
-CHECKS = 8  # fresh runs on the front
-DOUBT = 0.05  # chance of calling right emulators wrong
-
-
-def nothing_gained(history: Sequence[Batch], since: int) -> bool:
-    """Whether the last batches after the one numbered ``since`` gained nothing."""
-    last = history[since + 1 :][-BATCHES:]
-    return len(last) == BATCHES and all(
-        each.gained < max(SHARE * each.deviation, LEAST * each.hypervolume) for each in last
-    )
-
-
-def missed(emulators: Emulators, runs: Runs) -> np.ndarray:
-    """What runs (n, m) that the emulators do not know miss them by, in standard deviations of the two together."""
-    means, deviations = emulators.predict(runs.points)
-    own = emulators.scatter(runs.points) / runs.replicates[:, None] + emulators.nuggets()
-    return np.asarray((runs.values - means) / np.sqrt(deviations**2 + own))
-
-
-def as_predicted(emulators: Emulators, runs: Runs) -> bool:
-    """Whether fresh runs lie within what the emulators predict of them, all responses with a goal or a limit together."""
-    goals = emulators.goals
-    columns = sorted({*goals.objectives.tolist(), *(index for index, _, _ in goals.limited)})
-    off = missed(emulators, runs.rows(runs.good))[:, columns]
-    return off.size > 0 and bool(special.chdtrc(off.size, float((off**2).sum())) > DOUBT)
-
-
-FRESH = 0.2  # of the budget: fresh runs at the finalists
-TESTED = 4  # last batches that show how right the emulators' deviations are
-ROUNDS = 3  # of candidates for a front that is reported
-SHOWN, FEW = 200, 2048  # points of a predicted front that are shown, and levels by which its hypervolume is computed
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How a search goes: ``budget`` of runs, those of the design and the fresh ones included; runs a ``batch``; ``seed``.
-
-    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule. Two replicates
-    of the bearing may both miss what it does at a point in half of the time, and then agree.
-    """
-
-    budget: int
-    batch: int = 8
-    seed: int = 1
-    least: int = 4
-    most: int = 16
-    usual: int = 8
-    pick: Rule = "knee"
-
-    @property
-    def fresh(self) -> int:
-        """Fresh runs."""
-        return round(FRESH * self.budget)
-
-
-# Reports the state after a batch, the runs that are done and those of the whole search.
-Watch = Callable[[Batch, int, int], None]
-
-
 @one_thread
 def adaptive_front(
     evaluate: Evaluate,
@@ -223,20 +145,20 @@ def adaptive_front(
     goals: Goals,
     plan: Plan,
     baseline: Array,
-    watch: Watch = lambda state, done, total: None,
+    watch: Watch = lambda state, runs, budget: None,
     border: Border | None = None,
 ) -> AdaptiveFront:
     """Find the front; the same seed and the same runs give the same bits.
 
-    ``centre`` and ``step`` (k,) turn coded units into those of the factors, in which ``evaluate`` is asked and the
-    ``baseline`` is given. ``design`` are the first runs. The region may grow as far as the ``border``, not at all without one.
+    ``centre`` and ``step`` (k,) turn coded units into those of the factors, which ``evaluate`` and the ``baseline`` have.
+    ``design`` are the first runs. The region may grow as far as the ``border``, not at all without one.
 
     Raises MethodError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
     InfeasibleError where no run comes near to keeping the limits.
     """
     check_budget(plan, len(design.points))
-    widest = border or region
-    shares = shares_of(centre, step, widest.low, widest.high)
+    limits = border or region
+    shares = shares_of(centre, step, limits.low, limits.high)
     why = ["design"] * len(design.points)
     search = _Search(evaluate, centre, step, region, goals, plan, design, watch, border, shares, why=why)
     stopped = search.spend()
@@ -255,18 +177,21 @@ def check_budget(plan: Plan, design: int) -> None:
 
 
 class _Finals(NamedTuple):
-    """Fresh ``runs`` at the finalists, the one at the ``base``, what was ``believed`` (f, m) of the finalists when they were
-    chosen, and what good runs ``missed`` (g, m) that by, in standard deviations."""
+    """Fresh ``runs`` at the finalists and the one at the ``base``.
+
+    ``predictions`` (f, m) are those by which the finalists were chosen; ``residuals`` (g, m) are those of the good runs to
+    them, in standard deviations.
+    """
 
     runs: Runs
     base: Runs
-    believed: Array
-    missed: Array
+    predictions: Array
+    residuals: Array
 
 
 @dataclass(eq=False)
 class _Search:
-    """A search under way; ``runs`` are all so far, failed ones too."""
+    """A search under way; ``runs`` are all so far, failed ones too; ``residuals`` are those of every batch to its predictions."""
 
     evaluate: Evaluate
     centre: Array
@@ -282,7 +207,7 @@ class _Search:
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
     moves: list[tuple[Face, float]] = field(default_factory=list)
-    off: list[Array] = field(default_factory=list)
+    residuals: list[Array] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
 
@@ -293,25 +218,25 @@ class _Search:
             started = time.perf_counter()
             emulators = self._fit(self.runs)
             random = np.random.default_rng([self.plan.seed, len(self.history)])
-            points = candidates(emulators, self.region, random, self.runs.points)
-            levels, left, state = self._state(emulators, points, random)
+            pool = candidates(emulators, self.region, random, self.runs.points)
+            levels, improvable, state = self._state(emulators, pool, random)
             count = min(self.plan.batch, room - len(self.runs.points))
-            rows, _ = batch(emulators, points, levels, left, count, self.region.apart)
-            check = len(points) > 0 and nothing_gained(self.history, since) and count >= CHECKS
+            rows, _ = batch(emulators, pool, levels, improvable, count, self.region.apart)
+            check = len(pool) > 0 and nothing_gained(self.history, since) and count >= CHECKS
             if check:
-                rows = self._check(emulators, points, levels)
-            chosen, why = points[rows], "" if not rows else "check" if check else "improvement"
-            if self.history and rows and (beyond := self._beyond(emulators, points, count, random)) is not None:
-                chosen, why, check, since = beyond, "extension", False, len(self.history)
+                rows = self._check(emulators, pool, levels)
+            points, why = pool[rows], "" if not rows else "check" if check else "improvement"
+            if self.history and rows and (beyond := self._beyond(emulators, pool, count, random)) is not None:
+                points, why, check, since = beyond, "extension", False, len(self.history)
             self.history.append(replace(state, why=why))
             self.watch(self.history[-1], len(self.runs.points), self.plan.budget)
-            replicates = self._replicates(emulators, chosen)
+            replicates = self._replicates(emulators, points)
             self.seconds += time.perf_counter() - started
             if not rows:
                 return "the budget is spent" if count <= 0 else "no point is left that may gain"
-            fresh = self._run(chosen, replicates)
-            self.off.append(missed(emulators, fresh.rows(fresh.good)))
-            self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(chosen)]
+            fresh = self._run(points, replicates)
+            self.residuals.append(residuals_of(emulators, fresh.rows(fresh.good)))
+            self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(points)]
             if check:
                 if as_predicted(emulators, fresh):
                     return "batches gained nothing more and fresh runs on the front were as predicted"
@@ -328,24 +253,30 @@ class _Search:
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
         """Levels, the probability that each is still to be gained (u,), and where the search stands.
 
-        What is gained is gained by the predicted front, not by the runs: these fill it up whatever they show.
+        Gains are those of the predicted front, not of the runs: these fill it up whatever they show.
         """
         everything = np.vstack([points, emulators.runs.points])
         rows, costs = front_rows(emulators, everything)
         deviations = emulators.predict(everything)[1][:, self.goals.objectives]
         levels = levels_of(costs[rows], (costs - deviations).min(axis=0), random)
         draws = emulators.draws(DRAWS, random)
-        shown = everything[rows[spread(costs[rows], SHOWN)]]
-        known = known_of(levels, emulators, draws(emulators.runs.points))
-        before = self.fronts[-1] if self.fronts else shown[:0]
+        front = everything[rows[spread(costs[rows], SHOWN)]]
+        by_runs = dominance_of(levels, emulators, draws(emulators.runs.points))
+        before = self.fronts[-1] if self.fronts else front[:0]
         few = levels.first(FEW)
-        at, was, best = (known_of(few, emulators, draws(part)).hypervolumes for part in (shown, before, everything))
-        self.fronts.append(shown)
-        gained = float((at - was).mean()) if len(self.fronts) > 1 else float("nan")
-        state = Batch(
-            len(emulators.runs.points), float(at.mean()), float(at.std()), gained, float((best - at).mean()), ""
+        now, previous, best = (
+            dominance_of(few, emulators, draws(part)).hypervolumes for part in (front, before, everything)
         )
-        return levels, known.left, state
+        self.fronts.append(front)
+        state = Batch(
+            runs=len(emulators.runs.points),
+            hypervolume=float(now.mean()),
+            deviation=float(now.std()),
+            gained=float((now - previous).mean()) if len(self.fronts) > 1 else float("nan"),
+            remaining=float((best - now).mean()),
+            why="",
+        )
+        return levels, by_runs.improvable, state
 
     def _faces(self, emulators: Emulators, points: Array, random: np.random.Generator) -> list[Face]:
         """Faces at which the predicted pick lies."""
@@ -354,35 +285,35 @@ class _Search:
         return faces(place, border, self.plan.pick, random)
 
     def _beyond(self, emulators: Emulators, points: Array, count: int, random: np.random.Generator) -> Array | None:
-        """Move the face that is worth it, and give points (n, k) all over what is new; None where no face is."""
-        if self.border is None or (face := outermost(self._faces(emulators, points, random))) is None:
+        """Points (n, k) all over the new part of the region after a face has moved; None where no face is worth it."""
+        if self.border is None or (face := face_to_move(self._faces(emulators, points, random))) is None:
             return None
-        self.region = grown(self.border, self.region, face.factor, face.side)
+        self.region = extended(self.border, self.region, face.factor, face.side)
         low, high = self.region.low.copy(), self.region.high.copy()
         self.moves.append((face, float((high if face.side > 0 else low)[face.factor])))
-        (low if face.side > 0 else high)[face.factor] = face.at
+        (low if face.side > 0 else high)[face.factor] = face.position
         even = qmc.Sobol(low.size, seed=random).random_base2(count.bit_length())[:count]
         return self.region.snap(low + (high - low) * even)
 
     def _check(self, emulators: Emulators, points: Array, levels: Levels) -> list[int]:
         """Rows of points spread over the predicted front."""
         rows, _ = front_rows(emulators, points)
-        chosen, _ = batch(emulators, points[rows], levels, np.ones(len(levels.at)), CHECKS, self.region.apart)
-        return rows[chosen].tolist()
+        places, _ = batch(emulators, points[rows], levels, np.ones(len(levels.costs)), CHECKS, self.region.apart)
+        return rows[places].tolist()
 
     def _replicates(self, emulators: Emulators, points: Array) -> Whole:
         """As many (n,) as make the scatter of a run small compared with the uncertainty of it."""
         columns = self.goals.objectives
         single, deviations = emulators.scatter(points)[:, columns], emulators.predict(points)[1][:, columns]
-        wanted = np.ceil((single / (WORTH * deviations**2)).max(axis=1))
-        return wanted.clip(self.plan.least, self.plan.most).astype(np.int64)
+        enough = np.ceil((single / (WORTH * deviations**2)).max(axis=1))
+        return enough.clip(self.plan.least, self.plan.most).astype(np.int64)
 
     def _run(self, points: Array, replicates: Whole) -> Runs:
         values, errors, freedom = self.evaluate(self.centre + self.step * points, replicates)
         return Runs(points, values, errors, freedom, replicates)
 
     def finish(self, baseline: Array, stopped: str) -> AdaptiveFront:
-        """Fresh runs at the finalists, and what all runs together show."""
+        """Fresh runs at the finalists, and the front by all runs together."""
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
         finals = self._finals((baseline - self.centre) / self.step, random)
         if not finals.runs.good.any():
@@ -397,7 +328,7 @@ class _Search:
         return AdaptiveFront(
             front=self._front(finals),
             archive=self.centre + self.step * archive,
-            shown=best_for_hypervolume(costs[rows], SHOWN),
+            representatives=best_for_hypervolume(costs[rows], SHOWN),
             predictions=predictions,
             deviations=deviations,
             emulators=emulators,
@@ -409,8 +340,8 @@ class _Search:
             searched=Samples(self.centre + self.step * self.runs.points, self.runs.values, self.runs.errors),
             why=tuple(self.why),
             spent=self.runs.replicates,
-            bias=finals.missed.mean(axis=0),
-            spread=finals.missed.std(axis=0, ddof=1 if len(finals.missed) > 1 else 0),
+            bias=finals.residuals.mean(axis=0),
+            spread=finals.residuals.std(axis=0, ddof=1 if len(finals.residuals) > 1 else 0),
             fresh=len(finals.runs.points) + 1,
             stopped=stopped,
             seconds=self.seconds,
@@ -419,32 +350,31 @@ class _Search:
     def _finals(self, original: Array, random: np.random.Generator) -> _Finals:
         """Fresh runs at the finalists and at the original point (k,), a batch at a time: each shows where the next gains most.
 
-        None has a say in whether it is reported.
+        All of them are reported, whatever they show.
         """
         runs = self.runs.rows(slice(0))
-        believed: list[Array] = []
-        off: list[Array] = []
+        predictions: list[Array] = []
+        residuals: list[Array] = []
         sizes = np.diff(np.linspace(0, self.plan.fresh - 1, -(-self.plan.fresh // self.plan.batch) + 1).round())
         for size in sizes.astype(int).tolist():
             started = time.perf_counter()
             emulators = self._fit(self.runs.plus(runs))
-            chosen = self._finalists(emulators, runs.points, size, random)
+            finalists = self._finalists(emulators, runs.points, size, random)
             self.seconds += time.perf_counter() - started
-            asked = chosen if believed else np.vstack([chosen, original])
-            more = self._run(asked, np.full(len(asked), self.plan.usual))
-            if not believed:
+            points = finalists if predictions else np.vstack([finalists, original])
+            more = self._run(points, np.full(len(points), self.plan.usual))
+            if not predictions:
                 base, more = more.rows(slice(-1, None)), more.rows(slice(-1))
             runs = runs.plus(more)
-            believed.append(emulators.predict(chosen)[0])
-            off.append(missed(self._tested(emulators), more.rows(more.good)))
-            self.off.append(missed(emulators, more.rows(more.good)))
-        return _Finals(runs, base, np.vstack(believed), np.vstack(off))
+            predictions.append(emulators.predict(finalists)[0])
+            residuals.append(residuals_of(self._tested(emulators), more.rows(more.good)))
+            self.residuals.append(residuals_of(emulators, more.rows(more.good)))
+        return _Finals(runs, base, np.vstack(predictions), np.vstack(residuals))
 
     def _tested(self, emulators: Emulators) -> Emulators:
-        """Emulators with deviations by which the last batches lay within what had been predicted of them; runs left out one at
-        a time have neighbours that a point yet to be run has not. Source: Dawid, Statistical theory: the prequential approach
-        (1984)."""
-        last = np.vstack([np.ones((1, len(emulators.stretch))), *self.off[-TESTED:]])
+        """Emulators with deviations within which the last batches lay: runs left out one at a time have neighbours that a point
+        yet to be run has not. Source: Dawid, Statistical theory: the prequential approach (1984)."""
+        last = np.vstack([np.ones((1, len(emulators.stretch))), *self.residuals[-TESTED:]])
         return replace(emulators, stretch=emulators.stretch * np.sqrt((last**2).mean(axis=0)).clip(1.0))
 
     def _finalists(self, emulators: Emulators, before: Array, count: int, random: np.random.Generator) -> Array:
@@ -456,40 +386,39 @@ class _Search:
             self._check_limits(emulators, points)
         rows, costs = front_rows(emulators, np.vstack([points, before]))
         levels = levels_of(costs[rows], costs[rows].min(axis=0), random)
-        left = known_of(levels, emulators, emulators.draws(DRAWS, random)(before)).left
+        improvable = dominance_of(levels, emulators, emulators.draws(DRAWS, random)(before)).improvable
         archive = points[rows[rows < len(points)]]
-        return archive[batch(emulators, archive, levels, left, count, self.region.apart)[0]]
+        return archive[batch(emulators, archive, levels, improvable, count, self.region.apart)[0]]
 
     def _on_one_scale(self, emulators: Emulators, front: Array) -> list[Batch]:
         """The history with the hypervolumes of all predicted fronts, by the last emulators, on the scale of the last front
         (f, q)."""
         ideal, nadir = front.min(axis=0), front.max(axis=0)
-        reached = [hypervolume(self.goals.costs(emulators.predict(each)[0]), ideal, nadir) for each in self.fronts]
-        return [replace(each, reached=value) for each, value in zip(self.history, reached, strict=True)]
+        reached = [hypervolume(self.goals.costs(emulators.predict(points)[0]), ideal, nadir) for points in self.fronts]
+        return [replace(state, reached=value) for state, value in zip(self.history, reached, strict=True)]
 
     def _check_limits(self, emulators: Emulators, points: Array) -> None:
         """Raises InfeasibleError where nothing predicted is likely to keep all limits, with the nearest point."""
         means, deviations = emulators.predict(points)
-        kept = emulators.kept(means, deviations)
-        if kept.max() < 0.5 and (violations := self.goals.violations(means, means)).size:
+        feasibility = emulators.feasibility(means, deviations)
+        if feasibility.max() < 0.5 and (violations := self.goals.violations(means, means)).size:
             row = int((violations / violations.max(axis=0).clip(1e-300)).sum(axis=1).argmin())
             if violations[row].any():
                 raise InfeasibleError(self.centre + self.step * points[row], violations[row])
 
     def _front(self, finals: _Finals) -> SimulatedFront:
-        """The finalists as their fresh runs found them, in ascending order of the first cost believed, picked by what was
-        believed before."""
+        """The finalists by their fresh runs, in ascending order of the first predicted cost; the pick is by the predictions."""
         goals = self.goals
-        believed = goals.costs(finals.believed)
-        kept = np.array([row for row in believed[:, 0].argsort(kind="stable") if finals.runs.good[row]])
-        ours, believed = finals.runs.rows(kept), believed[kept]
-        values, errors = ours.values, np.nan_to_num(ours.errors)
+        predicted_costs = goals.costs(finals.predictions)
+        rows = np.array([row for row in predicted_costs[:, 0].argsort(kind="stable") if finals.runs.good[row]])
+        runs, predicted_costs = finals.runs.rows(rows), predicted_costs[rows]
+        values, errors = runs.values, np.nan_to_num(runs.errors)
         costs = goals.costs(values)
         base_values = finals.base.values[0] if finals.base.good.all() else None
-        picks, among = pick_all(believed, goals, None if base_values is None else goals.costs(base_values))
+        picks, among = pick_all(predicted_costs, goals, None if base_values is None else goals.costs(base_values))
         span = np.ptp(costs, axis=0)
         every = self.runs.plus(finals.runs).plus(finals.base)
-        actual = [self.centre + self.step * part.points for part in (ours, self.runs, every)]
+        actual = [self.centre + self.step * part.points for part in (runs, self.runs, every)]
         failed = actual[2][~every.good]
         return SimulatedFront(
             points=actual[0],
@@ -497,7 +426,7 @@ class _Search:
             standard_errors=errors,
             costs=costs,
             cost_errors=errors[:, goals.objectives],
-            optimism=(costs - believed).mean(axis=0) / np.where(span > 0.0, span, 1.0),
+            optimism=(costs - predicted_costs).mean(axis=0) / np.where(span > 0.0, span, 1.0),
             pick=picks[self.plan.pick],
             pick_reason=f"{NAMES[self.plan.pick]} {among}",
             baseline_values=base_values,
@@ -508,5 +437,106 @@ class _Search:
             seed=self.plan.seed,
             goals=goals,
             searched=Samples(actual[1], self.runs.values, self.runs.errors),
-            freedom=np.where(ours.freedom > 0, ours.freedom, np.inf),
+            freedom=np.where(runs.freedom > 0, runs.freedom, np.inf),
         )
+
+
+def nothing_gained(history: Sequence[Batch], since: int) -> bool:
+    """Whether the last batches after the one numbered ``since`` gained nothing."""
+    last = history[since + 1 :][-BATCHES:]
+    return len(last) == BATCHES and all(
+        state.gained < max(SHARE * state.deviation, LEAST * state.hypervolume) for state in last
+    )
+
+
+def residuals_of(emulators: Emulators, runs: Runs) -> Array:
+    """Residuals (n, m) of runs that the emulators were not fitted to, in standard deviations of the two together."""
+    means, deviations = emulators.predict(runs.points)
+    own = emulators.scatter(runs.points) / runs.replicates[:, None] + emulators.nuggets()
+    return np.asarray((runs.values - means) / np.sqrt(deviations**2 + own))
+
+
+def as_predicted(emulators: Emulators, runs: Runs) -> bool:
+    """Whether fresh runs lie within the predictions' errors, all responses with a goal or a limit together."""
+    goals = emulators.goals
+    columns = sorted({*goals.objectives.tolist(), *(index for index, _, _ in goals.limited)})
+    residuals = residuals_of(emulators, runs.rows(runs.good))[:, columns]
+    return residuals.size > 0 and bool(special.chdtrc(residuals.size, float((residuals**2).sum())) > DOUBT)
+
+
+class Border(NamedTuple):
+    """How far the faces of a region may be moved: to ``low`` and ``high`` (k,) in coded units, as long as runs are ``possible``
+    at all corners (c, k) of it."""
+
+    low: Array
+    high: Array
+    possible: Callable[[Array], bool]
+
+
+class Face(NamedTuple):
+    """A face that the pick lies at: of a ``factor``, upper (``side`` 1) or lower (-1), at the ``position`` (coded).
+
+    ``better``: chance that the front goes on beyond. The face is ``limited_by`` "allowed" (the border), "scene" (no run is possible
+    beyond), "moves" (no more are made) or, "", that chance alone.
+    """
+
+    factor: int
+    side: int
+    position: float
+    better: float
+    limited_by: str
+
+
+class Place(NamedTuple):
+    """Where a search stands: its emulators, its region, points (n, k) of it, and how many faces it has moved."""
+
+    emulators: Emulators
+    region: Region
+    points: Array
+    moves: int
+
+
+def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator) -> list[Face]:
+    """Faces of the region at which the pick of the predicted front lies."""
+    emulators, region, points, moves = place
+    rows, costs = front_rows(emulators, points)
+    pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
+    span, draws = region.high - region.low, emulators.draws(FUNCTIONS, random)
+    at_pick = []
+    for factor, side in product(range(pick.size - len(region.levels)), (-1, 1)):
+        position = (region.high if side > 0 else region.low)[factor]
+        if abs(pick[factor] - position) > NEAR * span[factor]:
+            continue
+        beyond = pick.copy()
+        beyond[factor] = position + side * AHEAD * span[factor]
+        responses = emulators.goals.costs(draws(np.vstack([beyond, points[rows]])))
+        better = 1.0 - float(dominates(responses[:, 1:], responses[:, :1]).any(axis=1).mean())
+        limited_by = "moves" if moves == MOST_MOVES else _limit(border, region, factor, side)
+        at_pick.append(Face(factor, side, float(position), better, limited_by))
+    return at_pick
+
+
+def face_to_move(faces: list[Face]) -> Face | None:
+    """The face to be moved: the surest of those that nothing limits and that the front goes on beyond."""
+    free = [face for face in faces if not face.limited_by and face.better > BETTER]
+    return max(free, key=lambda face: face.better, default=None)
+
+
+def extended(border: Border, region: Region, factor: int, side: int) -> Region:
+    """The region with a face moved outward, as far as the border permits."""
+    low, high = region.low.copy(), region.high.copy()
+    by = GROWTH * (high - low)[factor]
+    if side > 0:
+        high[factor] = max(min(high[factor] + by, border.high[factor]), high[factor])
+    else:
+        low[factor] = min(max(low[factor] - by, border.low[factor]), low[factor])
+    return region._replace(low=low, high=high)
+
+
+def _limit(border: Border, region: Region, factor: int, side: int) -> str:
+    """What limits a face before it has moved as often as it may: "allowed", "scene" or nothing, ""."""
+    wider = extended(border, region, factor, side)
+    before, after = ((part.high - part.low)[factor] for part in (region, wider))
+    if after < (1.0 + AHEAD) * before:
+        return "allowed"
+    return "" if border.possible(np.array(list(product(*zip(wider.low, wider.high, strict=True))))) else "scene"

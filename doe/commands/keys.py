@@ -2,8 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from rbdyn.base.options import Json
-from rbdyn.base.terminal import guarded
+from rbdyn.base.command import Json, guarded
 from rbdyn.scene.keys import AsSchema, Word, run
 
 if TYPE_CHECKING:

@@ -1,14 +1,20 @@
 """``doe new``."""
 
 import json
+import math
+import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.options import Json
-from rbdyn.base.terminal import guarded, print_json
+from rbdyn.base.command import Json, flag, guarded, plain_number, print_json, valued
+
+if TYPE_CHECKING:
+    from doe.commands.new_parts import Manufacture
+    from rbdyn.scene import Scene
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
 # design lie 1.7 steps out, and none may touch zero.
@@ -26,41 +32,156 @@ centre = {centre} # as the scene has it
 step = {step:.6g} # {percent:g} % of it
 resolution = 0.001 # of the drawing
 """
+TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
+"""
+# Responses that a study improves; others are watched where they have a limit.
+IMPROVED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
+HINT = """# Add to a factor: tolerance = 0.005, the half width that manufacture keeps; then [front] tolerance_aware = "quantile" and
+# [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
+LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
+BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}
+# By name of the response, then "upper" or "lower".
+Limits = dict[str, dict[str, float]]
+
+
+class Factor(NamedTuple):
+    """A clearance that a study varies: name, table of the scene, value [mm], step [mm] and its share of the value."""
+
+    name: str
+    table: str
+    centre: float
+    step: float
+    share: float
 
 
 def new(
     path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene whose clearances are to be studied.")],
+    limit: Annotated[
+        list[str] | None,
+        valued(
+            "NAME<=V",
+            'Limit of a response, in quotes: "power_loss_W<=250", >= or = for <=; repeatable.',
+            "none",
+            "--limit",
+        ),
+    ] = None,
+    tolerances: Annotated[
+        bool, flag("--tolerances", says="Tolerances of the clearances by grades of ISO 286, and the widest ones.")
+    ] = False,
+    chains: Annotated[bool, flag("--chains", says="Dimension chains of the parts that make the clearances.")] = False,
     as_json: Json = False,
 ) -> None:
     """Write a commented study of a scene's clearances on standard output."""
     with guarded(as_json):
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
+        from doe.workflow.front import check_goals
         from doe.workflow.whole import check_study
+        from rbdyn.base.command import fill_template
         from rbdyn.base.faults import read_toml, validated
-        from rbdyn.base.options import filled
         from rbdyn.scene import Scene, rollers_only
 
-        rollers_only(Scene.load(path))
+        bounds = limits_of(limit or [])
+        scene = rollers_only(Scene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
-        factors = "\n".join(_factors(read_toml(path)))
-        text = filled(template.replace("{factors}", factors), {"quoted": json.dumps(str(path))})
+        sections = _sections(scene, read_toml(path), tolerances, chains) | {"responses": _responses(bounds)}
+        for name, section in sections.items():
+            template = template.replace(f"{{{name}}}", section)
+        text = fill_template(template, {"quoted": json.dumps(str(path))})
         data = tomllib.loads(text)
-        check_study(Study(Path("study.toml"), validated(StudyFile, data, f"study of {path}")))
+        study = Study(Path("study.toml"), validated(StudyFile, data, f"study of {path}"))
+        check_goals(study)
+        check_study(study)
         if as_json:
             print_json(data)
         else:
             print(text)
 
 
-def _factors(scene: dict[str, Any]) -> list[str]:
+def limits_of(texts: Sequence[str]) -> Limits:
+    """Limits by response. Raises InputError with all faults at once."""
+    from doe.clearance import RESPONSES
+    from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
+
+    limits: Limits = {}
+    faults = []
+    for text in texts:
+        where, match = f"--limit {one_line(text, LONGEST_NAME)}", LIMIT.fullmatch(text)
+        if match is None:
+            faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
+            continue
+        name, sign, number = match.groups()
+        if name not in RESPONSES:
+            faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
+            continue
+        try:
+            value = plain_number(number)
+        except MethodError as error:
+            faults.append(f"{where}: {one_line(number, LONGEST_NAME)} {error}")
+            continue
+        own, bound = limits.setdefault(name, {}), BOUNDS[sign]
+        if not math.isfinite(value):
+            faults.append(f"{where}: {number} is not a finite number; write a plain number")
+        elif bound in own:
+            faults.append(f"{where}: {name} has the {bound} limit {own[bound]:g} already; keep one of them")
+        else:
+            own[bound] = value
+    faults += [
+        f"--limit {name}: the lower limit {own['lower']:g} is not below the upper limit {own['upper']:g}; swap or widen them"
+        for name, own in limits.items()
+        if len(own) == 2 and own["lower"] >= own["upper"]
+    ]
+    refuse(faults)
+    return limits
+
+
+def _responses(limits: Limits) -> str:
+    """The responses that a study improves, and those that only have limits."""
+    watched = [name for name in limits if name not in IMPROVED]
+    return "\n".join(_response(name, limits.get(name, {})) for name in (*IMPROVED, *watched))
+
+
+def _response(name: str, limits: Mapping[str, float]) -> str:
+    bounds = [f"{bound} = {value!r}" for bound, value in limits.items()]
+    goal = 'goal = "min"' if name in IMPROVED else 'goal = "none" # watched, with its limits only'
+    return "\n".join(["[[response]]", f'name = "{name}"', *bounds, 'model = "quadratic"', goal, ""])
+
+
+def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bool) -> dict[str, str]:
+    """Factors of the study, and what it says of their parts."""
+    factors = _factors(data)
+    if not tolerances and not chains:
+        return {"factors": "\n".join(map(_factor_text, factors)), "parts": HINT}
+    from doe.commands.new_parts import chain_text, clearance_parts, manufacture_of, tolerances_text
+
+    groups = clearance_parts(scene)
+    manufactures = {factor.name: manufacture_of(groups[factor.name], factor.step) for factor in factors}
+    closing = [chain_text(groups[name], manufacture, tolerances) for name, manufacture in manufactures.items()]
+    return {
+        "factors": "\n".join(
+            _factor_text(factor, manufactures[factor.name] if tolerances else None) for factor in factors
+        ),
+        "parts": "\n".join([*[tolerances_text()] * tolerances, *closing * chains]).rstrip(),
+    }
+
+
+def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:
+    text = FACTOR.format(**factor._asdict(), percent=100.0 * factor.share)
+    return (
+        text
+        if manufacture is None
+        else text + TOLERANCE.format(half_width=manufacture.half_width, rule=manufacture.rule)
+    )
+
+
+def _factors(scene: dict[str, Any]) -> list[Factor]:
     """A factor a clearance that the scene's file gives and that something reads."""
     landless = scene["cage"]["guidance"] == "roller" or scene.get("model", {}).get("guide_land") == "off"
-    found = []
+    factors = []
     for name, table, share in CLEARANCES:
         centre = scene[table].get(name)
         if centre is None or (landless and name == "guide_clearance_mm"):
             continue
         step = max(round(share * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
-        found.append(FACTOR.format(name=name, table=table, centre=float(centre), step=step, percent=100.0 * share))
-    return found
+        factors.append(Factor(name, table, float(centre), step, share))
+    return factors

@@ -1,135 +1,253 @@
-"""What the commands share: runs and surfaces of a study, and where a record goes."""
+"""One step of a study alone: ``doe design``, ``doe fit``, ``doe front`` and ``doe chain``."""
 
-import os
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, nullcontext
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rbdyn.base.faults import RunError
-from rbdyn.base.terminal import keeping, notice, output_folder, progress_bar
+import typer
+
+from doe.commands.options import Data, Effort, Out, Quiet, Retry, Save, Scheduler, StudyPath, fitted, keeping_runs, save
+from rbdyn.base.blocks import Block, Detail, Note, Paragraph
+from rbdyn.base.command import BAD_INPUT, Json, Workers, flag, guarded, hand_over, valued
+from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
-    from doe.clearance import Simulations
-    from doe.response_surface import Surface
-    from doe.running.keeper import AgendaKeeper
-    from doe.running.runner import Progress
     from doe.study_file import Study
 
 
-def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> None:
-    """Write the JSON record that a command made of the file ``source`` into the folder of ``--out``, if one is given."""
-    if out is not None:
-        from rbdyn.result import write_json
+def design(
+    path: StudyPath,
+    out: Save = None,
+    as_json: Json = False,
+    as_csv: Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Actual values only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also seeds and leverages.")] = False,
+) -> None:
+    """Print the design: every run, and how well the runs identify the terms of the models."""
+    with guarded(as_json):
+        from doe.report.sections.design import design_blocks, design_record, print_csv
+        from doe.study_file import Study
+        from doe.workflow.runs import design_of, evaluation
+        from doe.workflow.whole import check_study
 
-        write_json(output_folder(out, "doe", source) / name, record)
-
-
-@contextmanager
-def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
-    """Let Ctrl-C say that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
-    study of the file ``source`` runs there."""
-    from doe.running.lock import at_work
-    from doe.workflow.runs import STORE
-
-    with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out / STORE):
-        yield
-
-
-@contextmanager
-def stages(quiet: bool, workers: int | None) -> "Iterator[Callable[[str], Progress]]":
-    """Progress of one stage after the other, each by its title: a terminal has room for one bar. ``workers`` run at once."""
-    with ExitStack() as bars:
-
-        def stage(title: str) -> "Progress":
-            bars.close()
-            return bars.enter_context(progress_bar(title, quiet, workers))
-
-        yield stage
+        loaded = Study.load(path)
+        # Without a scene the runs are made elsewhere, and only the design itself is checked.
+        if loaded.file.scene and loaded.path_of(loaded.scene.file).exists():
+            check_study(loaded)
+        points = design_of(loaded)
+        record = design_record(loaded, points, evaluation(loaded, points))
+        save(out, path, "design.json", record)
+        detail = Detail.of(quiet, verbose)
+        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(design_blocks(record), detail))
 
 
-@contextmanager
-def simulations_in(
-    folder: Path,
-    source: Path,
-    workers: int | None,
-    scheduler: str | None,
-    retry: bool,
-    quiet: bool,
-    agenda: "AgendaKeeper | None" = None,
-) -> "Iterator[Simulations]":
-    """Simulations of what the file ``source`` asks for, kept in the store of a folder and counted in an agenda."""
-    from doe.clearance import Simulations
-    from doe.running.store import Store
-    from doe.workflow.runs import STORE
+def fit(
+    path: Annotated[
+        Path | None, typer.Argument(metavar="STUDY.toml", help="Study to fit; none for a table alone.")
+    ] = None,
+    data: Data = None,
+    factor: Annotated[
+        list[str] | None,
+        valued("NAME", "Column of --data that is a factor, without STUDY; repeatable.", "all numbers but --response"),
+    ] = None,
+    response: Annotated[
+        list[str] | None,
+        valued("NAME", "Column of --data to be fitted, without STUDY; repeatable.", "all numbers but --factor"),
+    ] = None,
+    model: Annotated[
+        str | None,
+        valued("NAME", "linear, interaction, pure_quadratic, quadratic or reduced, without STUDY.", "quadratic"),
+    ] = None,
+    out: Out = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[
+        bool, flag("--verbose", "-v", says="Also residual, leverage and Cook's distance of each run.")
+    ] = False,
+) -> None:
+    """Fit the response surfaces and print their analysis of variance."""
+    with guarded(as_json), ExitStack() as contexts:
+        loaded, notes = _study_or_table(path, data, {"factor": factor, "response": response, "model": model})
+        contexts.enter_context(keeping_runs(out, loaded.path))
+        from doe.report.sections.fit import fit_record, fit_tables
+        from doe.workflow.surfaces import unrivalled, with_rivals
 
-    with Store(folder / STORE, source.stem) as store, stages(quiet, workers) as progress:
-        progress = progress if agenda is None else agenda.announced(progress)
-        yield Simulations(store, workers, scheduler, retry, progress, agenda)
+        surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
+        surfaces = with_rivals(surfaces)
+        remarks = [*notes, *unrivalled(surfaces)]
+        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
+        save(out, loaded.path, "fit.json", record)
+        if out is not None:
+            from rbdyn.base.records import save_table
 
-
-@contextmanager
-def noted_agenda(
-    folder: Path,
-    command: str,
-    workers: int | None,
-    quiet: bool,
-    options: Mapping[str, bool] | None = None,
-    inputs: str = "",
-    asked: str = "",
-) -> "Iterator[AgendaKeeper]":
-    """The agenda of a command in the store of its folder, for ``doe status``, which states what is left unless ``quiet``;
-    ``inputs``: the digest of what it answers, ``asked``: also of what decides its runs."""
-    from doe.running.keeper import agenda_in
-    from doe.workflow.runs import STORE
-
-    threads = workers or os.cpu_count() or 1
-    with agenda_in(folder / STORE, command, threads, options, inputs, notice(quiet), asked) as agenda:
-        yield agenda
-
-
-def print_predicted(agenda: "AgendaKeeper | None", as_json: bool) -> None:
-    """How long a command took compared with what was predicted; nothing where nothing was."""
-    from rbdyn.base.forecast import duration, span
-
-    noted = None if agenda is None or as_json else agenda.agenda
-    if noted is not None and noted.predicted is not None and noted.took_s is not None:
-        print(f"the whole command took {duration(noted.took_s)}; predicted were {span(*noted.predicted)}")
-
-
-class Effort(NamedTuple):
-    """Where and how the runs of a command are made: its options ``--out``, ``--workers``, ``--scheduler``, ``--retry``."""
-
-    out: Path | None
-    workers: int | None
-    scheduler: str | None
-    retry: bool
-    quiet: bool
+            for name, rows in fit_tables(surfaces).items():
+                save_table(rows, out / name)
+        hand_over(
+            lambda: record, as_json, lambda: show(_fit_answer(record, loaded, data, path), Detail.of(quiet, verbose))
+        )
 
 
-def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]":
-    """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
-    from doe.workflow.runs import read_runs, run_design
-    from doe.workflow.surfaces import fit_surfaces
+def _fit_answer(record: dict[str, Any], study: "Study", data: Path | None, path: Path | None) -> list[Block]:
+    """The factors and responses of a table without a study, notes, and the fits."""
+    from doe.report.sections.fit import fit_blocks
+    from doe.report.sections.record import drop_undefined, readable
 
-    if data is not None:
-        return fit_surfaces(study, read_runs(study, data))
-    out, workers, scheduler, retry, quiet = effort
-    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
-        return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
+    columns = (
+        f"{data}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends of "
+        "a factor's range"
+    )
+    remarks = [Note(remark, Detail.LEAST) for remark in record.get("notes", ())]
+    fits = [
+        block
+        for name, fitted in drop_undefined(record["responses"]).items()
+        for block in fit_blocks(name, fitted, study.factors)
+    ]
+    return [Paragraph(columns if path is None else ""), *remarks, *readable(fits, {})]
 
 
-@contextmanager
-def _store_folder(out: Path | None, source: Path) -> Iterator[Path]:
-    """The given folder, or one that lasts as long as the command."""
-    if out is not None:
-        yield output_folder(out, "doe", source)
-        return
-    from doe.running.store import StoppedError
+def _study_or_table(
+    path: Path | None, data: Path | None, options: Mapping[str, Any]
+) -> "tuple[Study, tuple[str, ...]]":
+    """The study of the file, or else that of the table with the options that name its columns; and notes.
 
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            yield Path(folder)
-        except StoppedError as error:
-            raise RunError("{}; without --out no finished run is kept: {}".format(*error.args)) from None
+    Raises InputError.
+    """
+    from doe.study_file import Study
+    from doe.study_file.study import study_of_table
+
+    if path is not None:
+        refuse(
+            f"--{option}: {path} states it; leave out one or the other" for option, value in options.items() if value
+        )
+        return Study.load(path), ()
+    if data is None:
+        raise InputError(
+            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
+        )
+    return study_of_table(data, options["factor"] or [], options["response"] or [], options["model"] or "quadratic")
+
+
+Point = Annotated[
+    str | None,
+    valued(
+        "A,B,...|NAME=A,...",
+        "Also predict this point on the surfaces: factor values in order, or by name (the rest at the baseline).",
+        "none",
+    ),
+]
+
+
+def front(
+    path: StudyPath,
+    data: Data = None,
+    out: Out = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    point: Point = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
+) -> None:
+    """Find the Pareto front on the response surfaces."""
+    with guarded(as_json), keeping_runs(out, path):
+        from doe.report.sections.answer import asked_record
+        from doe.report.sections.front import front_record, given_point_record
+        from doe.study_file import Study
+        from doe.workflow.front import check_goals, find_front, with_survival
+
+        loaded = Study.load(path)
+        check_goals(loaded)
+        values = None if point is None else _point(loaded, point)
+        effort = Effort(out, workers, scheduler, retry, quiet or as_json)
+        surfaces = fitted(loaded, data, effort)
+        pareto = with_survival(loaded, surfaces, find_front(loaded, surfaces))
+        record = front_record(loaded, surfaces, pareto)
+        if values is not None:
+            import numpy as np
+
+            record["point"] = given_point_record(loaded, surfaces, pareto, np.array(values))
+        save(out, path, "front.json", record)
+        summary = {"asked": asked_record(loaded), "front": record}
+        hand_over(lambda: record, as_json, lambda: show(_front_answer(summary), Detail.of(quiet, verbose)))
+
+
+def _front_answer(summary: dict[str, Any]) -> list[Block]:
+    """The front's section of a report; ``asked`` holds its factors and responses, ``front`` its record."""
+    from doe.report.sections.front import front_blocks
+    from doe.report.sections.record import drop_undefined, readable
+
+    clean = drop_undefined(summary)
+    return readable(front_blocks(clean), clean)
+
+
+def _point(study: "Study", text: str) -> list[float]:
+    """Factor values of ``--point``. Raises InputError with every fault."""
+    from collections import Counter
+    from math import nan
+
+    from doe.study_file.table import RUN, is_number
+
+    values = study.by_factor(study.baseline)
+    parts = [part.strip() for part in text.split(",")]
+    by_name = any("=" in part for part in parts)
+    if not by_name and len(parts) != len(study.factors):
+        raise InputError([f"--point {text}: give a value for each factor ({', '.join(study.factors)}), or name=value"])
+    pairs = [part.partition("=")[::2] for part in parts] if by_name else list(zip(study.factors, parts, strict=True))
+    stripped = [(name.strip(), number.strip()) for name, number in pairs]
+    counts = Counter(name for name, _ in stripped)
+    faults = [f"--point {name}: given {count} times; give it once" for name, count in counts.items() if count > 1]
+    for name, number in stripped:
+        if name not in values:
+            faults.append(f"--point {name}: no such factor; name one of {', '.join(values)}")
+            continue
+        value = float(number) if is_number(number) else nan
+        if RUN.contains(value):
+            values[name] = value
+        else:
+            faults.append(f"--point {name} = {number}: {RUN.fault(value)}")
+    refuse(faults)
+    return list(values.values())
+
+
+def chain(
+    path: Annotated[
+        Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
+    ],
+    out: Save = None,
+    as_json: Json = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
+) -> None:
+    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits is refused."""
+    with guarded(as_json):
+        from doe.dimension_chain import is_several, read_chains, solve
+        from doe.report.sections.chain import chain_blocks, chains_record
+
+        several = is_several(path)
+        results, faults = {}, []
+        for name, chain_table in read_chains(path).items():
+            try:
+                results[name] = solve(chain_table, source=f'{path}: chain "{name}"' if several else str(path))
+            except InputError as error:
+                faults += error.faults
+        refuse(faults)
+        record = chains_record(results) if several else next(iter(results.values())).as_dict()
+        save(out, path, "chain.json", record)
+
+        def answer() -> None:
+            for name, result in results.items():
+                show(chain_blocks(name, result.as_dict()), Detail.of(quiet, verbose))
+
+        hand_over(lambda: record, as_json, answer)
+        refused = {name: result.status for name, result in results.items() if result.refused}
+        for name, status in refused.items():
+            print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)
+        if refused:
+            raise typer.Exit(BAD_INPUT)

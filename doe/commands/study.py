@@ -1,17 +1,32 @@
-"""``doe study``."""
+"""``doe study``, which runs a whole study or goes on with it, and ``doe status``, which shows where a command stands."""
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from doe.commands.options import Adaptive, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
-from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, stages
-from rbdyn.base.blocks import Detail
-from rbdyn.base.options import Json, Workers
-from rbdyn.base.render.terminal import show
-from rbdyn.base.terminal import FAILED, guarded, output_folder, print_json
+from doe.commands.options import (
+    Adaptive,
+    Quiet,
+    Retry,
+    Robust,
+    Scheduler,
+    StudyOut,
+    StudyPath,
+    Verbose,
+    keeping_runs,
+    noted_agenda,
+    print_predicted,
+    stages,
+)
+from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
+from rbdyn.base.command import FAILED, Json, Workers, folder_option, guarded, hand_over, output_folder, print_json
+from rbdyn.base.faults import InputError
+from rbdyn.base.forecast import duration, span
+from rbdyn.base.terminal import show
+from rbdyn.base.words import counted
 
 
 def study(
@@ -33,17 +48,16 @@ def study(
 
         loaded = Study.load(path)
         output_folder(folder, "doe", path)
-        from doe.workflow.status import finished, inputs_digest
+        from doe.workflow.status import finished_record, inputs_digest
 
         digest = inputs_digest(loaded, adaptive, robust)
-        if not (verbose or retry) and (record := finished(folder, digest)):
+        if not (verbose or retry) and (record := finished_record(folder, digest)):
             if not as_json:
                 print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
-                print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
+                print(f"Finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
             _leave_by(record, as_json)
             return
-        from doe.report.study.files import write
-        from doe.report.study.summary import blocks
+        from doe.report.files import blocks, write
         from doe.workflow.whole import run_study
 
         options = {"adaptive": adaptive, "robust": robust}
@@ -62,9 +76,110 @@ def study(
 
 
 def _leave_by(record: dict[str, Any], as_json: bool) -> None:
-    """With the record printed where that is asked for; a study whose pick did not keep its limits has failed."""
+    """Print the record if asked for, and fail if the pick did not keep its limits."""
     if as_json:
         print_json(record)
     if record["status"] != "ok":
         print(record["limits_sentence"], file=sys.stderr)
         raise typer.Exit(FAILED)
+
+
+def status(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="Study, or scene of an uncertainty or calibration.")
+    ],
+    out: Annotated[
+        Path | None,
+        folder_option(
+            "Folder of the runs.", "where it runs; if it does not, STUDY_results, SCENE_uncertainty or _calibration"
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Show where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
+    with guarded(as_json):
+        from doe.workflow.status import status_of
+
+        if out is not None and out.exists() and not out.is_dir():
+            raise InputError([f"--out {out}: is a file; name the folder of the results"])
+        record = status_of(path, out)
+        hand_over(lambda: record, as_json, lambda: show(status_blocks(record), Detail.of(quiet)))
+
+
+def status_blocks(record: Mapping[str, Any]) -> list[Block]:
+    """Counts of runs, their store, the steps and the time; not quietly also who runs what, and why points failed."""
+    store = record["store"]
+    other = ", ".join(f"{number} {state}" for state, number in record["other"].items() if number)
+    rows = [
+        (run["label"], run["host"], str(run["pid"]), run["since"], _duration(run["for_s"])) for run in record["running"]
+    ]
+    causes = [f"Failed: {', '.join(group['labels'])}: {group['cause']}" for group in record["failures"]]
+    return [
+        Paragraph(_counts(record), "statement"),
+        Paragraph(f"Read from {store}" if Path(store).exists() else f"Nothing has run yet in {store}", "small"),
+        Paragraph(_steps(record)),
+        Paragraph(f"Stopped by: {record['stopped_by']}" if record["stopped_by"] else ""),
+        Paragraph(_time(record)),
+        Paragraph(_prediction(record)),
+        Paragraph(f"Other runs: {other}" if other else "", detail=Detail.USUAL),
+        Table("Running", ("", "host", "process", "since", "for"), rows, detail=Detail.USUAL),
+        Bullets(causes, detail=Detail.USUAL),
+    ]
+
+
+def _counts(record: Mapping[str, Any]) -> str:
+    """The state, its stage, and the runs by what became of them."""
+    state, stage, points = record["status"], record["stage"], record["points"]
+    if stage:
+        state = f"running, in stage {stage}" if state == "running" else f"{state}, ended in stage {stage}"
+    runs = "design points" if any(step["name"] == "design runs" for step in record["stages"]) else "runs"
+    counts = ", ".join(f"{points[outcome]} {outcome}" for outcome in ("done", "failed", "running", "missing"))
+    return f"{record['study']}: {state}; of {points['total']} {runs} {counts}"
+
+
+def _steps(record: Mapping[str, Any]) -> str:
+    """The command with its steps; empty where none is planned."""
+    steps = record["stages"]
+    return f"{record['command']}, {counted(len(steps), 'step')}: {', '.join(map(_step, steps))}" if steps else ""
+
+
+def _step(step: Mapping[str, Any]) -> str:
+    """A step with its finished runs; a range where the number of its runs is not yet known."""
+    name, count, runs, most = (step[key] for key in ("name", "done", "runs", "most"))
+    if step["state"] == "done":
+        return f"{name} {count}" if runs else f"{name} done"
+    if not most:
+        return name if step["state"] == "to come" else f"{name} running"
+    fewest = max(runs, count)
+    return f"{name} {count} of {fewest} to {most}" if most > fewest else f"{name} {count} of {fewest}"
+
+
+def _time(record: Mapping[str, Any]) -> str:
+    """The time that runs took, the runs that are left, and the time that these take."""
+    left_s, (fewest, most) = record["left_s"], record["runs_left"]
+    parts = [f"Time spent {_duration(record['spent_s'])} of one thread"]
+    if most > 0:
+        parts.append(f"runs left {fewest} to {most}" if fewest < most else f"runs left {most}")
+    if left_s is None:
+        parts.append("time left not known yet")
+    elif left_s:
+        parts.append(f"time left {_duration(left_s)} ({span(*record['left_range_s'])})")
+    else:
+        parts.append(f"time left {_duration(left_s)}")
+    return "; ".join(parts)
+
+
+def _prediction(record: Mapping[str, Any]) -> str:
+    """What was predicted for the last command, and what it took; empty without a prediction."""
+    if record["predicted_s"] is None:
+        return ""
+    prediction = f"Predicted for the last command from its start: {span(*record['predicted_s'])}"
+    return prediction if record["took_s"] is None else f"{prediction}; it took {duration(record['took_s'])}"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"

@@ -1,7 +1,7 @@
 """Designs of experiments in coded units, one column a factor.
 
-- ``design``: the record of a design, and the designs that are constructed; ``optimal``: those that are searched for
-- ``evaluation`` (on ``model``): how good a design is before any run is made
+- ``design``: the record of a design and the classical designs; ``optimal``: D- and I-optimal designs by search
+- ``model``: terms of a polynomial, and how well a design estimates them before any run
 """
 
 from doe.designs.design import (

@@ -1,11 +1,11 @@
-"""A design of experiments as a record, and the designs that are constructed: central composite, of three levels, and those that fill a box.
+"""A design of experiments as a record, and the classical designs: central composite, of three levels, and space-filling.
 
-A record holds points, their blocks and kinds, and the order of the runs; coded and actual units of points, and which of them are
-replicates. Coded units: centre 0, corners of the cube -1 and +1, one column a factor.
+A ``Design`` has points with their blocks and kinds, and the order of the runs. Points are in coded units: centre 0, corners
+of the cube -1 and +1, one column a factor. ``to_actual`` and ``to_coded`` convert them; ``replicate_groups`` finds replicates.
 
-- Central composite designs stand on two-level factorials, full and fractional, and their division into blocks.
-- Box-Behnken designs have three levels and no corners: all points but the centre lie on one sphere. Definitive screening designs
-  have hardly more than twice as many runs as factors.
+- Central composite designs extend two-level factorials, full or fractional, which may be divided into blocks.
+- Box-Behnken designs have three levels and no corners: all points but the centre are on one sphere.
+- Definitive screening designs have about twice as many runs as factors.
 - Full factorials, Latin hypercubes and Sobol sequences fill the box from -1 to +1.
 """
 
@@ -28,13 +28,12 @@ SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Runs of a design in the order in which they are made.
+    """Runs of a design in the order of execution.
 
-    ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind``
-    (n,): what each point is ("cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given" or "centre"). ``order`` (n,): place of
-    each run in the standard order, which names a run whatever the order of the runs. ``region``: where the
-    design is meant to predict, a ball through its outermost points or the box of ``reach``, the half-range
-    of every factor in coded units.
+    ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind`` (n,): kind of
+    each point, "cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given" or "centre". ``order`` (n,): place
+    of each run in the standard order, which identifies the run in any order. ``region``: where the design is to predict, a
+    ball through its outermost points or a box. ``reach``: half-range of every factor in coded units.
     """
 
     coded: Array
@@ -51,7 +50,7 @@ class Design:
 
     @property
     def block_numbers(self) -> list[int]:
-        """Number of the block of each run as everything that is printed or written gives it, from 1."""
+        """Number of the block of each run from 1, as in tables and files."""
         return [int(number) + 1 for number in self.block]
 
     @property
@@ -60,21 +59,23 @@ class Design:
         return int(self.block.max()) + 1
 
     def by_blocks(self, seed: int | None = None) -> Self:
-        """Blocks one after the other, within each the standard order or, with a ``seed``, a random one after runs that are
-        given."""
+        """The design sorted by blocks, within each in standard order.
+
+        With a ``seed`` the order within a block is random, after runs of kind "given".
+        """
         ties = np.arange(len(self.coded))
         if seed is not None:
-            given = self.kind.count("given")
-            ties[given:] = given + np.random.default_rng(seed).permutation(len(self.coded) - given)
+            count = self.kind.count("given")
+            ties[count:] = count + np.random.default_rng(seed).permutation(len(self.coded) - count)
         return self.rows(np.lexsort((ties, self.block)))
 
     def rows(self, rows: Rows) -> Self:
-        """Some runs, or all in another order."""
+        """The design of these runs, in this order."""
         kind = tuple(self.kind[row] for row in rows)
         return replace(self, coded=self.coded[rows], block=self.block[rows], kind=kind, order=self.order[rows])
 
 
-def assembled(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: float, region: Region) -> Design:
+def design_of_parts(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: float, region: Region) -> Design:
     """A design in standard order from (kind, points) parts, with the block of every run."""
     coded = np.vstack([points for _, points in parts]) + 0.0  # no negative zeros
     kinds = tuple(kind for kind, points in parts for _ in points)
@@ -82,10 +83,10 @@ def assembled(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: 
 
 
 def replicate_groups(points: Array, block: Whole | None = None) -> Whole:
-    """For each run (n, k) the first run at the same point, and in the same block where blocks are given, shape (n,)."""
+    """First run at the same point as each run (n, k), within its block where ``block`` is given; shape (n,)."""
     first = np.empty(len(points), np.int64)
     for place, point in enumerate(points):
-        # Run by run: all distances at once would take gigabytes of ten thousand runs.
+        # Run by run: all distances of ten thousand runs at once would take gigabytes.
         same = np.abs(points[: place + 1] - point).max(axis=1) <= SAME_POINT
         if block is not None:
             same &= block[: place + 1] == block[place]
@@ -109,8 +110,8 @@ def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
     return (np.asarray(actual, float) - np.asarray(centre, float)) / step
 
 
-# Generators of the smallest regular fractions of resolution V or more: each added factor is the product of
-# the named ones. Box and Hunter, The 2^(k-p) fractional factorial designs II, Technometrics 3 (1961).
+# Generators of the smallest regular fractions of resolution V or more: each further factor is the product of
+# these factors. Box and Hunter, The 2^(k-p) fractional factorial designs II, Technometrics 3 (1961).
 RESOLUTION_V = {5: ("ABCD",), 6: ("ABCDE",), 7: ("ABCDEF",), 8: ("ABCD", "ABEF")}
 
 
@@ -127,15 +128,14 @@ def central_composite(
 
     factors : number of factors k, at least 2.
     alpha : axial distance in coded units, or one of the words of `axial_distance`; "inscribed" is the
-        rotatable design shrunk until its axial points lie at -1 and +1.
-    centre_replicates : number of centre points, from whose scatter pure error is estimated.
+        rotatable design scaled to axial points at -1 and +1.
+    centre_replicates : number of centre points, whose scatter estimates the pure error.
     cube : "full", or "resolution_v" for the tabulated fraction.
-    blocks : run cube and axial points in blocks of their own, the centre points shared between them by
-        `centre_shares`.
+    blocks : whether cube and axial points are separate blocks, which share the centre points by `centre_shares`.
     cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
 
-    Raises MethodError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
-    tabulated, or the blocks are impossible.
+    Raises MethodError when a number is out of range, ``alpha`` or ``cube`` is unknown, the fraction is not tabulated, or the
+    blocks are impossible.
 
     Source: Box and Hunter, Multi-factor experimental designs for exploring response surfaces,
     Ann. Math. Stat. 28 (1957) 195-241.
@@ -155,10 +155,10 @@ def central_composite(
     of_run = [0] * (len(corners) + len(axial) + centre_replicates)
     if blocks:
         of_cube = corner_blocks(corners, number).tolist()
-        of_centres = [each % number for each in range(shares[0])] + [number] * shares[1]
+        of_centres = [place % number for place in range(shares[0])] + [number] * shares[1]
         of_run = [*of_cube, *[number] * len(axial), *of_centres]
     ball = distance > 1.0 or alpha == "inscribed"
-    return assembled(parts, of_run, max(1.0, distance), "ball" if ball else "box")
+    return design_of_parts(parts, of_run, max(1.0, distance), "ball" if ball else "box")
 
 
 def axial_distance(
@@ -166,14 +166,14 @@ def axial_distance(
 ) -> float:
     """Axial distance in coded units, from a number or a word.
 
-    With k factors, F runs of the cube (``cube_runs``; 2^k unless given), ``centres`` centre points with the
-    cube and with the axial points, and N runs in all:
+    There are k factors, F runs of the cube (``cube_runs``, by default 2^k) and N runs in all. ``centres`` are n0c centre
+    points with the cube and n0s with the axial points:
 
-    - "rotatable": F^(1/4); the variance of a predicted quadratic depends on the distance from the centre only
-    - "spherical": sqrt(k); axial points as far out as the corners of the cube
+    - "rotatable": F^(1/4); the variance of a predicted quadratic depends only on the distance from the centre
+    - "spherical": sqrt(k); axial points are as far out as the corners of the cube
     - "orthogonal_blocks": alpha^2 = k (1 + n0s/(2k)) / (1 + n0c/F); cube and axial block shift no term
-    - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; square terms are estimated independently of each other
-    - "face_centred": 1; "inscribed": 1, with the cube shrunk
+    - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; estimates of the square terms are independent
+    - "face_centred": 1; "inscribed": 1, with a smaller cube
 
     Raises MethodError for an unknown word or a number that is not positive and finite.
 
@@ -202,21 +202,20 @@ def axial_distance(
 def centre_shares(
     factors: int, cube_runs: int, alpha: float | str, centre_replicates: int, cube_blocks: int = 1
 ) -> tuple[int, int]:
-    """Centre points with the cube and with the axial points, of ``centre_replicates`` in all.
+    """Numbers of centre points with the cube and with the axial points, of ``centre_replicates`` in all.
 
-    The share whose orthogonal blocking is nearest to the axial distance that is asked for (the rotatable one
-    for alpha = "orthogonal_blocks"), so that blocks disturb the surface least; every block of the cube gets
-    the same number.
+    The blocks disturb the surface least when their orthogonal axial distance is nearest to ``alpha``. For
+    alpha = "orthogonal_blocks" the rotatable distance is the target. All blocks of the cube get the same number.
 
     Raises MethodError for an unknown ``alpha``.
     """
-    asked = "rotatable" if alpha in ("orthogonal_blocks", "inscribed") else alpha
-    wanted = axial_distance(factors, asked, cube_runs=cube_runs, centres=(0, centre_replicates))
+    word = "rotatable" if alpha in ("orthogonal_blocks", "inscribed") else alpha
+    target = axial_distance(factors, word, cube_runs=cube_runs, centres=(0, centre_replicates))
 
     def away(with_cube: int) -> float:
         shares = (with_cube, centre_replicates - with_cube)
         orthogonal = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
-        return abs(math.log(orthogonal / wanted))
+        return abs(math.log(orthogonal / target))
 
     best = min(range(0, centre_replicates + 1, cube_blocks), key=away)
     return best, centre_replicates - best
@@ -225,9 +224,8 @@ def centre_shares(
 def cube_points(factors: int, cube: str = "full") -> Array:
     """Corners (n, k) in standard order, the first factor fastest.
 
-    ``cube``: "full" for 2^k corners, "resolution_v" for the smallest tabulated fraction in which no main
-    effect or two-factor interaction is confused with another. Raises MethodError where none is tabulated or
-    the word is unknown.
+    ``cube``: "full" for 2^k corners, "resolution_v" for the smallest tabulated fraction that confounds no main effect or
+    two-factor interaction with another. Raises MethodError for an unknown word or a fraction that is not tabulated.
     """
     if cube not in ("full", "resolution_v"):
         raise MethodError(f'cube = {cube!r}: choose "full" or "resolution_v"')
@@ -244,10 +242,10 @@ def cube_points(factors: int, cube: str = "full") -> Array:
 
 
 def corner_blocks(corners: Array, blocks: int) -> Rows:
-    """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
+    """Block (n,) of each corner, with no block effect confounded with a term up to second order.
 
-    Blocks are set by the signs of interactions of three or more factors, the longest that serve; their
-    products must not be short either. Raises MethodError where no such division exists.
+    The signs of interactions of three or more factors, as long as possible, set the blocks; the products of these
+    interactions must be long too. Raises MethodError where no such division exists.
     """
     if blocks == 1:
         return np.zeros(len(corners), dtype=np.intp)
@@ -264,13 +262,13 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
             if not np.abs(short.T @ between).any():
                 return (2 * (one > 0) + (two > 0)).astype(np.intp)
     raise MethodError(
-        f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without "
-        "confusing a block with a second-order term; use fewer blocks or a larger cube"
+        f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors have no division that confounds no block "
+        "with a second-order term; use fewer blocks or a larger cube"
     )
 
 
 def _short_products(corners: Array) -> Array:
-    """Columns of the constant, the factors and the products of two."""
+    """Columns of the constant, the factors and their two-factor products."""
     pairs = [corners[:, pair].prod(axis=1) for pair in combinations(range(corners.shape[1]), 2)]
     return np.column_stack([np.ones(len(corners)), corners, *pairs])
 
@@ -291,11 +289,11 @@ MOST_SCREENED = 8  # factors; the primes 3, 5 and 7 give the conference matrices
 def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = False) -> Design:
     """Box-Behnken design in standard order, 3 to 7 factors.
 
-    ``blocks``: the published division into orthogonal blocks (3 for 4 factors, 2 for 5 to 7), each with an
-    equal share of the centre points.
+    ``blocks``: the published division into orthogonal blocks (3 for 4 factors, 2 for 5 to 7), each with the same
+    number of centre points.
 
-    Raises MethodError when the number of factors is out of range, blocks do not exist for it, or the centre points
-    cannot be shared equally.
+    Raises MethodError when the number of factors is out of range or has no blocks, or the blocks cannot share the centre
+    points.
 
     Source: Box and Behnken, Some new three level designs for the study of quantitative variables,
     Technometrics 2 (1960) 455-475.
@@ -323,15 +321,15 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
             of_run.append(int(np.prod(signs) > 0) if len(columns) == 3 else part)
     centres = np.zeros((centre_replicates, factors))
     parts = [("edge", np.array(edges)), ("centre", centres)]
-    return assembled(parts, [each % number for each in (*of_run, *range(centre_replicates))], 1.0, "ball")
+    return design_of_parts(parts, [index % number for index in (*of_run, *range(centre_replicates))], 1.0, "ball")
 
 
 def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     """Definitive screening design in 2 to 8 factors: a conference matrix, its mirror image, and centre points.
 
-    With one centre point 2k + 1 runs for an even number k of factors; an odd one takes a column less of the next even
-    design. Main effects are orthogonal to each other and to all squares and products; squares can be distinguished from each
-    other and from products, products not all from each other: the model for it is "pure_quadratic".
+    With one centre point an even number k of factors has 2k + 1 runs; an odd number takes the next even design without one
+    column. Main effects are orthogonal to each other and to all squares and products. Squares are separable from each other
+    and from products, but products not all from each other: its model is "pure_quadratic".
 
     Raises MethodError when the number of factors is out of range.
 
@@ -347,7 +345,7 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     half = conference_matrix(factors + factors % 2)[:, :factors]
     points = np.stack([half, -half], axis=1).reshape(-1, factors)
     parts = [("screening", points), ("centre", np.zeros((centre_replicates, factors)))]
-    return assembled(parts, [0] * (len(points) + centre_replicates), 1.0, "box")
+    return design_of_parts(parts, [0] * (len(points) + centre_replicates), 1.0, "box")
 
 
 def conference_matrix(order: int) -> Array:
@@ -367,7 +365,7 @@ def conference_matrix(order: int) -> Array:
 
 
 MOST_RUNS = 10_000
-# More runs of a Latin hypercube are even enough by themselves, and exchanges among them take seconds.
+# Above this number of runs a Latin hypercube is even without exchanges, which would take seconds.
 MOST_EXCHANGED = 200
 
 
@@ -382,13 +380,15 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
             'fewer levels or use kind = "sobol"'
         )
     values = np.linspace(-1.0, 1.0, levels)
-    return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)
+    return _space_filling(
+        "grid", np.array([combination[::-1] for combination in product(values, repeat=factors)]), centre_replicates
+    )
 
 
 def latin_hypercube(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int = 0) -> Design:
-    """Latin hypercube: in every factor one run in each of ``runs`` equal intervals, evenly spread by exchanges.
+    """Latin hypercube: in every factor one run in each of ``runs`` equal intervals.
 
-    Seeded; exchanges within columns lower the centred discrepancy of up to `MOST_EXCHANGED` runs.
+    For up to `MOST_EXCHANGED` runs, exchanges within columns lower the centred discrepancy. The ``seed`` fixes the design.
 
     Source: McKay, Beckman and Conover, Technometrics 21 (1979) 239-245; Fang, Li and Sudjianto, Design and
     Modeling for Computer Experiments (2006) (exchanges).
@@ -397,11 +397,11 @@ def latin_hypercube(factors: int, *, runs: int = 60, seed: int = 1, centre_repli
 
     exchanges = "random-cd" if runs <= MOST_EXCHANGED else None
     sample = qmc.LatinHypercube(factors, optimization=exchanges, seed=seed).random(runs)
-    return _filled("sample", 2.0 * sample - 1.0, centre_replicates)
+    return _space_filling("sample", 2.0 * sample - 1.0, centre_replicates)
 
 
 def sobol(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int = 0) -> Design:
-    """The first ``runs`` points of a scrambled Sobol sequence: more runs later keep those made.
+    """The first ``runs`` points of a scrambled Sobol sequence; a longer design starts with the same runs.
 
     Powers of two are the most even.
 
@@ -410,10 +410,10 @@ def sobol(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int
     from scipy.stats import qmc
 
     sample = qmc.Sobol(factors, seed=seed).random_base2(max(runs - 1, 1).bit_length())[:runs]
-    return _filled("sample", 2.0 * sample - 1.0, centre_replicates)
+    return _space_filling("sample", 2.0 * sample - 1.0, centre_replicates)
 
 
-def _filled(kind: str, points: Array, centre_replicates: int) -> Design:
+def _space_filling(kind: str, points: Array, centre_replicates: int) -> Design:
     centres = np.zeros((centre_replicates, points.shape[1]))
     blocks = [0] * (len(points) + centre_replicates)
-    return assembled([(kind, points), ("centre", centres)], blocks, 1.0, "box")
+    return design_of_parts([(kind, points), ("centre", centres)], blocks, 1.0, "box")

@@ -1,4 +1,4 @@
-"""D- and I-optimal designs: so many runs as estimate a model best, all new or added to runs that were made.
+"""D- and I-optimal designs: the runs that estimate a model best, alone or added to earlier runs.
 
 Source: Meyer and Nachtsheim, The coordinate-exchange algorithm for constructing exact optimal experimental designs,
 Technometrics 37 (1995) 60-69; exchange formulas of Fedorov, Theory of Optimal Experiments (1972).
@@ -11,23 +11,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.designs.design import Design, assembled
-from doe.designs.model import Terms, model_matrix, model_terms
+from doe.designs.design import Design, design_of_parts
+from doe.designs.model import Terms, block_contrasts, model_matrix, model_terms, moment_matrix
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
 
 Criterion = Literal["d", "i"]
-FEWEST, MOST = 4, 40  # random designs that exchanges start from; the best is kept
-WORK = 30_000  # coordinates times terms, of all these designs together, beyond which they are fewer
+FEWEST, MOST = 4, 40  # random designs from which exchanges start; the best one is the result
+WORK = 30_000  # coordinates times terms of all these designs together, above which there are fewer designs
 MOST_RUNS = 500  # exchanges among more take minutes
-# Of the half width of the box, on which coordinates lie: finer ones gain next to nothing and part replicates.
+# Coordinates are multiples of the half width of the box over PARTS: a finer grid gains little and separates replicates.
 PARTS = 20
-GRID = np.linspace(-1.0, 1.0, 9)  # of the first exchanges; then coordinates move by so many parts:
-MOVES = (2, 1)
-SWEEPS = 20  # through all coordinates, at most, with one step
-LEAST = 1e-5  # share by which an exchange improves a design at least
-RIDGE = 1e-6  # keeps designs that do not estimate all terms comparable
+GRID = np.linspace(-1.0, 1.0, 9)  # of the first exchanges
+MOVES = (2, 1)  # parts by which coordinates move in later exchanges
+SWEEPS = 20  # largest number of passes through all coordinates with one step
+LEAST = 1e-5  # least relative improvement of an exchange
+RIDGE = 1e-6  # makes designs comparable that do not estimate all terms
 
 
 def optimal(
@@ -38,38 +38,35 @@ def optimal(
     seed: int = 1,
     terms: Terms | None = None,
     levels: Sequence[ArrayLike | None] | None = None,
-    made: ArrayLike = (),
+    earlier_runs: ArrayLike = (),
     block: ArrayLike | None = None,
     centre_replicates: int = 0,
 ) -> Design:
-    """Add ``runs`` runs to those made such that all together estimate a model as well as they can.
+    """Design of ``runs`` new runs that, with the earlier runs, estimate a model best.
 
     criterion : "d", the largest determinant of X'X and so the smallest joint region of the coefficients; "i", the least
         mean variance of predictions over the box.
-    terms : of the model, with "1"; the quadratic's unless given.
-    levels : of each factor the coded values that it may take, None for any; all may take any unless given.
-    made : coded points (m, k) of runs that were made, which stay as they are and come first; the box from -1 to 1 grows
-        until it holds them.
-    block : of each of these, from 0 (m,); where there are several blocks, the new runs make one more.
-    centre_replicates : centre points besides.
+    terms : of the model, with "1"; by default those of the quadratic.
+    levels : coded values that each factor may take, None for any; by default all may take any.
+    earlier_runs : coded points (m, k), which come first without change. The box from -1 to 1 grows to include them.
+    block : of each earlier run, from 0 (m,); where there are several blocks, the new runs are one more block.
+    centre_replicates : number of additional centre points.
 
     The same seed gives the same design. Raises MethodError when the runs are too few for the terms, or too many.
     """
-    from doe.designs.evaluation import block_contrasts, moment_matrix
-
     terms = model_terms(factors, "quadratic") if terms is None else terms
-    old = np.asarray(made, float).reshape(-1, factors)
+    old = np.asarray(earlier_runs, float).reshape(-1, factors)
     groups = np.zeros(len(old), np.int64) if block is None else np.asarray(block, np.int64)
     new = int(groups.max(initial=0)) + 1 if len(np.unique(groups)) > 1 else 0
     fixed = np.vstack([old, np.zeros((centre_replicates, factors))])
     needed = len(terms) + len(np.unique([*groups, new])) - 1
     if len(fixed) + runs < needed:
         least, model = needed + 1 - len(fixed), counted(len(terms), "term")
-        if len(fixed):
-            few = f"with {len(fixed)} given or at the centre too few for a model of {model}"
-        else:
-            few = f"too few for a model of {model}"
-        raise MethodError(f"runs = {runs}: {few}; give at least {least}")
+        if not len(fixed):
+            raise MethodError(f"runs = {runs}: too few for a model of {model}; give at least {least}")
+        raise MethodError(
+            f"runs = {runs}: with {len(fixed)} given or at the centre too few for a model of {model}; give at least {least}"
+        )
     if runs > MOST_RUNS:
         raise MethodError(
             f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; give fewer, or kind = 'sobol'"
@@ -86,57 +83,59 @@ def optimal(
         contrasts[-1],
         rows.T @ rows + RIDGE * np.eye(rows.shape[1]),
         weights if criterion == "i" else None,
-        [None if each is None else np.asarray(each, float) / reach for each in levels or [None] * factors],
+        [None if values is None else np.asarray(values, float) / reach for values in levels or [None] * factors],
     )
     points = exchange.best(exchange.starts(runs, np.random.default_rng(seed)))
     kinds = [("given", old), ("centre", fixed[len(old) :]), ("optimal", reach * points[np.lexsort(points.T)])]
-    return assembled(kinds, blocks.tolist(), reach, "box")
+    return design_of_parts(kinds, blocks.tolist(), reach, "box")
 
 
 def _on_parts(number: ArrayLike) -> Array:
-    """Coordinates of so many parts, within the box; quotients, which have the same bits whatever they were made by."""
+    """Coordinates of a ``number`` of parts within the box, as quotients, so that equal coordinates have equal bits."""
     return np.asarray(np.rint(np.asarray(number, float)).clip(-PARTS, PARTS) / PARTS)
 
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """Exchanges of coordinates in many designs (s, n, k) of new runs side by side, in the box from -1 to 1.
+    """Coordinate exchange in many designs (s, n, k) of new runs in parallel, in the box from -1 to 1.
 
-    ``beside`` (b,) stands in the row of every new run for the blocks, ``made`` (p, p) is X'X of the runs that stay;
-    ``moments`` (p, p) weigh the variances of an I-optimal design, None for a D-optimal one.
+    ``block_row`` (b,): columns of the blocks in the row of every new run. ``fixed_information`` (p, p): X'X of the earlier
+    runs. ``moments`` (p, p): weights of the variances of an I-optimal design, None for a D-optimal one.
     """
 
     terms: Terms
-    beside: Array
-    made: Array
+    block_row: Array
+    fixed_information: Array
     moments: Array | None
     levels: Sequence[Array | None]
 
     def starts(self, runs: int, random: np.random.Generator) -> Array:
         """Random designs."""
-        shape = min(max(WORK // (runs * len(self.levels) * len(self.made)), FEWEST), MOST), runs
+        shape = min(max(WORK // (runs * len(self.levels) * len(self.fixed_information)), FEWEST), MOST), runs
         columns = [
             _on_parts(random.integers(-PARTS, PARTS, shape, endpoint=True))
-            if each is None
-            else random.choice(each, shape)
-            for each in self.levels
+            if values is None
+            else random.choice(values, shape)
+            for values in self.levels
         ]
         return np.stack(columns, axis=-1)
 
     def best(self, points: Array) -> Array:
-        """The best of the designs after all exchanges that improve them, first over a grid, then by smaller steps."""
+        """The best design after all exchanges that improve them, first over a grid, then by smaller steps."""
         for parts in (0, *MOVES):
             self._sweep(points, parts)
-        # Rounded, lest the last bits of equals choose among them.
+        # Rounding makes equal designs equal, so that their last bits do not decide.
         return np.asarray(points[int(np.round(self._loss(points), 9).argmin())])
 
     def _rows(self, points: Array) -> Array:
         columns = model_matrix(points, self.terms)
-        return np.concatenate([columns, np.broadcast_to(self.beside, (*columns.shape[:-1], self.beside.size))], axis=-1)
+        return np.concatenate(
+            [columns, np.broadcast_to(self.block_row, (*columns.shape[:-1], self.block_row.size))], axis=-1
+        )
 
     def _information(self, points: Array) -> Array:
         rows = self._rows(points)
-        return np.asarray(self.made + np.swapaxes(rows, -1, -2) @ rows)
+        return np.asarray(self.fixed_information + np.swapaxes(rows, -1, -2) @ rows)
 
     def _loss(self, points: Array) -> Array:
         information = self._information(points)
@@ -145,23 +144,27 @@ class Exchange:
         return np.log(np.trace(np.linalg.inv(information) @ self.moments, axis1=-2, axis2=-1))
 
     def _sweep(self, points: Array, parts: int) -> None:
-        """Exchange each coordinate of the designs, in place, for a neighbour so many ``parts`` away, 0 for any on the grid,
-        until none improves any design."""
+        """Exchange each coordinate of the designs, in place, until no exchange improves any design.
+
+        Candidates are the neighbours ``parts`` away or, for 0, all values of the grid.
+        """
         for _ in range(SWEEPS):
             inverse, improved = np.asarray(np.linalg.inv(self._information(points)), float), False
             for run in range(points.shape[1]):
                 for factor, levels in enumerate(self.levels):
-                    beside = _on_parts(PARTS * points[:, run, factor, None] + [-parts, parts]) if parts else GRID
-                    improved |= self._exchange(points, inverse, (run, factor), beside if levels is None else levels)
+                    neighbours = _on_parts(PARTS * points[:, run, factor, None] + [-parts, parts]) if parts else GRID
+                    improved |= self._exchange(points, inverse, (run, factor), neighbours if levels is None else levels)
             if not improved:
                 return
 
-    def _exchange(self, points: Array, inverse: Array, place: tuple[int, int], given: Array) -> bool:
-        """Exchange one coordinate, a run's and a factor's, for the best of those given, (c,) or (s, c), where that improves a
-        design; update the ``inverse`` (s, p, p)."""
+    def _exchange(self, points: Array, inverse: Array, place: tuple[int, int], values: Array) -> bool:
+        """Exchange one coordinate, of a run and a factor, for the best of ``values`` (c,) or (s, c); update ``inverse`` (s, p, p).
+
+        Designs that no exchange improves stay.
+        """
         run, factor = place
-        trial = np.repeat(points[:, run, None], given.shape[-1], axis=1)
-        trial[..., factor] = given
+        trial = np.repeat(points[:, run, None], values.shape[-1], axis=1)
+        trial[..., factor] = values
         old, new = self._rows(points[:, run]), self._rows(trial)
         gain = self.gain(inverse, old, new)
         every = np.arange(len(points))
@@ -175,8 +178,10 @@ class Exchange:
         return better.size > 0
 
     def gain(self, inverse: Array, old: Array, new: Array) -> Array:
-        """By what share each of the ``new`` rows (s, c, p) in place of the ``old`` (s, p) raises the determinant, or lowers the
-        mean variance, of the designs; -1 where it leaves a term untold."""
+        """Relative gain (s, c) of each of the ``new`` rows (s, c, p) in place of the ``old`` ones (s, p).
+
+        It is the rise of the determinant or the fall of the mean variance, and -1 where a term is no longer estimable.
+        """
         ahead = new @ inverse
         behind = np.einsum("sij,sj->si", inverse, old)
         at_new, between = (ahead * new).sum(axis=-1), np.einsum("scj,sj->sc", ahead, old)
@@ -184,10 +189,10 @@ class Exchange:
         ratio = (1.0 + at_new) * (1.0 - at_old) + between**2
         if self.moments is None:
             return np.asarray(ratio - 1.0)
-        weighed = ahead @ self.moments
-        of_new, both = (weighed * ahead).sum(axis=-1), np.einsum("scj,sj->sc", weighed, behind)
+        weighted = ahead @ self.moments
+        of_new, both = (weighted * ahead).sum(axis=-1), np.einsum("scj,sj->sc", weighted, behind)
         of_old = ((behind @ self.moments) * behind).sum(axis=-1)[:, None]
         whole = (inverse * self.moments).sum(axis=(-1, -2))[:, None]
         less = (1.0 - at_old) * of_new + 2.0 * between * both - (1.0 + at_new) * of_old
-        told = ratio > RIDGE
-        return np.where(told, less / (whole * np.where(told, ratio, 1.0)), -1.0)
+        estimable = ratio > RIDGE
+        return np.where(estimable, less / (whole * np.where(estimable, ratio, 1.0)), -1.0)

@@ -1,10 +1,10 @@
 """Dimension chains: a closing link, its parts and their tolerances.
 
-- ``links``: what a chain is made of; ``reading``: its TOML and what is wrong with it
-- ``closing``: the closing link as a function of its parts, of which some are expressions
-- ``yields``: what comes of given tolerances; ``allocation``: the way back from limits to tolerances
-- ``selective_assembly``: parts sorted into classes
-- ``solution``: ``solve`` answers all
+- ``links``: tables of a chain and the parts of its links; ``reading``: chains from TOML, and their faults
+- ``closing``: the closing link as a function of its parts, expressions included, and its intervals
+- ``yields``: distributions of parts, yield of tolerances, selective assembly
+- ``allocation``: tolerances of parts from the limits of the closing link
+- ``solution``: ``solve`` and its record
 """
 
 from doe.dimension_chain.links import Chain, Link, Part

@@ -1,15 +1,16 @@
-"""Allocation: from the limits of the closing link back to tolerances of its parts.
+"""Allocation: tolerances of the parts from the limits of the closing link.
 
-"equal" gives every part that is not fixed the same tolerance, "iso286" one in proportion to its tolerance unit,
-"cost" the cheapest by the curves of the links. What they fill is the worst case, the root sum square, or what keeps
-a yield. Where the chain is not linear, or a yield is wanted, the tolerances of the linear rule are widened or
-narrowed together until they fill the limits. The nominal of one part is moved: so that the closing link's maximum
-meets its upper limit; for a yield, so that its mean (with functions, the middle of its tails) lies midway.
+"equal" gives all parts that are not fixed the same tolerance, "iso286" one in proportion to its tolerance unit. "cost" gives
+the cheapest tolerances by the curves of the links. Together they fill the limits by worst case, root sum square, or a
+yield. For a yield, or in a chain with functions, one factor scales the tolerances of the linear rule until they fill the
+limits. The nominal of one part is moved so that the closing link's maximum is at its upper limit. For a yield its
+mean is midway between the limits, or the middle of its tails in a chain with functions.
 
-The cheapest are the Lagrange optimum of cost curves a + b/T^k that together fill the closing link: with one multiplier L,
-T = (k b/(L |c|))^(1/(k+1)) in worst case, sum |c| T = W, and
-T = (k b/(2 L c^2))^(1/(k+2)) by root sum square, sum c^2 T^2 = W^2, each kept between the narrowest and the widest that
-its process gives (Chase and Greenwood, Design issues in mechanical tolerance analysis, 1988).
+The cheapest tolerances are the Lagrange optimum of cost curves a + b/T^k with one multiplier L. By worst case
+T = (k b/(L |c|))^(1/(k+1)) with sum |c| T = W. By root sum square T = (k b/(2 L c^2))^(1/(k+2)) with sum c^2 T^2 = W^2. Each
+tolerance is limited to the narrowest and the widest of its process.
+
+Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (1988).
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,19 +21,30 @@ from math import exp, inf, sqrt
 import numpy as np
 
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part, allocated_part, given_part
+from doe.dimension_chain.links import (
+    DIGITS,
+    SLACK,
+    Chain,
+    Cost,
+    Interval,
+    Link,
+    Mode,
+    Part,
+    allocated_part,
+    stated_part,
+)
 from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error
 from rbdyn.base.faults import MethodError
 from rbdyn.properties.tolerances import grade_tolerances, tolerance_unit
 
-SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
+SAMPLES = 100_000  # assemblies for a yield in a chain with functions
 HALVINGS = 26
 NEWTON_STEPS = 30
-WANDER = 0.5  # of the nominal: farther off, the steps of Newton have lost the solution
+WANDER = 0.5  # share of the nominal beyond which the steps of Newton have lost the solution
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
-SPAN = 700.0  # of the logarithm of the multiplier: all that a float holds
+SPAN = 700.0  # of the logarithm of the multiplier, the range of a float
 
 
 def moved_by(part: Part, step: float) -> Part:
@@ -43,7 +55,7 @@ def moved_by(part: Part, step: float) -> Part:
 
 @dataclass(frozen=True)
 class Allocation:
-    """The search for tolerances of a checked chain."""
+    """The search for tolerances of a valid chain."""
 
     chain: Chain
 
@@ -54,18 +66,18 @@ class Allocation:
 
     @property
     def mode(self) -> Mode:
-        """What the tolerances fill."""
+        """Criterion by which the tolerances fill the limits."""
         return self.chain.allocate.mode
 
     @property
     def adjusted(self) -> Link:
         """The link whose nominal is moved."""
         free = {link.name: link for link in self.chain.free if link.coefficient != 0}
-        wanted = self.chain.allocate.adjust
-        return free[wanted] if wanted else min(free.values(), key=lambda link: link.coefficient < 0)
+        name = self.chain.allocate.adjust
+        return free[name] if name else min(free.values(), key=lambda link: link.coefficient < 0)
 
     def parts(self, tolerances: Tolerances, grades: Mapping[str, str] | None = None) -> list[Part]:
-        """All parts, those that are not fixed with the given tolerances, mm, and one nominal moved.
+        """All parts, with ``tolerances`` in mm of those that are not fixed, and with one nominal moved.
 
         Raises MethodError where no nominal of that part brings the closing link to its limits.
         """
@@ -73,30 +85,30 @@ class Allocation:
         parts = [
             allocated_part(link, tolerances[link.name], (grades or {}).get(link.name))
             if link.name in tolerances
-            else given_part(link, by_name)
+            else stated_part(link, by_name)
             for link in self.chain.link
             if link.is_dimension or link.thermal_growth
         ]
-        moved, gone = self.adjusted.name, 0.0
-        # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
+        moved, distance = self.adjusted.name, 0.0
+        # One step is exact unless a function uses the moved part; then these are steps of Newton's method.
         for _ in range(NEWTON_STEPS):
             try:
                 slope = self.function.sensitivities(middle(parts))[moved]
                 step = self._missing(parts) / slope if slope else inf
             except NoValueError:
-                # Where the part was moved to says nothing of where it was given.
-                if gone:
+                # After a step, a missing value is no fault of the stated nominal.
+                if distance:
                     break
                 raise
             parts = [moved_by(part, step) if part.name == moved else part for part in parts]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
-            gone += abs(step)
-            if not gone <= WANDER * abs(self.adjusted.nominal):
+            distance += abs(step)
+            if not distance <= WANDER * abs(self.adjusted.nominal):
                 break
-        raise MethodError("no nominal of it brings the closing link to its limits; name another part")
+        raise MethodError("no nominal of this part brings the closing link to its limits; name another part")
 
-    def kept(self, parts: list[Part]) -> bool:
+    def fits(self, parts: list[Part]) -> bool:
         """Whether parts keep the limits in the mode of the chain."""
         if self.mode == "yield":
             return self.sure_yield(parts) >= self.chain.allocate.target_yield
@@ -104,32 +116,32 @@ class Allocation:
         return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
 
     def sure_yield(self, parts: list[Part]) -> float:
-        """Yield with each part's own distribution: by convolution; with functions, two errors below a Monte Carlo."""
+        """Yield with each part's own distribution, by convolution or, with functions, two errors below a Monte Carlo."""
         limits = self.chain.closing_link
         if self.function.linear:
             return 1 - sum(exact_shares(self.function, parts, limits))
-        share = self._drawn(parts).yields["as_given"]
+        share = self._assemblies(parts).yields["as_given"]
         return share - 2 * standard_error(share, SAMPLES)
 
     def tails(self, parts: list[Part]) -> Interval:
-        """Closing links, mm, between which the wanted yield lies, as many below as above, by Monte Carlo."""
+        """Closing links, mm, with the target yield between them and equal tails, by Monte Carlo."""
         tail = (1 - self.chain.allocate.target_yield) / 2
-        low, high = np.quantile(self._drawn(parts).values, (tail, 1 - tail))
+        low, high = np.quantile(self._assemblies(parts).values, (tail, 1 - tail))
         return float(low), float(high)
 
     def allocated(self) -> list[Part]:
-        """Parts whose tolerances together fill the limits, snapped to grades where that is asked for."""
-        wish = self.linear_rule()
-        scale = 1.0 if self.function.linear and self.mode != "yield" else self._scale(wish)
-        tolerances = {name: scale * t for name, t in wish.items()}
+        """Parts whose tolerances fill the limits, with grades if the chain demands them."""
+        rule = self.linear_rule()
+        scale = 1.0 if self.function.linear and self.mode != "yield" else self._scale(rule)
+        tolerances = {name: scale * t for name, t in rule.items()}
         if not self.chain.allocate.grades:
             return self.parts(tolerances)
-        return self._snapped(tolerances)
+        return self._graded(tolerances)
 
     def linear_rule(self) -> dict[str, float]:
         """Tolerances, mm, that fill the limits of the linear chain; for a yield by root sum square.
 
-        Raises MethodError where no tolerances can: see the sentences.
+        Raises MethodError where a part has no effect, or the narrowest tolerances of cost curves are too wide.
         """
         rule, free = self.chain.allocate, self.chain.free
         mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
@@ -137,12 +149,12 @@ class Allocation:
         slopes = self.function.sensitivities(middle(bare))
         fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], mode)
         width = self.chain.width_mm
-        # A bent chain may have more room than its tangent says: any positive width starts the search.
+        # A nonlinear chain may have more room than its tangent: any positive width can start the search.
         rest = sqrt(max(width**2 - fixed**2, 0.0)) if mode == "rss" else width - fixed
         rest = rest if rest > 0 else width
         idle = [link.name for link in free if slopes[link.name] == 0]
         if idle and (rule.method == "cost" or len(idle) == len(free)):
-            raise MethodError(f'"{idle[0]}" does not move the closing link; fix it')
+            raise MethodError(f'"{idle[0]}" does not change the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
             widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
@@ -152,25 +164,25 @@ class Allocation:
         share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
         return {name: share * weight for name, weight in weights.items()}
 
-    def _scale(self, wish: Tolerances) -> float:
+    def _scale(self, rule: Tolerances) -> float:
         """Factor on the tolerances at which they just keep the limits."""
 
-        def kept(scale: float) -> bool:
+        def fits_at(scale: float) -> bool:
             try:
-                return self.kept(self.parts({name: scale * t for name, t in wish.items()}))
+                return self.fits(self.parts({name: scale * t for name, t in rule.items()}))
             except MethodError:
-                # Too wide for the functions to have a value, or for the nominal to follow.
+                # The tolerances are too wide for the functions, or for a move of the nominal.
                 return False
 
         low, high = 0.0, 1.0
-        while high < WIDEST and kept(high):
+        while high < WIDEST and fits_at(high):
             low, high = high, 2 * high
         for _ in range(HALVINGS):
             half = (low + high) / 2
-            low, high = (half, high) if kept(half) else (low, half)
+            low, high = (half, high) if fits_at(half) else (low, half)
         return low
 
-    def _snapped(self, tolerances: Tolerances) -> list[Part]:
+    def _graded(self, tolerances: Tolerances) -> list[Part]:
         """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
@@ -178,13 +190,13 @@ class Allocation:
         steps = {name: sum(width <= room[name] for _, width in ladder) - 1 for name, ladder in ladders.items()}
 
         def parts(steps: Mapping[str, int]) -> list[Part]:
-            chosen = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
-            widths = {name: chosen[name][1] if name in chosen else t for name, t in tolerances.items()}
-            return self.parts(widths, {name: grade for name, (grade, _) in chosen.items()})
+            choice = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
+            widths = {name: choice[name][1] if name in choice else t for name, t in tolerances.items()}
+            return self.parts(widths, {name: grade for name, (grade, _) in choice.items()})
 
         while self.chain.allocate.spend_slack:
             open_ones = [name for name, step in steps.items() if 0 <= step < len(ladders[name]) - 1]
-            wider = [name for name in open_ones if self.kept(parts({**steps, name: steps[name] + 1}))]
+            wider = [name for name in open_ones if self.fits(parts({**steps, name: steps[name] + 1}))]
             if not wider:
                 break
             best = max(wider, key=lambda name: self._worth(free[name], ladders[name], steps[name]))
@@ -192,14 +204,14 @@ class Allocation:
         return parts(steps)
 
     def _worth(self, link: Link, ladder: list[tuple[str, float]], step: int) -> tuple[float, float]:
-        """What the next grade is worth: the cost that it saves; without a curve, how fine the grade still is."""
+        """Value of the next wider grade: the saved cost, or without a curve the fineness of the present grade."""
         narrow, wide = ladder[step][1], ladder[step + 1][1]
         if link.cost is None:
             return 0.0, -step
         return link.cost.b * (narrow**-link.cost.k - wide**-link.cost.k), -step
 
     def _missing(self, parts: list[Part]) -> float:
-        """How far the closing link lies too low, mm."""
+        """Shift of the closing link to its target, mm."""
         limits = self.chain.closing_link
         if self.mode != "yield":
             return limits.upper_mm - interval(self.function, parts, self.mode)[1]
@@ -208,7 +220,7 @@ class Allocation:
             return target - closing_moments(self.function, parts, None)[0]
         return target - sum(self.tails(parts)) / 2
 
-    def _drawn(self, parts: list[Part]) -> Assemblies:
+    def _assemblies(self, parts: list[Part]) -> Assemblies:
         seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link
         return draw(self.function, parts, limits, samples=SAMPLES, seed=seed, laws=())
 
@@ -216,16 +228,16 @@ class Allocation:
 def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode: Mode) -> list[float]:
     """Tolerances, mm, of least cost whose worst case or root sum square is ``width``; slopes must not be zero.
 
-    Where even the widest fill less than the width, these. Raises MethodError, with the width that is needed, where
-    even the narrowest fill more.
+    The widest tolerances are the result where they fill less than the width. Raises MethodError, with the required width,
+    where the narrowest fill more.
     """
 
     from scipy.optimize import brentq
 
     def tolerance(curve: Cost, slope: float, log_multiplier: float) -> float:
         power, weight = (curve.k + 2, 2 * slope**2) if mode == "rss" else (curve.k + 1, abs(slope))
-        wish = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
-        return min(max(wish, curve.narrowest_mm), curve.widest_mm or inf)
+        optimum = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
+        return min(max(optimum, curve.narrowest_mm), curve.widest_mm or inf)
 
     def tolerances(log_multiplier: float) -> list[float]:
         return [tolerance(curve, slope, log_multiplier) for curve, slope in zip(curves, slopes, strict=True)]
@@ -236,8 +248,10 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
 
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
-        what = f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm"
-        raise MethodError(f"{what}; widen the limits or let a process go narrower")
+        raise MethodError(
+            f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm; widen the limits or permit "
+            "narrower tolerances"
+        )
     if excess(-SPAN / 4) < 0:
         return tolerances(-SPAN / 4)
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))

@@ -1,14 +1,13 @@
-"""The closing link as a function of the parts' sizes, its sensitivities, and its least and greatest value: worst case over
-the limits of the parts, and root sum square.
+"""The closing link as a function of the sizes of the parts, with its sensitivities, worst case and root sum square.
 
-Raceways that a press fit widens or narrows: rings, shafts and housings are thick cylinders of one length in plane stress
-(Lamé), as in `rbdyn.mounting.rings`.
+- ``ClosingFunction``: value and sensitivities; ``interval``: least and greatest value over the limits of the parts
+- ``evaluate``: arithmetic on other links, written as text. It is safe, for it accepts only numbers, names and a few functions.
+- ``press_fit_factor``: change of a raceway by a press fit. Rings, shafts and housings are thick cylinders of one length in
+  plane stress (Lamé), as in `rbdyn.mounting.rings`.
 
-Where the chain is linear worst case and root sum square are sums. Otherwise the worst case is looked for at every corner of the limits and at
-points between them; the best point is polished where it is no corner. The root sum square then takes the local
-sensitivities at mid-tolerance.
-
-A link may be arithmetic on others, written as text: safe, since only numbers, names and the functions below are read.
+In a linear chain the worst case and the root sum square are sums. Otherwise the worst case is the best of all corners of the
+limits and of points between them, refined where it is no corner. The root sum square uses the sensitivities at
+mid-tolerance.
 """
 
 import ast
@@ -35,7 +34,7 @@ BINARY: dict[type[ast.operator], Operator] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
-    # Numpy's rules: what is infinite or undefined is so in the result, and neither raises nor turns complex.
+    # Numpy's rules: infinite and undefined values pass into the result, without an error and without complex numbers.
     ast.Div: np.true_divide,
     ast.Pow: lambda base, power: np.asarray(base, float) ** power,
 }
@@ -45,32 +44,32 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "max": lambda *values: reduce(np.maximum, values),
 }
 CONSTANTS = {"pi": pi}
-MANY = ("min", "max")  # the others take one value
+MANY = ("min", "max")  # of several values, all others of one
 LONGEST = 1000  # characters
-DEEPEST = 100  # operations within each other, which a sum of as many terms has: each is a call within the last
+DEEPEST = 100  # nested operations, each a nested call; a sum has as many as terms
 SHOWN = 60  # characters of an expression in a message
 
 
 def names_in(text: str) -> list[str]:
-    """Links that an expression uses, in order. Raises MethodError for what is not such an expression."""
-    tree = _parsed(text)
+    """Links in an expression, in order. Raises MethodError for an invalid expression."""
+    tree = _syntax_tree(text)
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     names = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called]
     return [name for name in dict.fromkeys(names) if name not in CONSTANTS]
 
 
 def evaluate(text: str, sizes: Mapping[str, Any]) -> Any:
-    """Value of an expression at the sizes of its links, numbers or arrays of one shape; infinite or NaN where it has none."""
-    return _value(_parsed(text), sizes)
+    """Value of an expression at the sizes of its links, numbers or arrays of one shape; infinite or NaN where undefined."""
+    return _value(_syntax_tree(text), sizes)
 
 
-def shown(text: str) -> str:
-    """An expression as messages have it: in quotes, on one line, cut."""
+def quotation(text: str) -> str:
+    """An expression for messages: in quotes, on one line, shortened."""
     return json.dumps(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...", ensure_ascii=False)
 
 
 @cache
-def _parsed(text: str) -> ast.expr:
+def _syntax_tree(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise MethodError(f"has {len(text)} characters, more than {LONGEST}; split it into links of coefficient 0")
     try:
@@ -95,8 +94,10 @@ def _parsed(text: str) -> ast.expr:
             case _:
                 read = False
         if not read:
-            what, known = shown(ast.unparse(node) or type(node).__name__), ", ".join(FUNCTIONS)
-            raise MethodError(f"holds {what}; only + - * / **, numbers, names of links and {known} are read")
+            raise MethodError(
+                f"contains {quotation(ast.unparse(node) or type(node).__name__)}; use only + - * / **, numbers, names of links "
+                f"and {', '.join(FUNCTIONS)}"
+            )
     return tree
 
 
@@ -117,10 +118,10 @@ def _value(node: ast.expr, sizes: Mapping[str, Any]) -> Any:
 
 MM = 1e-3
 STEP = 1e-5  # mm of the central differences that give sensitivities
-LARGEST = 1e12  # of a function's value: what is larger is a slip of the pen, and squares of slopes must stay finite
+LARGEST = 1e12  # of a function's value, for squares of slopes must stay finite
 
 Sizes = Mapping[str, Any]
-CORNERS = 12  # functions of more parts are looked at in as many random corners as those have
+CORNERS = 12  # number of parts up to which all corners count; with more parts, as many random corners
 BETWEEN = 512  # points between the corners
 
 
@@ -136,24 +137,24 @@ class Function:
     value: Callable[[Sizes], Any]
 
     def without_value(self, value: Any, sizes: Sizes) -> NoValueError:
-        """Report the first of the sizes at which the value is not finite."""
+        """Error that names the first sizes at which the value is not finite."""
         link, values = self.link, np.atleast_1d(value)
         lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
         first = {name: np.broadcast_to(sizes[name], values.shape)[lost[0]] for name in _varies_with(link)}
-        at = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
-        what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
+        place = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
+        what = f"expression = {quotation(link.expression)}" if link.expression else "press_fit or thermal_growth"
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
         return NoValueError(
-            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no '
-            "finite closing link; give it a value there, as max(x, 0) does, or keep the links it uses away from it"
+            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {place or "any size"}{share}, which gives no '
+            "finite closing link; limit its argument, as max(x, 0) does, or the sizes of its links"
         )
 
 
 @dataclass(frozen=True)
 class ClosingFunction:
-    """Sum of coefficient times part, plus that of the functions, in their order.
+    """Sum of coefficient times part and of coefficient times function, in their order.
 
-    ``arguments`` names the parts that functions use; without any the chain is linear.
+    ``arguments``: names of the parts that functions use; without functions the chain is linear.
     """
 
     coefficients: Mapping[str, float]
@@ -162,7 +163,7 @@ class ClosingFunction:
 
     @property
     def linear(self) -> bool:
-        """Whether the closing link is a sum of parts and nothing else."""
+        """Whether the closing link is a sum of parts alone."""
         return not self.functions
 
     def value(self, sizes: Sizes) -> Any:
@@ -170,24 +171,24 @@ class ClosingFunction:
         return sum(c * sizes[name] for name, c in self.coefficients.items()) + self.bent(sizes)
 
     def bent(self, sizes: Sizes) -> Any:
-        """Share of the functions alone, mm; only the sizes of ``arguments`` are needed.
+        """Sum of the functions alone, mm, by the sizes of ``arguments``.
 
         Raises NoValueError where a function has no finite value.
         """
-        known = dict(sizes)
+        values = dict(sizes)
         total: Any = 0.0
         with np.errstate(all="ignore"):
             for function in self.functions:
-                known[function.link.name] = value = function.value(known)
-                # Written so that NaN, which is not below anything, is caught too.
+                values[function.link.name] = value = function.value(values)
+                # Written so that NaN fails too.
                 if not np.max(np.abs(value)) <= LARGEST:
-                    raise function.without_value(value, known)
+                    raise function.without_value(value, values)
                 total = total + function.link.coefficient * value
         return total
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
-        """Change of the closing link per change of each part at the given sizes."""
-        self.bent(sizes)  # a place without a value is reported as it is, before the steps aside
+        """Change of the closing link per change of each part, at these sizes."""
+        self.bent(sizes)  # so that an error names these sizes and not those of a step
         slopes = dict(self.coefficients)
         for name in self.arguments:
             above, below = ({**sizes, name: sizes[name] + sign * STEP} for sign in (1, -1))
@@ -196,15 +197,15 @@ class ClosingFunction:
 
 
 def closing_function(links: Sequence[Link]) -> ClosingFunction:
-    """The closing link of checked links.
+    """The closing link of valid links.
 
-    Raises MethodError for a press fit whose diameters make no rings.
+    Raises MethodError for a press fit of impossible diameters.
     """
     by_name = {link.name: link for link in links}
     functions = [Function(link, _function(link, by_name)) for link in links if not link.is_dimension]
     used = [name for link in links for name in _varies_with(link)]
     return ClosingFunction(
-        # A thermal growth counts as a function; the part of its name only varies the temperature.
+        # A thermal growth is a function; the part of its name is only its temperature.
         {link.name: link.coefficient * link.is_dimension for link in links if is_part(link)},
         tuple(functions),
         tuple(name for name in dict.fromkeys(used) if is_part(by_name[name])),
@@ -212,12 +213,12 @@ def closing_function(links: Sequence[Link]) -> ClosingFunction:
 
 
 def is_part(link: Link) -> bool:
-    """Whether something varies with the link itself: a dimension, or the temperature of a growth."""
+    """Whether the link is a part, a dimension or the temperature of a growth."""
     return link.is_dimension or link.thermal_growth is not None
 
 
 def used_links(link: Link) -> list[str]:
-    """Links that a link is a function of. Raises MethodError for an expression that cannot be read."""
+    """Links in the function of a link. Raises MethodError for an invalid expression."""
     if link.press_fit:
         return [link.press_fit.shaft, link.press_fit.bore]
     if link.thermal_growth:
@@ -254,19 +255,19 @@ def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
     """Change of the raceway's diameter per interference of a tight fit; positive on the outer part, else negative.
 
     A solid shaft in a ring of its own material widens the ring's outside by fit/outside. ``bore_nominal`` [mm] is the
-    diameter of the fit unless it has its own. Raises MethodError unless shaft_bore < fit < outside and the raceway lies
-    on one of the two parts.
+    diameter of a fit without ``fit_mm``. Raises MethodError unless shaft_bore < fit < outside and the raceway is on one of
+    the two parts.
     """
     fit_mm, raceway_mm = fit.fit_mm or bore_nominal, fit.raceway_mm
     outer = raceway_mm > fit_mm
-    # The raceway bounds the part that it stands on, unless stated otherwise.
+    # By default the raceway bounds its part.
     shaft_bore_mm = (0.0 if outer else raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
     outside_mm = raceway_mm if fit.outside_mm is None else fit.outside_mm
     if fit.outside_mm is None and not outer:
         raise MethodError("outside_mm is missing: give the outside diameter of what holds the ring")
     if not shaft_bore_mm <= raceway_mm <= outside_mm or raceway_mm == fit_mm:
-        raise MethodError(f"a raceway of {raceway_mm:g} mm lies on neither part; fix its diameter")
-    # Free of loads but the pressure, a part needs neither mass nor heat.
+        raise MethodError(f"a raceway of {raceway_mm:g} mm is on neither part; fix its diameter")
+    # The fit needs neither density nor thermal expansion.
     shaft_steel = Material(1e9 * fit.shaft_modulus_GPa, fit.shaft_poisson, 0.0)
     bore_steel = Material(1e9 * fit.bore_modulus_GPa, fit.bore_poisson, 0.0)
     shaft = Ring(MM * shaft_bore_mm / 2, MM * fit_mm / 2, shaft_steel)
@@ -280,11 +281,11 @@ def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
 
 def interval(function: ClosingFunction, parts: Sequence[Part], mode: Mode) -> Interval:
     """Least and greatest closing link, mm: by root sum square about mid-tolerance in mode "rss", else worst case."""
-    return linear_interval(function, parts, mode) if mode == "rss" or function.linear else _searched(function, parts)
+    return linear_interval(function, parts, mode) if mode == "rss" or function.linear else _worst_case(function, parts)
 
 
 def linear_interval(function: ClosingFunction, parts: Sequence[Part], mode: Mode) -> Interval:
-    """The same with the closing link made linear at mid-tolerance; exact for a linear chain."""
+    """The interval of the closing link linearised at mid-tolerance, exact for a linear chain."""
     sizes = middle(parts)
     centre, slopes = float(function.value(sizes)), function.sensitivities(sizes)
     half = total([abs(slopes[part.name]) * part.tolerance_mm for part in parts], mode) / 2
@@ -296,8 +297,8 @@ def total(tolerances: Sequence[float], mode: Mode) -> float:
     return sqrt(sum(t * t for t in tolerances)) if mode == "rss" else sum(tolerances)
 
 
-def _searched(function: ClosingFunction, parts: Sequence[Part]) -> Interval:
-    """Worst case with the parts that functions use searched and the others at the limit that their sign asks for."""
+def _worst_case(function: ClosingFunction, parts: Sequence[Part]) -> Interval:
+    """Worst case by a search over the parts in functions, with the other parts at the limits of their sign."""
     bent = [part for part in parts if part.name in function.arguments]
     straight = [part for part in parts if part.name not in function.arguments]
     ends = []
@@ -311,12 +312,12 @@ def _searched(function: ClosingFunction, parts: Sequence[Part]) -> Interval:
 
 
 def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
-    """Least of sign times the share of the closing link that the given parts have."""
+    """Least value of ``sign`` times the sum of the ``parts`` and the functions."""
     varying = [part for part in parts if part.tolerance_mm > 0]
     nominals = {part.name: np.asarray(part.nominal_mm + part.lower_mm) for part in parts}
 
     def value(places: Array) -> Array:
-        """At places (n, k) from 0 to 1 between the limits."""
+        """Values at places (n, k) from 0 to 1 between the limits."""
         sizes: dict[str, Array] = dict(nominals)
         for part, place in zip(varying, places.T, strict=True):
             sizes[part.name] = part.nominal_mm + part.lower_mm + part.tolerance_mm * place

@@ -1,10 +1,10 @@
-"""What a dimension chain is made of: the closing link, its links, the wish for their tolerances; and the parts that links stand for.
+"""Tables of a dimension chain: closing link, links, allocation of tolerances, Monte Carlo; and the parts of the links.
 
-A link is a dimension of a part, or a function of links that stand before it: the growth of a raceway by a press
-fit, the growth by temperature, an expression. The closing link is the sum of coefficient times link. A dimension
-that only functions use has the coefficient 0.
+A link is a dimension of a part, or a function of links before it: the growth of a raceway by a press fit, the growth by
+temperature, an expression. The closing link is the sum of coefficient times link. A dimension that only functions use has
+the coefficient 0.
 
-The limits of a part are given deviations, codes of fits (ISO 286, ISO 492), or allocated tolerances in their place.
+The limits of a part come from stated deviations, codes of fits (ISO 286, ISO 492), or allocated tolerances.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,14 +13,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbdyn.base.faults import Strict
-from rbdyn.base.fields import NonNegative, Positive
-from rbdyn.properties.tolerances import SURFACES, fit_limits, positioned, ring_limits
+from rbdyn.base.faults import NonNegative, Positive, Strict
+from rbdyn.properties.tolerances import SURFACES, fit_limits, position_limits, ring_limits
 
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]
 Mode = Literal["worst_case", "rss", "yield"]
 Interval = tuple[float, float]
-# A kilometre, or a coefficient of a million, is a slip of the pen.
+# A kilometre, or a coefficient of a million, is a typing error.
 Bounded = Annotated[float, Field(ge=-1e6, le=1e6)]
 Poisson = Annotated[float, Field(ge=0.0, lt=0.5)]
 Position = Literal[
@@ -29,11 +28,11 @@ Position = Literal[
     "D", "E", "F", "G", "H", "JS",
 ]  # fmt: skip
 
-SLACK = 1e-9  # mm: round-off allowed at a limit
-DIGITS = 12  # decimals in mm kept of an allocated size
+SLACK = 1e-9  # mm: rounding tolerated at a limit
+DIGITS = 12  # decimals of an allocated size in mm
 
 
-# Every assembly drawn is kept, and sorted for quantiles: a hundred million take 2 GB.
+# All assemblies stay in memory and are sorted for quantiles: a hundred million take 2 GB.
 Samples = Annotated[int, Field(ge=1, le=100_000_000)]
 
 
@@ -58,7 +57,7 @@ class Cost(Strict):
     narrowest_mm: NonNegative = 0.0
     """Narrowest tolerance that the process gives."""
     widest_mm: Positive | None = None
-    """Widest tolerance worth making; without bound where left out."""
+    """Widest useful tolerance; by default without bound."""
 
 
 class PressFit(Strict):
@@ -69,14 +68,14 @@ class PressFit(Strict):
     bore: str
     """Link of the outer part's diameter."""
     raceway_mm: Positive
-    """Diameter whose change the link is. Wider than the fit it stands on the outer part and grows, narrower on the
-    inner one and shrinks."""
+    """Diameter whose change the link is. If larger than the fit it is on the outer part and grows, if smaller it is on the
+    inner part and shrinks."""
     fit_mm: Positive | None = None
-    """Diameter of the fit; the nominal of bore where left out."""
+    """Diameter of the fit; by default the nominal of bore."""
     shaft_bore_mm: NonNegative | None = None
-    """Bore of the inner part; 0, or the raceway on it, where left out."""
+    """Bore of the inner part; by default 0, or the raceway if it is on this part."""
     outside_mm: Positive | None = None
-    """Outside of the outer part; the raceway on it where left out, else to be given."""
+    """Outside diameter of the outer part; by default the raceway if it is on this part, else required."""
     shaft_modulus_GPa: Positive = 206.0  # noqa: N815
     """Young's modulus of the inner part; steel."""
     bore_modulus_GPa: Positive = 206.0  # noqa: N815
@@ -86,7 +85,7 @@ class PressFit(Strict):
     bore_poisson: Poisson = 0.3
     """Poisson's ratio of the outer part; steel."""
     interference_change_mm: Bounded = 0.0
-    """What roughness, temperature and rotation add to the interference; negative where they take some."""
+    """Change of the interference by roughness, temperature and rotation; negative where they reduce it."""
 
 
 class ThermalGrowth(Strict):
@@ -110,7 +109,7 @@ class Link(Strict):
     name: Annotated[str, Field(min_length=1)]
     """Name of the link."""
     coefficient: Bounded
-    """What the closing link changes by per unit of this link; 0 for one that only functions use."""
+    """Change of the closing link per unit of this link; 0 for a link that only functions use."""
     nominal_mm: Bounded | None = None
     """Nominal of a dimension."""
     upper_mm: Bounded | None = None
@@ -120,16 +119,16 @@ class Link(Strict):
     fit: str | None = None
     """Deviations by a code instead: "k5", "H7" of ISO 286, or "P5 bore", "Normal outside" of ISO 492."""
     distribution: Distribution = "normal"
-    """How the parts made scatter."""
+    """Distribution of the manufactured parts."""
     mean_mm: Bounded | None = None
-    """Mean of the parts made, as a deviation from the nominal; the middle of the tolerance where left out."""
+    """Mean of the manufactured parts, as a deviation from the nominal; by default the middle of the tolerance."""
     capability: Positive = 1.0
     """T/(6 sigma) of a normal or truncated normal part."""
     fixed: bool = False
-    """Whether the tolerance stays as given when tolerances are allocated, also where all links have deviations. Next to
-    links without any, given ones stay in any case."""
+    """Whether the allocation keeps the stated tolerance of this link. It matters where all links have deviations; if some
+    have none, stated deviations always stay."""
     position: Position = "unilateral"
-    """Where an allocated tolerance lies: on one side, so that it can only shorten the closing link, on both, or by a
+    """Position of an allocated tolerance: on one side, so that it can only shorten the closing link, on both sides, or by a
     letter of ISO 286."""
     cost: Cost | None = None
     """Cost of the tolerance."""
@@ -138,7 +137,7 @@ class Link(Strict):
     thermal_growth: ThermalGrowth | None = None
     """Makes the link the growth of another by temperature."""
     expression: str | None = None
-    """Makes the link an expression of links that stand before it."""
+    """Makes the link an expression of links before it."""
 
     @property
     def is_dimension(self) -> bool:
@@ -147,7 +146,7 @@ class Link(Strict):
 
     @property
     def has_deviations(self) -> bool:
-        """Whether it says how far it deviates; a growth by temperature always does."""
+        """Whether the link has stated deviations; a growth by temperature always has."""
         return self.thermal_growth is not None or self.fit is not None or self.upper_mm is not None
 
     @property
@@ -157,30 +156,29 @@ class Link(Strict):
 
 
 class Allocate(Strict):
-    """How tolerances are shared."""
+    """Allocation of tolerances."""
 
     method: Literal["equal", "iso286", "cost"] = "equal"
-    """How tolerances are shared: equal ones, in proportion to ISO 286's tolerance units (for its grades: grades = true), or
-    at the least cost."""
+    """Rule of the allocation: equal tolerances, in proportion to the tolerance units of ISO 286 (for its grades: grades =
+    true), or at least cost."""
     mode: Mode = "worst_case"
-    """What must stay within the limits: the worst case, the root sum square, or target_yield of the assemblies."""
+    """Criterion within the limits: the worst case, the root sum square, or target_yield of the assemblies."""
     grades: bool = False
     """Whether each tolerance is narrowed to a grade of ISO 286."""
     spend_slack: bool = False
-    """Whether grades are widened as long as the limits allow: where the curves save most, without curves the finest
-    grade first."""
+    """Whether grades are widened as far as the limits allow, first where the cost curves save most or, without curves, the
+    finest grade."""
     target_yield: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9973
     """Share of the assemblies that mode = "yield" keeps within the limits; 3 sigma."""
     adjust: str | None = None
-    """Part whose nominal is moved; where left out the first that is not fixed, of positive coefficient if there is one.
-    """
+    """Part whose nominal is moved; by default the first that is not fixed, if possible of positive coefficient."""
 
 
 class MonteCarlo(Strict):
     """Size and seed of the Monte Carlo of the assemblies."""
 
     samples: Samples = 1_000_000
-    """Assemblies drawn."""
+    """Number of random assemblies."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the assemblies."""
 
@@ -197,20 +195,20 @@ class Selective(Strict):
     by: Literal["width", "probability"] = "width"
     """Classes of equal width over the tolerance, or of equal share of each part's production."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 200_000
-    """Parts drawn; all sizes of all parts are kept."""
+    """Number of random parts of each link; all sizes stay in memory."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the parts."""
 
 
 class Chain(Strict):
-    """A closing link, its links and the wish for their tolerances."""
+    """A closing link, its links, and the allocation of their tolerances."""
 
     closing_link: ClosingLink
     """The gap or dimension that the links make."""
     link: Annotated[list[Link], Field(min_length=1)]
     """The links."""
     allocate: Allocate = Allocate()
-    """How tolerances are shared."""
+    """Allocation of tolerances."""
     monte_carlo: MonteCarlo = MonteCarlo()
     """Monte Carlo of the assemblies."""
     selective: Selective | None = None
@@ -223,14 +221,14 @@ class Chain(Strict):
 
     @property
     def free(self) -> list[Link]:
-        """Dimensions whose tolerances are to be allocated: those without deviations; where all have some, all but the fixed."""
+        """Dimensions for the allocation: those without deviations or, if all have some, all that are not fixed."""
         loose = [link for link in self.link if link.is_dimension and not link.fixed]
         return [link for link in loose if not link.has_deviations] or loose
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part with all its numbers, mm; ``mean_mm`` is a deviation from the nominal, which was moved by ``moved_mm``."""
+    """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal."""
 
     name: str
     coefficient: float
@@ -260,7 +258,7 @@ class Part:
 
     @property
     def text(self) -> str:
-        """'9.2900 0/-0.0050'."""
+        """Nominal and deviations, such as '9.2900 0/-0.0050'."""
         upper, lower = (f"{value:+.4f}" if value else "0" for value in (self.upper_mm, self.lower_mm))
         return f"{self.nominal_mm:.4f} {upper}/{lower}"
 
@@ -272,8 +270,8 @@ def coded_limits(link: Link) -> Interval:
     return (ring_limits if rings else fit_limits)(link.nominal, code)
 
 
-def given_part(link: Link, by_name: Mapping[str, Link]) -> Part:
-    """The part of a link with deviations; a link without any is taken at its nominal."""
+def stated_part(link: Link, by_name: Mapping[str, Link]) -> Part:
+    """The part of a link with deviations; without any it is exactly nominal."""
     nominal, mean = link.nominal, link.mean_mm
     lower, upper = link.lower_mm or 0.0, link.upper_mm or 0.0
     if link.thermal_growth:
@@ -286,20 +284,20 @@ def given_part(link: Link, by_name: Mapping[str, Link]) -> Part:
     return _part(link, nominal, lower, upper, mean, None)
 
 
-def given_parts(links: Sequence[Link]) -> list[Part]:
+def stated_parts(links: Sequence[Link]) -> list[Part]:
     """Parts of all links that vary."""
     by_name = {link.name: link for link in links}
-    return [given_part(link, by_name) for link in links if link.is_dimension or link.thermal_growth]
+    return [stated_part(link, by_name) for link in links if link.is_dimension or link.thermal_growth]
 
 
 def allocated_part(link: Link, tolerance: float, grade: str | None = None) -> Part:
-    """The part of a link with a tolerance, mm, where the link's ``position`` puts it."""
+    """The part of a link with a tolerance, mm, at the link's ``position``."""
     if link.position == "symmetric":
         lower, upper = -tolerance / 2, tolerance / 2
     elif link.position == "unilateral":
         lower, upper = (-tolerance, 0.0) if link.coefficient > 0 else (0.0, tolerance)
     else:
-        lower, upper = positioned(link.nominal, link.position, tolerance)
+        lower, upper = position_limits(link.nominal, link.position, tolerance)
     return _part(link, link.nominal, lower, upper, None, grade)
 
 

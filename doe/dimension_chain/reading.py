@@ -1,6 +1,4 @@
-"""Chains from TOML: one of its own, or several under names in one file; and what is wrong with a chain, one sentence a fault, with key,
-value and fix.
-"""
+"""Chains from TOML, one or several with names in a file, and their faults, one sentence each with key, value and fix."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -11,10 +9,10 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, shown, used_links
+from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, quotation, used_links
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link, coded_limits
 from rbdyn.base.faults import MethodError, Strict, read_toml, refuse, validated
-from rbdyn.properties.tolerances import LARGEST, positioned
+from rbdyn.properties.tolerances import LARGEST, position_limits
 
 
 def faults(chain: Chain) -> list[str]:
@@ -29,7 +27,7 @@ def faults(chain: Chain) -> list[str]:
     sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
     sentences += _reference_faults(chain) + _selective_faults(chain)
     sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
-    # The width that fixed links leave can only be computed for a chain that is otherwise sound.
+    # The room left by fixed links is defined only for a chain without other faults.
     try:
         return sentences or _room_faults(chain)
     except NoValueError as error:
@@ -39,9 +37,9 @@ def faults(chain: Chain) -> list[str]:
 def _used(links: list[Link]) -> set[str]:
     names: set[str] = set()
     for link in links:
-        # An expression that cannot be read may use any link.
+        # An invalid expression may use any link.
         unread = _sentence(partial(used_links, link)) is not None
-        names |= {each.name for each in links} if unread else set(used_links(link))
+        names |= {other.name for other in links} if unread else set(used_links(link))
     return names
 
 
@@ -70,7 +68,7 @@ def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
         (priceless, 'method = "cost" needs a curve; give cost = { b = ..., k = ... } or fix it'),
         (mean is not None and bare, f"mean_mm = {mean}: needs deviations; give upper_mm and lower_mm"),
         (mean is not None and shaped, f'mean_mm = {mean}: not for "{link.distribution}"; remove it'),
-        (twice, f'fit = "{link.fit}": says the deviations already; remove upper_mm and lower_mm, or the fit'),
+        (twice, f'fit = "{link.fit}": already sets the deviations; remove upper_mm and lower_mm, or the fit'),
     ]
     sentences = [sentence for bad, sentence in checks if bad]
     if link.fit is not None and (unknown := _sentence(lambda: coded_limits(link))):
@@ -79,13 +77,13 @@ def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
         lower, upper = coded_limits(link)
     if mean is not None and not (bare or half) and not lower <= mean <= upper:
         sentences.append(f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm")
-    if free and lettered and (outside := _sentence(lambda: positioned(link.nominal, link.position, 0.0))):
+    if free and lettered and (outside := _sentence(lambda: position_limits(link.nominal, link.position, 0.0))):
         sentences.append(f'position = "{link.position}": {outside}')
     return [f'link "{link.name}": {sentence}' for sentence in sentences]
 
 
 def _function_faults(link: Link) -> list[str]:
-    """Faults of a link that is a function: it takes nothing that only a dimension has."""
+    """Faults of a link that is a function, such as keys of a dimension."""
     kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
     sentences = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
     alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
@@ -94,21 +92,22 @@ def _function_faults(link: Link) -> list[str]:
     if rise and rise.lower_K > rise.upper_K:
         sentences.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
     if unread := _sentence(lambda: used_links(link)):
-        sentences.append(f"expression = {shown(link.expression or '')}: {unread}")
+        sentences.append(f"expression = {quotation(link.expression or '')}: {unread}")
     return [f'link "{link.name}": {sentence}' for sentence in sentences]
 
 
 def _reference_faults(chain: Chain) -> list[str]:
-    """Functions must use links that stand before them, and make sense with them."""
+    """Faults of functions: unknown links, later links, and links that do not fit the function."""
     sentences = []
     before: dict[str, Link] = {}
     for link in chain.link:
         if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
-            alien = [f'uses "{name}", which no link before it is called' for name in names if name not in before]
             sentences += [
-                f'link "{link.name}": {fault}; name one of {", ".join(before) or "those placed before it"}'
-                for fault in alien
+                f'link "{link.name}": uses "{name}", which is no link before it; name one of '
+                f"{', '.join(before) or 'those placed before it'}"
+                for name in names
+                if name not in before
             ]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
@@ -138,16 +137,17 @@ def _selective_faults(chain: Chain) -> list[str]:
 
 def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:
     if not free:
-        return ["link.fixed = true on every link: nothing is left to allocate; unfix at least one"]
+        return ["link.fixed = true on every link: no tolerance is left to allocate; unfix at least one link"]
     adjust = chain.allocate.adjust
     if adjust is not None and adjust not in free:
-        kind = "is fixed" if any(link.name == adjust for link in chain.link) else "is no link"
-        return [f'allocate.adjust = "{adjust}": {kind}; name one of {", ".join(free)}']
+        if any(link.name == adjust for link in chain.link):
+            return [f'allocate.adjust = "{adjust}": is fixed; name one of {", ".join(free)}']
+        return [f'allocate.adjust = "{adjust}": is no link; name one of {", ".join(free)}']
     return []
 
 
 def _room_faults(chain: Chain) -> list[str]:
-    """Fixed links, or the narrowest tolerances of cost curves, that leave no room within the limits."""
+    """Faults of fixed links, or of the narrowest tolerances of cost curves, that exceed the limits."""
     search, free = Allocation(chain), chain.free
     bare_widths = {link.name: 0.0 for link in free}
     if lost := _sentence(partial(search.parts, bare_widths)):
@@ -158,25 +158,30 @@ def _room_faults(chain: Chain) -> list[str]:
         share, target = search.sure_yield(bare), chain.allocate.target_yield
         if share < target:
             low, high = search.tails(bare)
-            what = f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}"
-            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, high - low)}"]
+            return [
+                f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or widen "
+                f"the limits to more than {_interval(limits, high - low)}"
+            ]
     else:
         low, high = interval(search.function, bare, chain.allocate.mode)
         consumed = high - low
         if consumed > SLACK and width <= consumed + SLACK:
-            what = f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm"
-            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"]
+            return [
+                f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm; narrow or "
+                f"unfix one, or widen the limits to more than {_interval(limits, consumed)}"
+            ]
     tight = _sentence(search.linear_rule)
     return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
 
 
-def _nearest(limits: ClosingLink, width: float) -> str:
+def _interval(limits: ClosingLink, width: float) -> str:
+    """Text of the limits with the same middle and another width."""
     middle = (limits.lower_mm + limits.upper_mm) / 2
-    return f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+    return f"{middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:
-    """The message of a MethodError, if one comes; one that names its link itself passes."""
+    """Message of a MethodError, None without one; a NoValueError, which names its link, passes on."""
     try:
         attempt()
     except NoValueError:
@@ -208,12 +213,12 @@ def chain_from(data: Mapping[str, Any], source: str) -> Chain:
 
 
 def is_several(path: Path | str) -> bool:
-    """Whether a TOML file holds several chains under names. Raises InputError where it cannot be read."""
+    """Whether a TOML file has several chains with names. Raises InputError where it cannot be read."""
     return "chain" in read_toml(path)
 
 
 def read_chains(path: Path | str) -> dict[str, Chain]:
-    """Read the chains of a TOML file by name; a file that is one chain gives it the name of the file.
+    """The chains of a TOML file by name; a single chain has the name of the file.
 
     Raises InputError with the faults of all chains at once.
     """

@@ -1,10 +1,7 @@
-"""Emulators of noisy simulations: a trend plus a Gaussian process, in numpy alone; knows no bearing.
+"""Emulators of noisy simulations: a trend plus a Gaussian process, fitted by scikit-learn; knows no bearing.
 
-- ``covariance``: the Matern correlation with its derivatives, and random functions that have it
-- ``likelihood``: the restricted likelihood of the hyperparameters with its gradient
-- ``emulator``: fit, prediction, leave-one-out, draws of whole functions
-- ``scatter``: variances of few replicates, smoothed over the inputs
+- ``emulator``: fit, prediction, leave-one-out, random functions of the posterior; variances of few replicates, pooled
+- ``regression``: kernels, prior and search of the hyperparameters; the only module that loads scikit-learn
 """
 
-from doe.emulator.emulator import Draws, Emulator, fit_emulator
-from doe.emulator.scatter import pooled_variances
+from doe.emulator.emulator import Draws, Emulator, Hyperparameters, fit_emulator, leave_one_out, pooled_variances

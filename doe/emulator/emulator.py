@@ -1,129 +1,182 @@
-"""A noisy simulation as a trend plus a Gaussian process, with variances of the runs that are known.
+"""A noisy simulation as a trend plus a Gaussian process, with known variances of the runs.
 
-y = h(x)' b + Z(x) + e: the trend h is a polynomial with a flat prior on its coefficients, Z has a Matern correlation of
-smoothness 5/2 with a length a factor, and the variance of e is what the replicates of a run tell plus one nugget, for
-replicates miss what they share. Hyperparameters are those of the largest restricted likelihood under a weak prior of the lengths.
+y = m + h(x)'b + Z(x) + e. The level m has a wide normal prior about the mean of the runs. The coefficients b of the
+polynomial trend have a normal prior: together they have the kernel v (1 + x'y)^d. Z has a Matern correlation of smoothness 5/2
+with a length scale an input. The variance of e is that of the run's mean by its replicates, plus one nugget, as replicates
+do not show what they share. Hyperparameters are the mode of their posterior under weak priors, in ``regression``.
 
-Sources: Santner, Williams and Notz, The Design and Analysis of Computer Experiments, chapter 3; Dubrule, Cross validation
-of kriging in a unique neighborhood (1983); Wilson et al., Pathwise conditioning of Gaussian processes (2021).
+Sources: Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), sections 2.7, 4.2 and 5.4; Sundararajan and
+Keerthi, Predictive approaches for choosing hyperparameters in Gaussian processes, Neural Computation 13 (2001), for
+leave-one-out; Wilson et al., Pathwise conditioning of Gaussian processes, J. Machine Learning Research 22 (2021), and Rahimi
+and Recht, Random features for large-scale kernel machines (2007), for draws.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize
+from scipy import special
+from scipy.linalg import lapack
 
-from doe.designs.model import model_matrix, model_terms
-from doe.emulator.covariance import Features, correlation, random_features, squares
-from doe.emulator.likelihood import (
-    Hyperparameters,
-    Solved,
-    back_substituted,
-    covariance_of,
-    forward_substituted,
-    loss,
-    of_logarithms,
-    solved,
-)
+from doe.designs.model import model_matrix, model_terms, term_powers
 from doe.threads import one_thread
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import MethodError
 
-Trend = Literal["none", "constant", "linear", "quadratic"]
+if TYPE_CHECKING:
+    from sklearn.gaussian_process import GaussianProcessRegressor
 
-# Bounds of lengths in units of the points' half range, of variances in units of that of the values about their trend.
-LENGTHS, VARIANCES, NUGGETS = (0.1, 50.0), (1e-3, 1e4), (1e-8, 1.0)
-# Prior of the logarithm of a length in half ranges: mean, to which half the logarithm of the number of factors is added, and
-# deviation. Weak, it keeps few runs from lengths that forget between neighbours. Source: Hvarfner, Hellsten and Nardi (2024).
+Trend = Literal["none", "constant", "linear", "quadratic"]
+DEGREES: dict[Trend, int] = {"none": 0, "constant": 0, "linear": 1, "quadratic": 2}
+# Prior of the logarithm of a length scale in half ranges: mean, to which half the logarithm of the number of inputs is added,
+# and deviation. Weak, it keeps few runs from lengths that forget between neighbours. Source: Hvarfner, Hellsten and Nardi (2024).
 PRIOR = (2.0**0.5 + 0.6931, 3.0**0.5)
-# Starts of the search: lengths in half ranges and variances as above. One alone lost 1 to 2 fits in 8 on Ishigami's function.
-STARTS = ((1.0, 1.0, 1e-3), (0.4, 1.0, 1e-5), (4.0, 10.0, 1e-2))
-# The search costs the cube of the runs: of more than so many, every third, fourth, ... tells the hyperparameters.
+# The search costs the cube of the runs: of more than so many it takes every second, third, ...
 MOST_SEARCHED = 200
 FEATURES = 512
-ENOUGH = {"ftol": 1e-7, "maxiter": 100}  # of a logarithm of the likelihood
+FREEDOM = 5  # of Student's distribution that is the spectral density of the Matern correlation 5/2
+
+
+class Hyperparameters(NamedTuple):
+    """Length scales (k,) in units of the points; variances of the process, of the nugget, of the trend's coefficients and of
+    the level."""
+
+    lengths: Array
+    variance: float
+    nugget: float
+    trend: float
+    level: float
 
 
 @dataclass(frozen=True, eq=False)
 class Emulator:
     """A fitted emulator of one response.
 
-    ``points`` (n, k), ``values`` (n,) and known ``variances`` (n,) of the runs; ``terms`` of the trend; hyperparameters;
-    ``restricted_likelihood`` is its logarithm, of the runs that were searched.
+    ``points`` (n, k), ``values`` (n,) and known ``variances`` (n,) of the runs; the trend has the ``degree`` 0 to 2 in the first
+    ``columns`` coordinates; ``middle``: mean of the runs; ``likelihood``: logarithm of that of the hyperparameters;
+    ``regressor``: scikit-learn's, of the values about their middle.
     """
 
     points: Array
     values: Array
     variances: Array
-    terms: tuple[str, ...]
+    degree: int
+    columns: int
+    middle: float
     hyperparameters: Hyperparameters
-    restricted_likelihood: float
-    solution: Solved
+    likelihood: float
+    regressor: GaussianProcessRegressor
 
     @one_thread
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Mean and standard deviation (n,) of the response without scatter at points (n, k)."""
-        columns, across = self._beside(np.asarray(points, float))
-        inside, left = self._explained(columns, across)
-        variance = self.hyperparameters.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
-        return columns @ self.solution.coefficients + across @ self.solution.weights, np.sqrt(variance.clip(0.0))
+        places = np.asarray(points, float)
+        across = self.prior(places, self.points)
+        variance = self.regressor.kernel_.diag(places) - (self._explained(across) ** 2).sum(axis=0)
+        return self.middle + across @ self.weights, np.sqrt(variance.clip(0.0))
 
     @one_thread
     def mean(self, points: ArrayLike) -> Array:
         """Mean (n,) of the response at points (n, k), for a fraction of the time of ``predict``."""
-        columns, across = self._beside(np.asarray(points, float))
-        return np.asarray(columns @ self.solution.coefficients + across @ self.solution.weights)
+        return np.asarray(self.middle + self.prior(np.asarray(points, float), self.points) @ self.weights)
 
     @one_thread
     def covariance(self, points: ArrayLike, other: ArrayLike) -> Array:
         """Covariance (n, m) of the uncertainty of the response at points (n, k) and (m, k)."""
-        first, second, given = np.asarray(points, float), np.asarray(other, float), self.hyperparameters
-        (inside, left), (inside_other, left_other) = (self._explained(*self._beside(at)) for at in (first, second))
-        between = given.variance * correlation(first, second, given.lengths)
-        return between - inside.T @ inside_other + left.T @ left_other
-
-    def _beside(self, points: Array) -> tuple[Array, Array]:
-        """Trend columns (n, p) at points (n, k), and covariances (n, runs) with the runs."""
-        given = self.hyperparameters
-        return model_matrix(points, self.terms), given.variance * correlation(points, self.points, given.lengths)
-
-    def _explained(self, columns: Array, across: Array) -> tuple[Array, Array]:
-        """What the runs explain (n, m) and what the trend leaves open (p, m) at m points, as square roots."""
-        inside = forward_substituted(self.solution.factor, across.T)
-        left = np.linalg.solve(self.solution.root.T, (columns - inside.T @ self.solution.trend).T)
-        return inside, np.asarray(left)
+        first, second = np.asarray(points, float), np.asarray(other, float)
+        explained, explained_other = (self._explained(self.prior(part, self.points)) for part in (first, second))
+        return self.prior(first, second) - explained.T @ explained_other
 
     @one_thread
     def leave_one_out(self) -> tuple[Array, Array]:
         """What the others predict of every run: mean and standard deviation (n,), its own scatter included."""
-        projection = self.solution.projection
-        variance = 1.0 / np.diag(projection)
-        return self.values - variance * (projection @ self.values), np.sqrt(variance)
+        residuals, variances = leave_one_out(self.regressor.L_, self.weights)
+        return self.values - residuals, np.sqrt(variances)
 
     def q2(self) -> float:
         """Share of the values' variance that the other runs predict."""
-        missed = self.values - self.leave_one_out()[0]
-        return 1.0 - float((missed**2).sum() / ((self.values - self.values.mean()) ** 2).sum())
+        residuals = self.values - self.leave_one_out()[0]
+        return 1.0 - float((residuals**2).sum() / ((self.values - self.values.mean()) ** 2).sum())
 
     @one_thread
-    def draw(self, count: int, random: np.random.Generator) -> "Draws":
-        """Functions that the runs might as well have come from, ``count`` of them."""
-        given = self.hyperparameters
-        features = random_features(given.lengths, FEATURES, random)
-        loads = np.sqrt(given.variance) * random.standard_normal((FEATURES, count))
-        noise = np.sqrt(self.variances + given.nugget)[:, None] * random.standard_normal((len(self.points), count))
-        left = self.values[:, None] - features(self.points) @ loads - noise
-        inside = forward_substituted(self.solution.factor, left)
-        coefficients = np.asarray(np.linalg.lstsq(self.solution.trend, inside, rcond=None)[0], float)
-        weights = back_substituted(self.solution.factor, inside - self.solution.trend @ coefficients)
-        return Draws(self, features, loads, coefficients, weights)
+    def draw(self, count: int, random: np.random.Generator) -> Draws:
+        """Random functions of the posterior, ``count`` of them."""
+        features = random_features(self.hyperparameters.lengths, FEATURES, random)
+        loads = np.sqrt(self.hyperparameters.variance) * random.standard_normal((FEATURES, count))
+        coefficients = np.sqrt(self.term_variances)[:, None] * random.standard_normal((len(self.terms), count))
+        noise = np.sqrt(self.noise)[:, None] * random.standard_normal((len(self.points), count))
+        prior = features(self.points) @ loads + model_matrix(self.points, self.terms) @ coefficients
+        residuals = (self.values - self.middle)[:, None] - prior - noise
+        return Draws(self, features, loads, coefficients, lapack.dpotrs(self.regressor.L_, residuals, lower=True)[0])
+
+    def prior(self, points: Array, other: Array) -> Array:
+        """Prior covariance (n, m) of the response at points (n, k) and (m, k)."""
+        return np.asarray(self.regressor.kernel_(points, other))
+
+    @property
+    def weights(self) -> Array:
+        """Weights (n,) of the prior covariances with the runs in the mean."""
+        return np.asarray(self.regressor.alpha_)
+
+    @property
+    def noise(self) -> Array:
+        """Variances (n,) of the runs about the response."""
+        return self.variances + self.hyperparameters.nugget
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """Terms of the trend, the level included."""
+        level = ("1",) if self.hyperparameters.level > 0.0 else ()
+        return (level, model_terms(self.columns, "linear"), model_terms(self.columns, "quadratic"))[self.degree]
+
+    @cached_property
+    def term_variances(self) -> Array:
+        """Prior variances (p,) of the coefficients of the terms: the kernel of the trend is their sum over products of terms."""
+        powers = term_powers(self.terms, self.columns)
+        constant = powers.sum(axis=1) == 0
+        # The square of 1 + x'y has every product of two different of its parts twice.
+        twice = (self.degree == 2) & (powers.max(axis=1, initial=0) == 1)
+        trend = self.hyperparameters.trend if self.degree else 0.0
+        return trend * np.where(twice, 2.0, 1.0) + self.hyperparameters.level * constant
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Mean coefficients (p,) of the terms, the middle in the constant."""
+        middle = self.middle * (np.array(self.terms) == "1")
+        return middle + self.term_variances * (model_matrix(self.points, self.terms).T @ self.weights)
+
+    def _explained(self, across: Array) -> Array:
+        """What the runs explain (n, m), as a square root, by prior covariances (m, n) with them. LAPACK itself: SciPy's checks
+        take longer than matrices as small as these."""
+        return np.asarray(lapack.dtrtrs(self.regressor.L_, across.T, lower=True)[0])
+
+
+class Features(NamedTuple):
+    """Cosines of random frequencies (k, f) and phases (f,): weighted by standard normals, a random function of variance 1."""
+
+    frequencies: Array
+    phases: Array
+
+    def __call__(self, points: Array) -> Array:
+        """Values (n, f) at points (n, k)."""
+        return np.sqrt(2.0 / self.phases.size) * np.cos(points @ self.frequencies + self.phases)
+
+
+def random_features(lengths: Array, count: int, random: np.random.Generator) -> Features:
+    """Features whose correlation is the Matern one on average."""
+    normal = random.standard_normal((lengths.size, count)) / lengths[:, None]
+    return Features(
+        normal * np.sqrt(FREEDOM / random.chisquare(FREEDOM, count)), random.uniform(0.0, 2.0 * np.pi, count)
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Functions drawn from an emulator: the prior's, moved by what it takes to pass the runs."""
+    """Random functions of an emulator's posterior: those of the prior, moved by what it takes to pass the runs."""
 
     emulator: Emulator
     features: Features
@@ -134,10 +187,9 @@ class Draws:
     @one_thread
     def __call__(self, points: ArrayLike) -> Array:
         """Values (s, n) at points (n, k)."""
-        at, given = np.asarray(points, float), self.emulator.hyperparameters
-        across = given.variance * correlation(at, self.emulator.points, given.lengths)
-        trend = model_matrix(at, self.emulator.terms) @ self.coefficients
-        return (trend + self.features(at) @ self.loads + across @ self.weights).T
+        places, emulator = np.asarray(points, float), self.emulator
+        prior = model_matrix(places, emulator.terms) @ self.coefficients + self.features(places) @ self.loads
+        return (emulator.middle + prior + emulator.prior(places, emulator.points) @ self.weights).T
 
 
 @one_thread
@@ -154,74 +206,65 @@ def fit_emulator(
 ) -> Emulator:
     """Fit an emulator to runs at points (n, k) with values (n,) and known variances (n,) of these.
 
-    The trend is the largest up to the one asked for with at most a term for two runs. ``start``: hyperparameters of nearly
-    the same runs, from which the search starts in the place of the last of its own starts; without ``search`` they stay as
-    they are. ``prior``: mean and deviation of the logarithm of a length in half ranges of one factor alone. ``trended``: the
-    first so many coordinates, all by default, are those of the trend. Raises MethodError for
-    numbers that are not finite, variances below 0 or fewer than two runs.
+    Points are in units in which the region has a size of about 1, as coded units or quantiles: the prior of the trend asks for
+    that. ``trend``: "none" (about 0), "constant", "linear" or "quadratic". ``start``: hyperparameters of nearly the same runs, from
+    which the search starts; without ``search`` they stay. ``prior``: mean and deviation of the logarithm of a length scale in
+    half ranges, of one input alone. ``trended``: the trend is in the first so many coordinates, in all by default.
+
+    Raises MethodError for numbers that are not finite, variances below 0 or fewer than two runs.
     """
-    at, y = np.asarray(points, float), np.asarray(values, float)
-    known = np.array(np.broadcast_to(np.asarray(variances, float), y.shape))
-    if at.ndim != 2 or y.shape != (len(at),) or len(at) < 2:
-        raise MethodError(f"emulator: points {at.shape} and values {y.shape}: give two runs at least, a value each")
-    if not (np.isfinite(at).all() and np.isfinite(y).all() and np.isfinite(known).all() and (known >= 0.0).all()):
+    from doe.emulator.regression import Trended, mode, regression
+
+    places, responses = np.asarray(points, float), np.asarray(values, float)
+    noise = np.array(np.broadcast_to(np.asarray(variances, float), responses.shape))
+    if places.ndim != 2 or responses.shape != (len(places),) or len(places) < 2:
+        raise MethodError(
+            f"emulator: points {places.shape} and values {responses.shape}: give two runs at least, a value each"
+        )
+    if not (all(np.isfinite(part).all() for part in (places, responses, noise)) and (noise >= 0.0).all()):
         raise MethodError(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; fix it"
         )
-    terms = _terms(trend, len(at), at.shape[1] if trended is None else trended)
-    fitted = start
-    if search or fitted is None:
-        rows = slice(None, None, -(-len(at) // MOST_SEARCHED))
-        fitted = _search(at[rows], y[rows], known[rows], terms, start, prior)
-    columns = model_matrix(at, terms)
-    rest = solved(covariance_of(at, known, fitted), columns, y)
-    likelihood = -loss(fitted.logarithms, squares(at, at), columns, y, known)[0]
-    return Emulator(at, y, known, terms, fitted, likelihood, rest)
+    middle = 0.0 if trend == "none" else float(responses.mean())
+    form = DEGREES[trend], places.shape[1] if trended is None else trended
+    hyperparameters, about = start, responses - middle
+    if search or hyperparameters is None:
+        rows = slice(None, None, -(-len(places) // MOST_SEARCHED))
+        runs = places[rows], about[rows], noise[rows]
+        warm = None if start is None else Trended(*start, *form)
+        kernel = mode(*runs, *form, prior, warm, level=trend != "none")
+        hyperparameters = Hyperparameters(kernel.lengths, kernel.variance, kernel.nugget, kernel.trend, kernel.level)
+    regressor = regression(Trended(*hyperparameters, *form), places, about, noise)
+    likelihood = float(regressor.log_marginal_likelihood_value_)
+    return Emulator(places, responses, noise, *form, middle, hyperparameters, likelihood, regressor)
 
 
-def _terms(trend: Trend, runs: int, factors: int) -> tuple[str, ...]:
-    kinds = {
-        "quadratic": model_terms(factors, "quadratic"),
-        "linear": model_terms(factors, "linear"),
-        "constant": ("1",),
-        "none": (),
-    }
-    smaller = list(kinds)[list(kinds).index(trend) :]
-    return kinds[next(each for each in smaller if len(kinds[each]) <= max(runs // 2, 1))]
+def leave_one_out(factor: Array, weights: Array) -> tuple[Array, Array]:
+    """Residuals (n,) of runs to what the others predict of each, and the variances (n,) of these, its own scatter included.
+
+    ``factor`` (n, n): lower Cholesky factor of the covariance of the runs; ``weights`` (n,): its inverse times the values.
+    """
+    variances = 1.0 / np.diag(lapack.dpotri(factor, lower=True)[0])
+    return weights * variances, variances
 
 
-def _search(
-    points: Array,
-    values: Array,
-    variances: Array,
-    terms: tuple[str, ...],
-    start: Hyperparameters | None,
-    prior: tuple[float, float],
-) -> Hyperparameters:
-    """The hyperparameters of the largest restricted likelihood from every start."""
-    columns = model_matrix(points, terms)
-    left = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0] if terms else values
-    unit = float(left @ left) / max(len(values) - len(terms), 1) or float(np.var(values)) or 1.0
-    half = 0.5 * np.ptp(points, axis=0)
-    half = np.where(half > 0.0, half, 1.0)
-    scale = np.log([*half, unit, unit])
-    ends = np.log([LENGTHS] * half.size + [VARIANCES, NUGGETS]) + scale[:, None]
-    firsts = [np.log([*[length] * half.size, variance, nugget]) + scale for length, variance, nugget in STARTS]
-    if start is not None:
-        firsts[-1] = start.logarithms.clip(*ends.T)
-    along = squares(points, points)
-    centre = prior[0] + 0.5 * np.log(half.size) + np.log(half)
+def pooled_variances(points: Array, variances: Array, freedom: Whole, new: Array | None = None) -> Array:
+    """Variances (n,) of single replicates at points (n, k) as a log-linear function of the inputs, at ``new`` points where given.
 
-    def penalised(logarithms: Array) -> tuple[float, Array]:
-        value, slope = loss(logarithms, along, columns, values, variances)
-        off = (logarithms[:-2] - centre) / prior[1] ** 2
-        return value + 0.5 * prior[1] ** 2 * float(off @ off), slope + np.concatenate([off, [0.0, 0.0]])
+    ``freedom`` (n,): degrees of freedom of each (0: no estimate). The logarithm of an estimate lies below that of the truth by
+    psi(f/2) - log(f/2) on average and scatters by the root of psi'(f/2). The first is taken off, the second weighs the runs.
+    Zero where no run has an estimate.
 
-    best = min(
-        (
-            optimize.minimize(penalised, first, method="L-BFGS-B", jac=True, bounds=ends, options=ENOUGH)
-            for first in firsts
-        ),
-        key=lambda each: each.fun,
-    )
-    return of_logarithms(best.x)
+    Source: Bartlett and Kendall, The statistical analysis of variance-heterogeneity (1946).
+    """
+    places = points if new is None else new
+    estimated = np.isfinite(variances) & (variances > 0.0) & (freedom > 0)
+    if not estimated.any():
+        return np.zeros(len(places))
+    half = 0.5 * freedom[estimated]
+    logarithms = np.log(variances[estimated]) - special.digamma(half) + np.log(half)
+    weight = 1.0 / np.sqrt(special.polygamma(1, half))
+    # Runs fewer than twice the coefficients of a plane give one level only.
+    plane = estimated.sum() >= 2 * (points.shape[1] + 1)
+    columns, rows = (np.column_stack([np.ones(len(x)), *([x] if plane else [])]) for x in (points[estimated], places))
+    return np.exp(rows @ np.linalg.lstsq(columns * weight[:, None], logarithms * weight, rcond=None)[0])

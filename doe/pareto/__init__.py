@@ -1,11 +1,10 @@
 """Pareto fronts: search, picks, errors.
 
-- ``goals``: costs of responses, and which point of a front to pick
-- ``search``: what dominates what, how good a front is, and the search among cheap responses; ``front``: the front found, and what
-  the surfaces' errors make of it and of a gain
-- ``manufacture``: what tolerances leave of a point, and the front of that
-- ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
-- ``simulated``, ``simulated_tolerance``: a front run on the simulator, and what manufacture leaves of its points
+- ``search``: dominance, hypervolume, archive, and NSGA-II on cheap responses
+- ``goals``: costs of responses, and the rules that pick a point of a front
+- ``front``: fronts of fitted surfaces with the effect of their errors, and fronts of simulated points
+- ``manufacture``: responses of parts within tolerances, robust costs, and their front
+- ``tolerance``: the widest tolerances that keep the gains of a pick, and the tolerances of a simulated front
 """
 
 from doe.pareto.front import ParetoFront, front

@@ -1,10 +1,10 @@
-"""The front of cheap responses, its picks, its hypervolume, and what the errors of fitted surfaces make of them.
+"""Pareto fronts of cheap responses, with their picks and the effect of surface errors, and fronts of simulated points.
 
-Responses stay in their own units; the search minimises the costs that their goals make of them.
+``front`` finds a ``ParetoFront``. Responses keep their units; the search minimises the costs of their goals. The coefficients
+of a least-squares surface follow a multivariate t distribution about their estimates. One draw of them is a surface that
+the runs support as well. All points of a drawn surface share its error, and so does the difference of two points.
 
-Coefficients of a least-squares surface follow a multivariate t distribution about their estimates. One draw of them
-is one surface that the runs might as well have come from; all points on it share its error, and so does a difference
-of two points.
+The figures of a ``SimulatedFront`` are those of fresh runs, which had no part in the selection of its points.
 
 Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
 """
@@ -12,26 +12,28 @@ Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
 import math
 from dataclasses import dataclass
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import special
 
-from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinned
+from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, hypervolume, search
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 
-SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
+SELECTIONS = 300  # draws on which the rule picks anew, so many that their error is below that of the gain
 
 
 @dataclass(frozen=True, eq=False)
 class FrontUncertainty:
-    """How sure a front is.
+    """Uncertainty of a front.
 
-    ``non_dominated`` (f,): probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
-    pick dominates the baseline. Probabilities carry their Monte Carlo standard errors. ``optimism`` (q,): by how much
-    the rule promises too large a gain of each cost, because it picks what the errors flatter.
+    ``non_dominated`` (f,): probability that no other front point dominates a point. ``pick_dominates``: probability that the
+    pick dominates the baseline, with its Monte Carlo standard error. ``optimism`` (q,): excess of the predicted gain of each
+    cost, because the rule prefers points with favourable errors.
     """
 
     non_dominated: Array
@@ -55,9 +57,9 @@ def draw_coefficients(
 
 
 def share(hits: Mask) -> tuple[Array, Array]:
-    """Share of the draws (d, ...) that hit and its Monte Carlo standard error.
+    """Share of hits among the draws (d, ...) and its Monte Carlo standard error.
 
-    The error is that of the share with one hit and one miss more, lest a few hundred hits of as many pass for sure.
+    The error counts one additional hit and miss, so that hits in all draws do not count as certain.
     """
     count = len(hits)
     mean = hits.mean(axis=0)
@@ -66,65 +68,64 @@ def share(hits: Mask) -> tuple[Array, Array]:
 
 
 def non_dominated_share(costs: Array) -> Array:
-    """Probability (f,) that a point is dominated by no other, from drawn costs (d, f, q)."""
+    """Probability (f,) that no other point dominates a point, from costs (d, f, q) of many draws."""
     from pymoo.util.nds.non_dominated_sorting import find_non_dominated
 
     undominated = np.zeros(costs.shape[:2], dtype=bool)
-    for row, drawn in zip(undominated, costs, strict=True):
-        row[find_non_dominated(drawn)] = True
+    for row, draw in zip(undominated, costs, strict=True):
+        row[find_non_dominated(draw)] = True
     return undominated.mean(axis=0)
 
 
 def front_uncertainty(
-    drawn: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
+    responses: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
 ) -> FrontUncertainty:
-    """How sure a front is, from drawn responses.
+    """Uncertainty of a front, from responses on drawn surfaces.
 
-    drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
-    goals : what is wanted of the responses.
+    responses : (d, f, m) of the front's points on each drawn set of surfaces.
+    goals : of the responses.
     values : responses (f, m) on the fitted surfaces.
-    pick, rule : row of the pick and the rule that made it.
+    pick, rule : row of the pick and its rule.
     baseline, original : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones.
     """
-    costs, base = goals.costs(drawn), goals.costs(baseline)
+    costs, base = goals.costs(responses), goals.costs(baseline)
     wins, error = share(dominates(costs[:, pick], base))
     real = goals.costs(original) - goals.costs(values)
     optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     sure = float(wins), float(error)
-    return FrontUncertainty(non_dominated_share(costs), *sure, optimism, len(drawn))
+    return FrontUncertainty(non_dominated_share(costs), *sure, optimism, len(responses))
 
 
 def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:
-    """Mean excess (q,) of the gain that a rule promises at its pick over the gain that is there.
+    """Mean excess (q,) of the predicted gain at a rule's pick over the real gain, by parametric bootstrap.
 
-    With the fitted surfaces in the place of the truth and drawn ones in that of the fit (parametric bootstrap):
-    ``costs`` (d, f, q) and ``baseline`` (d, q) are drawn, ``real`` (f, q) are the gains on the fitted surfaces.
+    The fitted surfaces represent the truth and drawn ones the fit: ``costs`` (d, f, q) and ``baseline`` (d, q) are of draws,
+    ``real`` (f, q) are the gains on the fitted surfaces.
     """
     excess = []
-    for drawn, base in zip(costs, baseline, strict=True):
-        row = pick_all(drawn, goals, base)[0][rule]
-        excess.append(base - drawn[row] - real[row])
+    for draw, base in zip(costs, baseline, strict=True):
+        row = pick_all(draw, goals, base)[0][rule]
+        excess.append(base - draw[row] - real[row])
     return np.mean(excess, axis=0)
 
 
 def contrast_error(jacobian: Array, covariance: Array) -> float:
-    """Standard error of a difference of predictions: ``jacobian`` (p,) is the difference of their derivatives
-    by the coefficients, ``covariance`` (p, p) that of the coefficients. The error that both share cancels.
+    """Standard error of a difference of predictions, in which their common error cancels.
+
+    ``jacobian`` (p,): difference of their derivatives by the coefficients. ``covariance`` (p, p): of the coefficients.
     """
     return math.sqrt(max(float(jacobian @ covariance @ jacobian), 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class ParetoFront:
-    """Non-dominated points of every point evaluated, in ascending order of the first cost.
+    """Non-dominated points of all evaluated points, in ascending order of the first cost.
 
-    ``points`` (f, k) in the factors' units; ``values`` (f, m) in the responses' units, watched ones too, and
-    ``costs`` (f, q) what their goals make of them. ``ideal`` and ``nadir`` (q,) are the best and worst of each cost on
-    the front; ``knee``, ``pick`` and ``picks`` (the pick of every rule) are row numbers. ``archive_size`` counts the
-    front before thinning and ``hypervolume`` is of that front; ``hypervolume_history`` (generations,) is on the same
-    scale. ``baseline_values`` (m,) are None without a baseline. ``feasible`` is the share
-    of the evaluated points that keep all limits. ``uncertainty`` and ``tolerance_aware``
-    are None where they were not asked for.
+    ``points`` (f, k) in the factors' units; ``values`` (f, m) of all responses in their units, ``costs`` (f, q) by their goals.
+    ``ideal``, ``nadir`` (q,): best and worst of each cost on the front. ``knee``, ``pick`` and ``picks`` (by rule) are row
+    numbers. ``archive_size``: number of points before thinning, with their ``hypervolume``; ``hypervolume_history``
+    (generations,) has the same scale. ``baseline_values`` (m,): None without a baseline. ``feasible``: share of the evaluated
+    points that keep all limits. ``uncertainty`` and ``tolerance_aware``: None unless computed.
     """
 
     points: Array
@@ -167,16 +168,16 @@ def front(
 
     objectives : maps points (n, k) to responses (n, m), at least two of them with a goal.
     lower, upper : bounds of the factors, shape (k,).
-    goals : what is wanted of the responses; all to be minimised without it.
+    goals : of the responses; by default all are minimised.
     population, generations, seed : of NSGA-II.
-    baseline : a point (k,) to improve on. Picks are then among those front points that dominate it.
-    keep : about how many points to return. A larger front is thinned to evenly spread points, among them
-        the best and worst of each cost, the knee and the picks.
-    pick : rule that makes the pick.
-    doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
+    baseline : a point (k,) to improve on. Picks are then among the front points that dominate it.
+    keep : approximate number of points to return. A larger front is thinned to evenly spread points, with the best and
+        worst of each cost, the knee and the picks.
+    pick : rule of the pick.
+    doubt : maps points (n, k) to the errors of their responses downwards and upwards (n, m), within which limits must hold.
 
-    Raises MethodError when the bounds are not a box, a setting is out of range, or an objective is not finite;
-    InfeasibleError when no point evaluated keeps all limits.
+    Raises MethodError when the bounds are no box, a setting is out of range, or an objective is not finite; InfeasibleError
+    when no evaluated point keeps all limits.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     check_search(low, high, population, generations, keep)
@@ -190,13 +191,13 @@ def front(
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
     best = int(knee_depth(costs).argmax())
-    rows, picks, among = thinned(costs, goals, baseline_costs, keep, [best])
+    rows, picks, among = thinning(costs, goals, baseline_costs, keep, [best])
     return ParetoFront(
         points=points[rows],
         values=_values(objectives, points[rows]),
         costs=costs[rows],
         hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in searched.archives]),
+        hypervolume_history=np.array([hypervolume(archive.costs, ideal, nadir) for archive in searched.archives]),
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(rows, best)),
@@ -220,14 +221,89 @@ def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: A
 
 
 def _values(objectives: Objectives, points: Array) -> Array:
-    """Responses (n, m) of points. Raises MethodError unless they are finite, a row a point, two or more in a row."""
+    """Responses (n, m) of points. Raises MethodError unless they are finite, one row a point, with two or more columns."""
     values = np.asarray(objectives(points), float)
     if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
-        given = f"objectives gave shape {values.shape} for {len(points)} points"
-        raise MethodError(f"{given}; give one row a point and at least two objectives")
+        raise MethodError(
+            f"objectives gave shape {values.shape} for {len(points)} points; give one row a point and at least two objectives"
+        )
     bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         row, column = bad[0]
-        given = f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}"
-        raise MethodError(f"{given}; narrow the bounds or fix the objective")
+        raise MethodError(
+            f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}; narrow the bounds or fix the objective"
+        )
     return values
+
+
+DRAWS = 200  # of the noise in a hypervolume
+
+
+class Samples(NamedTuple):
+    """Points (n, k) run, their responses (n, m) and standard errors (n, m); rows of NaN where a run failed."""
+
+    points: Array
+    values: Array
+    errors: Array
+
+    @property
+    def failed(self) -> Mask:
+        """Whether each point's run failed, (n,)."""
+        return np.asarray(np.isnan(self.values).any(axis=1))
+
+    def rows(self, which: Any) -> "Samples":
+        """These samples alone."""
+        return Samples(*(part[which] for part in self))
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedFront:
+    """Front of a noisy simulator, in ascending order of the first cost at selection.
+
+    ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, with their ``costs`` and
+    ``cost_errors`` (f, q). The fresh runs had no part in the selection. ``optimism`` (q,): mean excess of these costs over
+    those of the search, in shares of their range. ``searched``: all runs of the search. ``pick``: a row. ``failures`` (x, k):
+    points with a failed run. ``freedom`` (f, m): degrees of freedom of the standard errors, by default infinite.
+    """
+
+    points: Array
+    values: Array
+    standard_errors: Array
+    costs: Array
+    cost_errors: Array
+    optimism: Array
+    pick: int
+    pick_reason: str
+    baseline_values: Array | None
+    repeats: int
+    failures: Array
+    evaluations: int
+    generations: int
+    seed: int
+    goals: Goals
+    searched: Samples
+    freedom: Array | None = None
+
+    def quantile(self, probability: float) -> Array:
+        """Student's quantile (f, m) of a probability, at the degrees of freedom of the standard errors."""
+        freedom = np.full_like(self.values, np.inf) if self.freedom is None else self.freedom
+        return np.asarray(special.stdtrit(freedom, probability))
+
+    @property
+    def half_widths(self) -> Array:
+        """95 % half-widths (f, m) of the values."""
+        return self.standard_errors * self.quantile(0.975)
+
+
+def noisy_hypervolume(
+    costs: Array, errors: Array, ideal: Array, nadir: Array, draws: int, seed: int = 1
+) -> tuple[float, float]:
+    """Hypervolume of means (n, q) with standard errors (n, q), and its standard error.
+
+    Noise raises a hypervolume, for favourable errors extend the front. Draws of the noise estimate this bias, which is
+    subtracted (parametric bootstrap: Efron and Tibshirani, An Introduction to the Bootstrap, section 10.6).
+    """
+    random = np.random.default_rng(seed)
+    believed = hypervolume(costs, ideal, nadir)
+    noisy = [hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)]
+    return 2.0 * believed - float(np.mean(noisy)), float(np.std(noisy, ddof=1))

@@ -18,7 +18,7 @@ from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
 
 Kind = Literal["min", "max", "target", "none"]
-# What stands for a wish that a response does not have.
+# Values of goals that a response does not have.
 BLANK: dict[str, Any] = {
     "target": np.nan, "lower": -np.inf, "upper": np.inf, "weight": 1.0, "desired": (np.nan, np.nan)
 }  # fmt: skip
@@ -28,9 +28,8 @@ BLANK: dict[str, Any] = {
 class Goals:
     """Goals of m responses.
 
-    ``kinds`` (m,); ``target`` (m,), NaN where there is none; ``lower`` and ``upper`` (m,), infinite where there
-    is no limit; ``weight`` (m,); ``desired`` (m, 2), where desirability starts to rise from 0 or reaches 1, NaN
-    where the front's own ideal and nadir shall stand for it.
+    ``kinds`` (m,); ``target`` (m,), NaN without one; ``lower`` and ``upper`` limits (m,), infinite without one; ``weight`` (m,).
+    ``desired`` (m, 2): responses of desirability 0 and 1, NaN for the nadir and the ideal of the front.
     """
 
     kinds: tuple[Kind, ...]
@@ -41,14 +40,14 @@ class Goals:
     desired: Array
 
     @classmethod
-    def of(cls, kinds: Sequence[Kind], **given: Sequence[Any]) -> Self:
-        """Goals of the ``kinds``; what else is ``given`` has None where a response has none.
+    def of(cls, kinds: Sequence[Kind], **wishes: Sequence[Any]) -> Self:
+        """Goals of the ``kinds``; columns of other ``wishes`` have None for a response without one.
 
         Raises MethodError for a target without its number or a lower limit that is not below the upper one.
         """
         columns = {key: [blank] * len(kinds) for key, blank in BLANK.items()}
-        for key, column in given.items():
-            columns[key] = [BLANK[key] if each is None else each for each in column]
+        for key, column in wishes.items():
+            columns[key] = [BLANK[key] if value is None else value for value in column]
         goals = cls(tuple(kinds), **{key: np.array(column, float) for key, column in columns.items()})
         for index, kind in enumerate(kinds):
             if kind == "target" and not np.isfinite(goals.target[index]):
@@ -65,8 +64,8 @@ class Goals:
     @property
     def cost_weight(self) -> Array:
         """Weights of the costs, (q,), summing to 1."""
-        chosen: Array = self.weight[self.objectives]
-        return chosen / chosen.sum()
+        weights: Array = self.weight[self.objectives]
+        return weights / weights.sum()
 
     @property
     def limited(self) -> list[tuple[int, str, float]]:
@@ -96,7 +95,7 @@ class Goals:
         return np.where(np.isnan(sign), toward, sign)
 
     def violations(self, low: Array, high: Array) -> Array:
-        """By how much responses from ``low`` to ``high`` (..., m) break each limit, (..., c); 0 if they do not."""
+        """Excess (..., c) of responses from ``low`` to ``high`` (..., m) over each limit, 0 within it."""
         below = [limit - low[..., i] for i, sense, limit in self.limited if sense == ">="]
         above = [high[..., i] - limit for i, sense, limit in self.limited if sense == "<="]
         if not below + above:
@@ -114,8 +113,8 @@ NAMES = {"knee": "the knee", "desirability": "the most desirable", "weights": "t
 def knee_depth(values: Array) -> Array:
     """Depth (n,) of front points (n, m) below the hyperplane through the best point of each objective.
 
-    The knee is the deepest point. Distances are in normalised objectives. Where the best points do not span
-    a plane that falls in every objective, the plane on which normalised objectives sum to 1 takes its place.
+    The knee is the deepest point. Distances are in normalised objectives. Where the best points span no plane that falls
+    in every objective, the plane of normalised objectives with sum 1 replaces it.
 
     Source: Das (1999).
     """
@@ -131,10 +130,9 @@ def knee_depth(values: Array) -> Array:
 def desirability(costs: Array, goals: Goals) -> Array:
     """Overall desirability (n,) of front points with costs (n, q), from 0 to 1.
 
-    Each response's desirability falls on a straight line from 1 at the better end of its ``desired`` to 0 at the
-    worse end; for a target it is 1 there and 0 at either end of ``desired``, which then counts by its nearer end.
-    Where ``desired`` is not given, the front's own ideal and nadir are the ends. The whole is the geometric mean
-    by the weights. Source: Derringer and Suich (1980).
+    The desirability of a response falls linearly from 1 at the better end of its ``desired`` range to 0 at the worse end.
+    For a target it falls from 1 at the target to 0 at the distance of the nearer end. Without ``desired`` the ends are the
+    ideal and the nadir of the front. The whole is the geometric mean by the weights. Source: Derringer and Suich (1980).
     """
     best, worst = costs.min(axis=0), costs.max(axis=0)
     for column, index in enumerate(goals.objectives):
@@ -143,8 +141,8 @@ def desirability(costs: Array, goals: Goals) -> Array:
             ends = {"min": (low, high), "max": (-high, -low)}
             reach = min(high - goals.target[index], goals.target[index] - low)
             best[column], worst[column] = ends.get(goals.kinds[index], (0.0, reach))
-    each = (1.0 - normalised(costs, best, worst)).clip(0.0, 1.0)
-    return np.prod(each**goals.cost_weight, axis=1)
+    scores = (1.0 - normalised(costs, best, worst)).clip(0.0, 1.0)
+    return np.prod(scores**goals.cost_weight, axis=1)
 
 
 def tchebycheff(costs: Array, weight: Array) -> Array:
@@ -161,38 +159,38 @@ def score(rule: Rule, costs: Array, goals: Goals) -> Array:
     if rule == "knee":
         return knee_depth(costs)
     if rule == "desirability":
-        # Where all are undesirable, the distance from the ideal point decides.
+        # Among points of desirability 0 the distance from the ideal point decides.
         return desirability(costs, goals) - 1e-9 * tchebycheff(costs, goals.cost_weight)
     return -tchebycheff(costs, goals.cost_weight)
 
 
-class Thinned(NamedTuple):
-    """A front thinned to ``rows`` (f,), the places among them of the pick of every rule, and what they were picked of."""
+class Thinning(NamedTuple):
+    """A front thinned to ``rows`` (f,), the place of every rule's pick among them, and the set of the picks in words."""
 
     rows: Rows
     picks: dict[Rule, int]
     among: str
 
 
-def thinned(costs: Array, goals: Goals, baseline: Array | None, keep: int, wanted: Sequence[int] = ()) -> Thinned:
-    """About ``keep`` evenly spread rows of costs (n, q), with the best and worst of each, the picks and the wanted."""
+def thinning(costs: Array, goals: Goals, baseline: Array | None, keep: int, required: Sequence[int] = ()) -> Thinning:
+    """About ``keep`` evenly spread rows of costs (n, q), with best and worst of each cost, picks and ``required`` rows."""
     picks, among = pick_all(costs, goals, baseline)
-    rows = spread(costs, keep, [*wanted, *picks.values()])
-    return Thinned(rows, {rule: int(np.searchsorted(rows, row)) for rule, row in picks.items()}, among)
+    rows = spread(costs, keep, [*required, *picks.values()])
+    return Thinning(rows, {rule: int(np.searchsorted(rows, row)) for rule, row in picks.items()}, among)
 
 
 def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[Rule, int], str]:
-    """The pick of every rule among the points that dominate the baseline, and among how many it was.
+    """The pick of every rule among the points that dominate the baseline, and the set of these points in words.
 
-    Without a baseline, or where no point dominates it, all points stand for election.
+    Without a baseline, or where no point dominates it, all points are candidates.
     """
     rows = np.arange(len(costs))
     if baseline is None:
-        among = "of the front, for no baseline is given"
+        among = "of the front, without a baseline"
     else:
         rows = np.flatnonzero(dominates(costs, baseline))
         among = f"among the {rows.size} of {len(costs)} front points that dominate the baseline"
         if rows.size == 0:
             rows = np.arange(len(costs))
-            among = "of the front, for no point of the front dominates the baseline"
+            among = "of the front; no point of the front dominates the baseline"
     return {rule: int(rows[score(rule, costs, goals)[rows].argmax()]) for rule in RULES}, among

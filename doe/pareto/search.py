@@ -1,9 +1,9 @@
-"""Search of Pareto fronts of cheap responses by NSGA-II: dominance, the archive of every evaluated point, and hypervolumes.
+"""Search of Pareto fronts of cheap responses by NSGA-II: dominance, the archive of all evaluated points, and hypervolumes.
 
-Responses stay in their own units; the search minimises the costs that their goals make of them. What breaks a limit
-gives way to what keeps it (constrained domination), and only the latter enters the archive. Costs are normalised to 0 at the ideal
-point and 1 at the nadir point, up to `REFERENCE` in a hypervolume. Between means that carry errors, one dominates another only
-where the noise cannot have made the difference.
+Responses keep their units; the search minimises the costs of their goals. Points that keep all limits dominate the others
+(constrained domination), and only they enter the archive. Costs are normalised to 0 at the ideal point and 1 at the nadir
+point, and a hypervolume counts up to `REFERENCE`. A mean with an error dominates another only if the difference exceeds the
+noise.
 
 Sources: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II (2002); Hughes, Evolutionary multi-objective
 ranking with uncertainty and noise (2001); Teich, Pareto-front exploration with uncertain objectives (2001).
@@ -50,7 +50,7 @@ class Archive(NamedTuple):
 
 
 def non_dominated(values: Array) -> Rows:
-    """Row numbers of the non-dominated of ``values`` (n, m), by ascending first objective, no repeats."""
+    """Row numbers of the distinct non-dominated ``values`` (n, m), by ascending first objective."""
     from pymoo.util.nds.non_dominated_sorting import find_non_dominated
 
     unique, rows = np.unique(values, axis=0, return_index=True)
@@ -65,15 +65,15 @@ def dominates(better: Array, worse: Array) -> Mask:
 
 
 def dominance(costs: Array) -> Mask:
-    """Whether row i of ``costs`` (n, q) dominates row j, taken at their word: (n, n)."""
+    """Whether row i of ``costs`` (n, q) dominates row j, (n, n), without regard to errors."""
     return dominates(costs[:, None], costs[None, :])
 
 
 def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mask:
     """Whether mean i dominates mean j beyond their errors: (n, n).
 
-    Row i of ``costs`` (n, q) must be smaller than row j in every cost, by more than the one-sided normal quantile of
-    ``confidence`` times the combined standard error of both (``errors`` (n, q)).
+    Row i of ``costs`` (n, q) must be below row j in every cost. The least difference is the one-sided normal quantile of
+    ``confidence`` times the combined standard error of both, ``errors`` (n, q).
     """
     difference = costs[None, :] - costs[:, None]
     combined = np.sqrt(errors[None, :] ** 2 + errors[:, None] ** 2)
@@ -81,14 +81,14 @@ def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mas
 
 
 def ranks(dominating: Mask) -> Rows:
-    """Front number (n,) of each row: 0 for those that none dominates, 1 for those that only these do, and so on."""
+    """Front number (n,) of each row: 0 for non-dominated rows, 1 for rows that only those dominate, and so on."""
     rank = np.full(len(dominating), -1, dtype=np.intp)
     dominators = dominating.sum(axis=0)
     level = 0
     while (rank < 0).any():
         front = (dominators == 0) & (rank < 0)
         if not front.any():
-            # Errors may make dominance run in circles; who is in one shares a front.
+            # With errors, dominance may be circular; all rows of a circle share a front.
             front = rank < 0
         rank[front] = level
         dominators = dominators - dominating[front].sum(axis=0)
@@ -97,7 +97,7 @@ def ranks(dominating: Mask) -> Rows:
 
 
 def order(costs: Array, errors: Array, confidence: float) -> Rows:
-    """Place (n,) of each row: by its front beyond errors, and within that by its front at its word."""
+    """Place (n,) of each row by its front beyond errors, and within that by its front without errors."""
     outer = ranks(error_aware_dominance(costs, errors, confidence))
     inner = np.empty_like(outer)
     for level in np.unique(outer):
@@ -107,32 +107,33 @@ def order(costs: Array, errors: Array, confidence: float) -> Rows:
     return places.reshape(-1)
 
 
-def merged(archive: Archive, new: Archive) -> Archive:
+def merge(archive: Archive, new: Archive) -> Archive:
     """Non-dominated points of both."""
     points, costs = np.vstack([archive.points, new.points]), np.vstack([archive.costs, new.costs])
     rows = non_dominated(costs)
     return Archive(points[rows], costs[rows])
 
 
-def spread(costs: Array, keep: int, wanted: Sequence[int] = ()) -> Rows:
-    """Rows of normalised costs (n, q) to keep, ascending: extremes and wanted first, then the row farthest from all."""
+def spread(costs: Array, keep: int, required: Sequence[int] = ()) -> Rows:
+    """``keep`` rows of costs (n, q), ascending: extremes and ``required`` rows, then always the row farthest from these."""
     if len(costs) <= keep:
         return np.arange(len(costs))
     scaled = normalised(costs, costs.min(axis=0), costs.max(axis=0))
-    chosen = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *wanted})
-    gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in chosen], axis=0)
-    while len(chosen) < keep:
-        chosen.append(int(gap.argmax()))
-        gap = np.minimum(gap, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
-    return np.sort(chosen)
+    rows = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *required})
+    gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in rows], axis=0)
+    while len(rows) < keep:
+        rows.append(int(gap.argmax()))
+        gap = np.minimum(gap, np.linalg.norm(scaled - scaled[rows[-1]], axis=1))
+    return np.sort(rows)
 
 
 def best_for_hypervolume(costs: Array, keep: int, seed: int = 1) -> Rows:
-    """Rows of costs (n, q), ascending, that together have nearly the largest hypervolume of all sets of so many.
+    """``keep`` rows of costs (n, q), ascending, that together have nearly the largest hypervolume.
 
-    One after the other, each that dominates most of the levels that are left: at least 1 - 1/e of the largest gain, and in
-    practice next to all of it (Guerreiro, Fonseca and Paquete, Greedy hypervolume subset selection in low dimensions, 2016).
-    Where no row dominates a level more, they are spread.
+    The greedy selection adds the row that dominates most of the remaining levels, until none dominates any; further rows
+    are evenly spread. It reaches at least 1 - 1/e of the largest gain, in practice nearly all of it.
+
+    Source: Guerreiro, Fonseca and Paquete, Greedy hypervolume subset selection in low dimensions (2016).
     """
     if len(costs) <= keep:
         return np.arange(len(costs))
@@ -141,38 +142,38 @@ def best_for_hypervolume(costs: Array, keep: int, seed: int = 1) -> Rows:
     below = np.ones((len(costs), len(levels)), dtype=bool)
     for column, level in zip(scaled.T, levels.T, strict=True):
         below &= column[:, None] <= level[None]
-    chosen: list[int] = []
-    gains, left = below.sum(axis=1), np.ones(len(levels), dtype=bool)
-    while len(chosen) < keep and gains.max() > 0:
-        # A gain only shrinks as others are chosen: that of the first is counted anew until it stays the first.
+    rows: list[int] = []
+    gains, open_levels = below.sum(axis=1), np.ones(len(levels), dtype=bool)
+    while len(rows) < keep and gains.max() > 0:
+        # Gains only shrink as rows are added: the first gain is recounted until it remains the first.
         row = int(gains.argmax())
-        now = int((below[row] & left).sum())
+        now = int((below[row] & open_levels).sum())
         if now == gains[row]:
-            chosen.append(row)
-            left &= ~below[row]
+            rows.append(row)
+            open_levels &= ~below[row]
             now = 0
         gains[row] = now
-    return spread(costs, keep, chosen)
+    return spread(costs, keep, rows)
 
 
 Objectives = Callable[[Array], Array]
-# How far below and above (n, m) what is predicted of points (n, k) their responses may be when limits are judged.
+# Errors downwards and upwards (n, m) of predicted responses at points (n, k), within which limits must hold.
 Doubt = Callable[[Array], tuple[Array, Array]]
 
 
 class Judged(NamedTuple):
-    """Costs (n, q) of points and by how much they break each limit (n, c)."""
+    """Costs (n, q) of points and their excess over each limit (n, c)."""
 
     costs: Array
     violations: Array
 
 
 Judge = Callable[[Array], Judged]
-History = list[tuple[Array, Judged]]  # points of each generation and what they are judged
+History = list[tuple[Array, Judged]]  # points of each generation, with their costs and violations
 
 
 class InfeasibleError(MethodError):
-    """No point keeps all limits. ``point`` comes closest and breaks limit c by ``violations`` (c,)."""
+    """No point keeps all limits; the closest ``point`` exceeds them by ``violations`` (c,)."""
 
     def __init__(self, point: Array, violations: Array) -> None:
         self.point, self.violations = point, violations
@@ -180,7 +181,7 @@ class InfeasibleError(MethodError):
 
 
 class Search(NamedTuple):
-    """Archive after every generation, number of evaluations and the share of them that keep all limits."""
+    """Archive after every generation, number of evaluations, and share of feasible ones."""
 
     archives: list[Archive]
     evaluations: int
@@ -190,7 +191,7 @@ class Search(NamedTuple):
 def search(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> Search:
     """NSGA-II over a box, with the archive of all evaluations after every generation.
 
-    Raises InfeasibleError when no point evaluated keeps all limits.
+    Raises InfeasibleError when no evaluated point keeps all limits.
     """
     history = _evolve(judge, low, high, population, generations, seed)
     allowed = [(judged.violations <= 0.0).all(axis=1) for _, judged in history]
@@ -201,7 +202,7 @@ def search(judge: Judge, low: Array, high: Array, population: int, generations: 
         closest = (violations / _scale(violations)).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
     good = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
-    archives = accumulate(good, merged, initial=Archive(*(part[:0] for part in good[0])))
+    archives = accumulate(good, merge, initial=Archive(*(part[:0] for part in good[0])))
     return Search(list(archives)[1:], count, sum(int(rows.sum()) for rows in allowed) / count)
 
 
@@ -211,15 +212,17 @@ def check_search(low: Array, high: Array, population: int, generations: int, kee
         raise MethodError("lower and upper bounds must be equally long lists of finite numbers")
     wrong = np.flatnonzero(low >= high)
     if wrong.size:
-        at = wrong[0]
-        raise MethodError(f"factor {at + 1}: lower bound {low[at]:g} must be below upper bound {high[at]:g}")
+        factor = wrong[0]
+        raise MethodError(
+            f"factor {factor + 1}: lower bound {low[factor]:g} must be below upper bound {high[factor]:g}"
+        )
     for name, value, least in (("population", population, 4), ("generations", generations, 1), ("keep", keep, 2)):
         if value < least:
             raise MethodError(f"{name} = {value}: must be at least {least}")
 
 
 def _scale(violations: Array) -> Array:
-    """The largest of violations (n, c), shares of which no unit outweighs; 1 where there is none."""
+    """Scale (c,) of violations (n, c), their largest values, to compare limits of different units; 1 without violations."""
     largest = violations.max(axis=0, initial=0.0)
     return np.where(largest > 0.0, largest, 1.0)
 
@@ -230,7 +233,7 @@ def _evolve(judge: Judge, low: Array, high: Array, population: int, generations:
     from pymoo.optimize import minimize
 
     history: History = []
-    # The scale of the violations is that of points all over the box.
+    # The scale of the violations comes from points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
     scale = _scale(sample.violations)
 

@@ -1,36 +1,56 @@
-"""Backwards from a pick: the widest tolerances of its factors within which parts keep what the pick promises."""
+"""The widest tolerances of a pick within which parts keep its gains, and the tolerances of a simulated front.
+
+``widest_tolerances`` widens the tolerances about a pick until the share of parts that keep all limits is at its target.
+
+A simulated front has no surface for parts about its points. ``simulated_aware`` takes their shape from surfaces. A local
+linear fit of the surfaces' errors at nearby runs corrects it (Cleveland, Robust locally weighted regression, 1979). The level is that of the fresh runs at the point. Parts may be outside the bounds of the search by the
+tolerance, where the same shape applies.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
-from doe.pareto.manufacture import Distribution, Interval, error_of_share, interval_of_share, percent, random_offsets
+from doe.pareto.goals import NAMES, Goals, Rule, pick_all
+from doe.pareto.manufacture import (
+    SURVIVAL_PARTS,
+    Distribution,
+    Interval,
+    Quadratic,
+    ToleranceBox,
+    error_of_share,
+    even_offsets,
+    interval_of_share,
+    percent,
+    random_offsets,
+)
+from doe.pareto.search import dominates, non_dominated
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
 
 Costs = Callable[[Array], Array]
-# Parts (n, k) to the number of them that keep all limits on each draw (d,) of what judges them.
-Kept = Callable[[Array], Array]
+# Number (d,) of the parts (n, k) that keep all limits, on each draw of the surfaces or emulators.
+PartCount = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
 
-MARCH = 32  # steps up to the rim of the region in which the first loss is looked for
+MARCH = 32  # steps up to the rim of the region in the search for the first loss
 HALVINGS = 24
 RIM = "the rim of the region"
-MOST_JUDGED = 4096  # parts that are judged on every draw
+MOST_JUDGED = 4096  # parts that are evaluated on every draw
 
 
 @dataclass(frozen=True, eq=False)
 class WidestTolerances:
-    """Half widths (k,) of the widest tolerances, NaN of what has none, and what they keep.
+    """Half widths (k,) of the widest tolerances, NaN for factors without one.
 
-    ``probability`` is the share of the parts that keep every limit, ``standard_error`` its Monte Carlo error alone;
-    ``interval`` holds the true share with 95 %, as far as what was drawn shows.
-    ``limited_by`` names the limit that parts break first beyond, or the rim of the region; ``at_rim`` (k,) the
-    factors that reach it. ``sentence`` says it in words.
+    ``probability``: share of the parts that keep every limit, with its Monte Carlo ``standard_error``. ``interval``: 95 %
+    interval of the true share, with the uncertainty of the draws. ``limited_by``: the limit that parts break first beyond
+    the tolerances, or the rim of the region. ``at_rim`` (k,): factors that reach the rim. ``sentence``: summary.
     """
 
     half_widths: Array
@@ -42,7 +62,7 @@ class WidestTolerances:
     sentence: str
 
     def as_dict(self, factors: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """JSON: factor to half width, probability with its error and interval, and what limits it."""
+        """JSON: half width, probability with its error and interval, and limiting goal, by factor."""
         sure: dict[str, Any] = {"probability": self.probability, "standard_error": self.standard_error}
         sure |= {"interval": list(self.interval)}
         return {
@@ -52,7 +72,7 @@ class WidestTolerances:
         }
 
     def among(self, factors: Rows, count: int) -> Self:
-        """The same as those of some of ``count`` factors, of which the others have none."""
+        """The same tolerances for ``factors`` among ``count`` factors, the others without one."""
         half, rim = np.full(count, np.nan), np.zeros(count, dtype=bool)
         half[factors], rim[factors] = self.half_widths, self.at_rim
         return replace(self, half_widths=half, at_rim=rim)
@@ -73,30 +93,30 @@ def widest_tolerances(
     seed: int = 1,
     aim: Aim = "ratios",
     promise: str = "keep all limits",
-    drawn: Kept | None = None,
+    count_on_draws: PartCount | None = None,
     open_errors: str = "",
 ) -> WidestTolerances:
-    """Find the widest tolerances with which a part keeps all limits with a given probability.
+    """The widest tolerances within which a part keeps all limits with a stated probability.
 
-    objectives : maps points (samples, k) to costs (samples, c). Row i always belongs to part i, so a surface of its
-        own may be drawn for each part; then ``limits`` has a row a part too.
+    objectives : maps points (samples, k) to costs (samples, c). Row i always belongs to part i, so that each part may have
+        its own drawn surface; then ``limits`` has a row a part too.
     pick : the nominal point (k,).
-    limits : largest costs (c,) or (samples, c) that count as kept.
+    limits : largest permitted costs (c,) or (samples, c).
     ratios : half widths (k,) relative to each other; all are widened together.
-    lower, upper : bounds (k,) of the region. No half width goes beyond, for no surface knows what is there.
+    lower, upper : bounds (k,) of the region, which no half width exceeds, for no surface is valid beyond.
     names : of the limits (c,), for the result.
     probability : share of the parts that must keep all limits.
     distribution : of the parts within the tolerance, see `doe.pareto.manufacture.offsets`.
-    samples, seed : parts drawn; the same for every width (common random numbers).
-    aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum in units of the ratios, each
-        within a twentieth to twenty times the given ratios.
-    promise : what the parts do that count, in words, for the sentence.
-    drawn : counts the parts that keep all limits on each draw of what judges them, for the interval; without it the
-        parts drawn alone are uncertain.
-    open_errors : sentence on what the interval holds and what it takes as exact.
+    samples, seed : of the random parts, the same for every width (common random numbers).
+    aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum over the ratios. Each
+        half width is then within a twentieth to twenty times its ratio.
+    promise : the condition on the parts in words, for the sentence.
+    count_on_draws : number of parts that keep all limits on each draw of the surfaces or emulators, for the interval. By
+        default the interval has only the error of the random parts.
+    open_errors : sentence on the errors that the interval includes and excludes.
 
-    The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
-    too. Where even the exact pick breaks a limit, all widths are zero.
+    The search goes from the pick outwards up to the first loss, so all narrower tolerances keep the limits too. Where even
+    the exact pick breaks a limit, all widths are zero.
 
     Raises MethodError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
     """
@@ -106,25 +126,25 @@ def widest_tolerances(
     if (share <= 0.0).any() or not 0.0 < probability < 1.0:
         raise MethodError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
-        raise MethodError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
+        raise MethodError(f"pick = {centre.tolist()}: is outside the region; pick a point within it")
     offsets = random_offsets(samples, centre.size, distribution, seed)
-    said = promise, open_errors
+    texts = promise, open_errors
     limit = np.asarray(limits, float)
-    parts = _Parts(objectives, centre, limit, room.clip(0.0), offsets, names, probability, said, drawn)
+    parts = _Parts(objectives, centre, limit, room.clip(0.0), offsets, names, probability, texts, count_on_draws)
     exact = np.zeros(centre.size)
-    if parts.kept(exact) < probability:
+    if parts.share(exact) < probability:
         worst = parts.most_broken(exact)
         return parts.nothing(
-            worst, f"even the exact pick keeps {worst} with a probability below the {parts.percent} demanded"
+            worst, f"even the exact pick keeps {worst} with a probability below the required {parts.percent}"
         )
     if aim != "ratios":
         share = _best_ratios(parts, share, aim)
-    return _result(parts, parts.widest(share), share)
+    return _result(parts, parts.largest_scale(share), share)
 
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Parts about a point, and the ``wanted`` probability with which they must keep limits of these names."""
+    """Parts about a point, and the ``target`` share that must keep the limits of these names."""
 
     objectives: Costs
     centre: Array
@@ -132,29 +152,29 @@ class _Parts:
     room: Array
     offsets: Array
     names: Sequence[str]
-    wanted: float
-    said: tuple[str, str]
-    drawn: Kept | None
+    target: float
+    texts: tuple[str, str]
+    count_on_draws: PartCount | None
 
     @property
     def percent(self) -> str:
-        """The wanted probability in words."""
-        return f"{100 * self.wanted:g} %"
+        """The target share in words."""
+        return f"{100 * self.target:g} %"
 
     def keep(self, half: Array) -> Mask:
         """Whether each part keeps each limit, (samples, c)."""
         return np.asarray(self.objectives(self.centre + half * self.offsets) <= self.limits)
 
-    def kept(self, half: Array) -> float:
+    def share(self, half: Array) -> float:
         """Share of the parts that keep all limits."""
         return float(self.keep(half).all(axis=1).mean())
 
     def interval(self, half: Array) -> Interval:
-        """Interval of the share that keep all limits."""
-        if self.drawn is None:
+        """Interval of the share of parts that keep all limits."""
+        if self.count_on_draws is None:
             return interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
         some = self.offsets[:MOST_JUDGED]
-        return interval_of_share(self.drawn(self.centre + half * some), len(some))
+        return interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
 
     def most_broken(self, half: Array) -> str:
         """The limit that most parts break."""
@@ -164,11 +184,11 @@ class _Parts:
         """Half widths at a scale, none beyond the region."""
         return np.minimum(ratios * scale, self.room)
 
-    def widest(self, ratios: Array, march: int = MARCH) -> float:
-        """Largest scale up to which the limits are kept."""
+    def largest_scale(self, ratios: Array, march: int = MARCH) -> float:
+        """Largest scale up to which the share of parts is at least the target."""
 
         def lost(scale: float) -> bool:
-            return self.kept(self.half(ratios, scale)) < self.wanted
+            return self.share(self.half(ratios, scale)) < self.target
 
         steps = np.linspace(0.0, float((self.room / ratios).max()), march + 1).tolist()
         first = next((place for place in range(1, march + 1) if lost(steps[place])), None)
@@ -181,15 +201,15 @@ class _Parts:
         return good
 
     def nothing(self, limit: str, cause: str) -> WidestTolerances:
-        """No tolerance, because of a limit."""
-        zero, share = np.zeros_like(self.centre), self.kept(np.zeros_like(self.centre))
-        sentence = f"No tolerance at all: {cause}; ask for less of the gain, or for less certainty."
+        """Result without any tolerance, because of a limit."""
+        zero, share = np.zeros_like(self.centre), self.share(np.zeros_like(self.centre))
+        sentence = f"No tolerance is possible: {cause}; demand less of the gain or a lower probability."
         error = error_of_share(share, len(self.offsets))
         return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
 
 
 def _best_ratios(parts: _Parts, share: Array, aim: Aim) -> Array:
-    """Ratios whose widest tolerances have the largest product or sum."""
+    """Ratios with the largest product or sum of their widest tolerances."""
     reach = np.log(20.0)
     free = np.flatnonzero(parts.room > 0.0)
 
@@ -200,7 +220,7 @@ def _best_ratios(parts: _Parts, share: Array, aim: Aim) -> Array:
 
     def worth(logarithms: Array) -> float:
         trial = ratios(logarithms)
-        half = parts.half(trial, parts.widest(trial, march=4))[free]
+        half = parts.half(trial, parts.largest_scale(trial, march=4))[free]
         return -float(np.log(half.clip(1e-300)).sum() if aim == "product" else (1.0 / share[free]) @ half)
 
     start, bounds = np.zeros(free.size), [(-reach, reach)] * free.size
@@ -216,12 +236,116 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
         return parts.nothing(first, f"as soon as parts differ, less than {parts.percent} of them keep {first}")
     half = parts.half(ratios, scale)
     at_rim = half >= parts.room * (1.0 - 1e-9)
-    # Just beyond, the tolerances are limited by what most parts break.
+    # The limit that most parts break just beyond is the limiting one.
     limit = RIM if at_rim.all() else parts.most_broken(parts.half(ratios, scale * 1.02))
-    share = parts.kept(half)
+    share = parts.share(half)
     error = error_of_share(share, len(parts.offsets))
-    interval, (promise, open_errors) = parts.interval(half), parts.said
-    within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}, {parts.percent} demanded"
+    interval, (promise, open_errors) = parts.interval(half), parts.texts
+    within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}; {parts.percent} are required."
     rim = "Where a tolerance ends at the rim of the region, no run shows whether it may be wider."
-    said = [f"{within}. They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
-    return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, said)))
+    sentences = [within, f"They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
+    return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
+
+
+NEIGHBOURS = 10  # runs a coefficient of the local linear fit, of which tricube weights count about half
+HARDLY_VARIED = 0.1  # share of the neighbours' largest spread below which a direction has no slope
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhood:
+    """Surfaces and their local correction by ``slopes`` (n, k, m) about coded points (n, k)."""
+
+    surfaces: Sequence[Quadratic]
+    points: Array
+    values: Array
+    slopes: Array
+
+    @classmethod
+    def of(cls, surfaces: Sequence[Quadratic], points: Array, values: Array, runs: Array, responses: Array) -> Self:
+        """Neighbourhood of coded points (n, k) with responses (n, m), by the search's ``runs`` (a, k) and ``responses`` (a, m)."""
+        good = np.isfinite(responses).all(axis=1)
+        runs, responses = runs[good], responses[good]
+        missed = responses - np.column_stack([surface.predict(runs) for surface in surfaces])
+        slopes = np.stack([_slope(runs - point, missed) for point in points])
+        return cls(surfaces, points, values, slopes)
+
+    def parts(self, offsets: Array) -> Array:
+        """Responses (n, s, m) of parts at coded ``offsets`` (s, k) from every point."""
+        points = self.points
+        shape = [surface.around(points, offsets) - surface.predict(points)[:, None] for surface in self.surfaces]
+        return self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedAware:
+    """Robust costs (n, q) of the points of a simulated front, and their violations of each limit (n, c).
+
+    ``robust_baseline`` (q,): robust costs of the baseline. ``survives`` (n,): share of the parts at a point that dominate the
+    nominal baseline. Both are None without a simulated baseline.
+    """
+
+    box: ToleranceBox
+    costs: Array
+    violations: Array
+    robust_baseline: Array | None
+    survives: Array | None
+
+
+def simulated_aware(
+    box: ToleranceBox, here: Neighbourhood, goals: Goals, baseline: Neighbourhood | None, below: Array, above: Array
+) -> SimulatedAware:
+    """Robust costs of points; limits must hold for responses lower by ``below`` and higher by ``above`` (n, m)."""
+    offsets = _offsets(box)
+    judged = box.judge_parts(here.parts(offsets), goals, below, above)
+    if baseline is None:
+        return SimulatedAware(box, judged.costs, judged.violations, None, None)
+    nominal = goals.costs(baseline.values)[0]
+    survival_offsets = box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
+    return SimulatedAware(
+        box=box,
+        costs=judged.costs,
+        violations=judged.violations,
+        robust_baseline=box.judge_parts(baseline.parts(offsets), goals).costs[0],
+        survives=np.mean(dominates(goals.costs(here.parts(survival_offsets)), nominal), axis=1),
+    )
+
+
+def pick_among(
+    costs: Array, violations: Array, goals: Goals, baselines: Sequence[Array], rule: Rule
+) -> tuple[int, str]:
+    """The row of a rule's pick among points with costs (n, q), and the reason in words.
+
+    Candidates are the points that keep every limit (violations (n, c)), or else the one that breaks them least. Of these,
+    the non-dominated ones count, if possible those that dominate the first dominated one of ``baselines`` (q,).
+    """
+    broken = violations.sum(axis=1)
+    rows = np.flatnonzero(broken <= 0.0)
+    limits = " and keep their limits" if violations.shape[1] else ""
+    if not rows.size:
+        rows, limits = np.array([int(broken.argmin())]), ", none of which keeps all limits"
+    rows = rows[non_dominated(costs[rows])]
+    against = next((baseline for baseline in baselines if dominates(costs[rows], baseline).any()), None)
+    if against is None and baselines:
+        against = baselines[-1]
+    picks, among = pick_all(costs[rows], goals, against)
+    return int(rows[picks[rule]]), f"{NAMES[rule]} {among}{limits}"
+
+
+def _offsets(box: ToleranceBox) -> Array:
+    """Offsets (s, k) of the evaluated parts; for the worst case with the corners of the box."""
+    even = box.half * even_offsets(box.samples, box.half.size, box.distribution)
+    if box.kind == "quantile":
+        return even
+    return np.vstack([even, box.half * np.array(list(product((-1.0, 1.0), repeat=box.half.size)))])
+
+
+def _slope(apart: Array, missed: Array) -> Array:
+    """Slope (k, m) at offset zero of the errors ``missed`` (a, m), with weights that fall with the distance of ``apart`` (a, k)."""
+    count = min(NEIGHBOURS * (apart.shape[1] + 1), len(apart))
+    far = np.linalg.norm(apart, axis=1)
+    nearest = np.argsort(far, kind="stable")[:count]
+    reach = far[nearest[-1]] * (1.0 + 1e-9) + 1e-300
+    weight = np.sqrt((1.0 - (far[nearest] / reach) ** 3) ** 3)[:, None]
+    mean = (weight**2 / (weight**2).sum()).T
+    across, up = (weight * (part - mean @ part) for part in (apart[nearest], missed[nearest]))
+    return np.linalg.lstsq(across, up, rcond=HARDLY_VARIED)[0]

@@ -1,7 +1,6 @@
 """What a person sees of a study.
 
-- ``steps``: JSON and tables of each step; ``study``: of a whole study, its answer, files and pictures
-- ``sections``: what the report says, as ``rbdyn.base.blocks``; ``html``, ``markdown``: both its files
-- ``still``: pictures that matplotlib draws for the page and for files
-- ``words``: names and numbers for people
+- ``sections``: what is said of each subject, as JSON and as ``rbdyn.base.blocks``
+- ``page``: all sections as one HTML page, with its scripts and style in ``html``, and as Markdown
+- ``files``: all that a study writes; ``pictures``: its PNG files; ``still``: pictures for pages and files
 """

@@ -1,7 +1,9 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
-- ``surface`` fits, predicts, and says in sentences what the statistics mean; ``least_squares`` checks the runs and solves
-- ``anova``, ``model_error``, ``canonical``, ``box_cox`` judge; ``comparison``: against a Gaussian process
+- ``surface``: fit, prediction, canonical analysis, and sentences on the statistics
+- ``least_squares``: runs of a response, their checks, the solution, and power transforms of Box and Cox
+- ``adequacy``: analysis of variance, elimination, residual diagnostics, known variances, model error
+- ``comparison``: cross-validation with a Gaussian process
 """
 
 from doe.designs.model import model_matrix

@@ -1,46 +1,164 @@
-"""Least-squares response surfaces of first and second order, with the statistics to judge them.
+"""Least-squares response surfaces of first and second order, with their statistics and canonical analysis.
 
-Everything is fitted in coded units. Factors are lettered A, B, C in the order of the columns; the terms of
-a surface are "1", "A", "AB" (interaction) and "A^2" (square). A number that the data leave undefined, such
-as the pure error of a design without replicates, is None and never NaN.
+Fits are in coded units. Factors have the letters A, B, C in the order of the columns; the terms of a surface are "1", "A",
+"AB" (interaction) and "A^2" (square). An undefined number, such as the pure error of a design without replicates, is None
+and never NaN. Canonical analysis gives the stationary point, the axes of curvature, and the errors of the curvature.
 
-Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed.
+Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 6.3-6.4 for nature and ridges; Bisgaard
+and Ankenman, Standard errors for the eigenvalues in second-order response surface models (1996).
 """
 
 from collections.abc import Collection, Mapping
 from functools import cached_property
-from typing import Any, Literal
+from string import ascii_uppercase
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
+from doe.designs import to_actual
 from doe.designs.design import replicate_groups
 from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
-from doe.response_surface.anova import (
+from doe.response_surface.adequacy import (
     AnovaRow,
     Diagnostics,
+    KnownVariance,
+    ModelError,
     Removal,
     anova,
+    compare,
     describe_diagnostics,
+    describe_known_variance,
     diagnose,
     eliminate,
     find,
     goodness,
+    model_error,
     observation_variance,
     p_text,
 )
-from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positive, forward, slope
-from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, describe_canonical
-from doe.response_surface.least_squares import Data, check_errors, check_matrix, check_size, checked, solve
-from doe.response_surface.model_error import KnownVariance, ModelError, compare, describe_known_variance, model_error
+from doe.response_surface.least_squares import (
+    BoxCox,
+    Data,
+    backward,
+    box_cox,
+    check_errors,
+    check_matrix,
+    check_positive,
+    check_size,
+    forward,
+    run_data,
+    slope,
+    solve,
+)
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, derived, outside_json
 
+FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
+Nature = Literal["minimum", "maximum", "saddle"]
+SURE = 0.95  # probability of the intervals of the eigenvalues
+
+
+class StationaryPoint(TypedDict):
+    """Point of zero gradient; ``eigenvalues`` of the matrix of second-order coefficients."""
+
+    coded: list[float]
+    actual: list[float]
+    eigenvalues: list[float]
+    nature: Nature
+
+
+class Canonical(TypedDict):
+    """Curvature with its error, and the nature of the stationary point.
+
+    ``eigenvalues`` ascend; ``eigenvalue_errors`` are half widths of their 95 % intervals, None without a residual.
+    ``eigenvectors[i]`` is the axis of ``eigenvalues[i]`` in coded units. ``nature`` is "minimum", "maximum" or "saddle". When
+    an eigenvalue is within its error of zero, it is "stationary ridge" with the stationary point in the region, else
+    "rising ridge". ``inside``: whether the point is in the region of the runs. ``distance``: from the centre (coded).
+    """
+
+    eigenvalues: list[float]
+    eigenvalue_errors: list[float] | None
+    eigenvectors: list[list[float]]
+    nature: str
+    inside: bool | None
+    distance: float | None
+
+
+def canonical(
+    terms: Terms, coefficients: Array, covariance: Array, dof: int, data: Data
+) -> tuple[StationaryPoint | None, Canonical | None]:
+    """The stationary point and the canonical analysis of a surface fitted to ``data``.
+
+    The point is None where a direction has no curvature, the analysis None without second-order terms.
+    """
+    factors = data.points.shape[1]
+    _, gradient, matrix = second_order(terms, coefficients, factors)
+    if not any(len(term) > 1 for term in terms):
+        return None, None
+    eigenvalues, vectors = (part.astype(float) for part in np.linalg.eigh(matrix))
+    vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(factors)])
+    errors = _errors(terms, vectors, covariance, dof) if covariance.any() else None
+    flat = np.abs(eigenvalues) <= FLAT * np.abs(coefficients).max()
+    unsure = flat if errors is None else flat | (np.abs(eigenvalues) <= errors)
+    sign: Nature = "minimum" if eigenvalues.min() > 0 else "maximum" if eigenvalues.max() < 0 else "saddle"
+    stationary, inside, distance = None, None, None
+    if not flat.any():
+        place = np.linalg.solve(-2 * matrix, gradient).astype(float)
+        inside, distance = _inside(place, data.points), float(np.linalg.norm(place))
+        actual = to_actual(place, data.centre, data.step).tolist()
+        coded, values = place.tolist(), np.linalg.eigvalsh(matrix).tolist()
+        stationary = StationaryPoint(coded=coded, actual=actual, eigenvalues=values, nature=sign)
+    ridge = "stationary ridge" if inside else "rising ridge"
+    return stationary, Canonical(
+        eigenvalues=eigenvalues.tolist(),
+        eigenvalue_errors=None if errors is None else errors.tolist(),
+        eigenvectors=vectors.T.tolist(),
+        nature=ridge if unsure.any() else sign,
+        inside=inside,
+        distance=distance,
+    )
+
+
+def describe_canonical(analysis: Canonical, place: StationaryPoint | None) -> str:
+    """Canonical analysis in a sentence."""
+    values = ", ".join(f"{value:.3g}" for value in analysis["eigenvalues"])
+    if place is None:
+        return f"there is no single stationary point, for one direction has no curvature (eigenvalues {values})."
+    where = ", ".join(f"{letter} = {x:.3g}" for letter, x in zip(ascii_uppercase, place["coded"], strict=False))
+    region = "inside" if analysis["inside"] else "outside"
+    head = f"the stationary point at {where} (coded), {region} the region of the runs, is a {analysis['nature']}"
+    if "ridge" not in analysis["nature"]:
+        if analysis["inside"]:
+            return f"{head} (eigenvalues {values})."
+        return f"{head} (eigenvalues {values}); the best point is on the border of the region."
+    axis = int(np.argmin(np.abs(analysis["eigenvalues"])))
+    lettered = zip(ascii_uppercase, analysis["eigenvectors"][axis], strict=False)
+    direction = " ".join(f"{x:+.2f} {letter}" for letter, x in lettered)
+    return (
+        f"{head} (eigenvalues {values}, one within its error of zero): its position along {direction} is undetermined."
+    )
+
+
+def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:
+    """Half widths by first order: the eigenvalue v'Bv changes with the coefficient of x_i x_j by v_i v_j."""
+    second = np.array([len(term) > 1 for term in terms])
+    slopes = model_matrix(vectors.T, terms) * second
+    variance = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)
+    return special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
+
+
+def _inside(place: Array, points: Array) -> bool:
+    """Within the box of the runs and no farther from the centre than the farthest of them."""
+    in_box = bool(((points.min(axis=0) <= place) & (place <= points.max(axis=0))).all())
+    return in_box and bool(np.linalg.norm(place) <= np.linalg.norm(points, axis=1).max())
+
+
 Weighting = Literal["equal", "replicates"]
-# Range of values over the largest of them, below which too few digits are left for their sums of squares.
+# Range of values over the largest value, below which sums of squares have too few digits.
 LEAST_SPREAD = 1e-9
 Transform = Literal["none", "box_cox"] | float
 
@@ -50,20 +168,22 @@ TESTED = ("t", "p", "low", "high")
 class Surface(Record):
     """A fitted surface of one response.
 
-    ``coefficients`` (p,) and ``covariance`` (p, p) follow ``terms``, in coded units and units of the
-    response or of its transform; ``transform`` is the exponent of Box and Cox, None without one. They and all
-    statistics are on the scale of the fit; predictions are in units of the response. ``covariance`` is
-    scaled by ``residual_mean_square`` on ``residual_dof`` degrees of freedom; with weights 1 / variance that
-    mean square has no unit, and `known_variance` shows what it should be. ``lack_of_fit`` is what the surface misses
-    against the scatter of replicates, ``pure_error`` that scatter about their own means.
-    ``observation_variance`` is that of a new run about the surface (of the mean run, if they differ).
-    ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
-    effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
-    ``actual_coefficients`` are those of the same terms with the factors in actual units, ``box_cox`` is advice on a power
-    transform for an untransformed fit, None where values or fit allow none.
-    ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
-    curvature, ``known_variance`` where the errors of the runs are not known, ``model_error`` where lack of fit is not
-    significant, ``rival`` until `doe.workflow.surfaces.with_rivals` has compared it with a Gaussian process.
+    Statistics are on the scale of the fit, predictions in units of the response.
+
+    - ``coefficients`` (p,), ``covariance`` (p, p): by ``terms``, in coded units and units of the response or its transform
+    - ``transform``: exponent of Box and Cox, None without one
+    - ``residual_mean_square``: scale of the covariance, on ``residual_dof`` degrees of freedom. With weights 1 / variance it
+      has no unit, and `known_variance` has its expected value.
+    - ``lack_of_fit``, ``pure_error``: error of the surface beyond the scatter of replicates, and that scatter
+    - ``observation_variance``: of a new run about the surface, or of the mean run if they differ
+    - ``r2``, ``adjusted_r2``, ``predicted_r2``: without the differences of blocks
+    - ``blocks``: effects by label about the mean over all runs, which the surface predicts
+    - ``vif``: by ``terms``, NaN for "1"
+    - ``actual_coefficients``: of the same terms in actual units
+    - ``box_cox``: advice on a power transform of an untransformed fit, None where values or fit allow none
+    - ``stationary_point``: None without a single one; ``canonical``: None without curvature
+    - ``known_variance``: None without errors of the runs; ``model_error``: None without significant lack of fit
+    - ``rival``: None until `doe.workflow.surfaces.with_rivals` has compared the surface with a Gaussian process
     """
 
     name: str = outside_json()
@@ -109,7 +229,7 @@ class Surface(Record):
     rival: dict[str, Any] | None
 
     def predict(self, coded: ArrayLike) -> Array:
-        """Response at coded points (..., k), shape (...): its mean, or of a transformed one its median."""
+        """Mean response at coded points (..., k), shape (...); with a transform its median."""
         points = np.asarray(coded, float)
         constant, gradient, matrix = self._polynomial
         return self._back(np.einsum("...i,...i", points @ matrix + gradient, points) + constant)
@@ -117,17 +237,17 @@ class Surface(Record):
     def draws(self, coded: ArrayLike, coefficients: ArrayLike, fields: Array | None = None) -> Array:
         """Response at coded points (..., k) for each row of ``coefficients`` (s, p), shape (s, ...).
 
-        ``fields`` (s, ...): what the model misses there, on the scale of the fit.
+        ``fields`` (s, ...): model errors there, on the scale of the fit.
         """
         columns = model_matrix(coded, self.terms)
-        drawn = np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0)
-        return self._back(drawn if fields is None else drawn + fields)
+        values = np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0)
+        return self._back(values if fields is None else values + fields)
 
     def prediction_standard_error(self, coded: ArrayLike) -> Array:
         """Standard error of the mean response at coded points (..., k), shape (...), its model error included.
 
-        A single new observation scatters by ``observation_variance`` more (as a variance). Of a transformed
-        response it is that of the transform over the slope of the transform (first order).
+        A new observation has ``observation_variance`` as additional variance. For a transformed response it is the error
+        of the transform over the slope of the transform, to first order.
         """
         matrix = model_matrix(coded, self.terms)
         variance = np.einsum("...j,jk,...k", matrix, self.covariance, matrix).clip(0.0)
@@ -137,13 +257,13 @@ class Surface(Record):
         return error / slope(self.predict(coded), self.transform)
 
     def refit(self, rows: Rows) -> "Surface":
-        """The same kind of surface through these runs alone. Raises MethodError when they do not suffice."""
+        """The same kind of surface fitted to these runs alone. Raises MethodError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform, advised=False)
 
     @property
     def interval_dof(self) -> int:
-        """Degrees of freedom of the intervals of a mean: of the residual, or of the source of the model error."""
+        """Degrees of freedom of intervals of a mean: of the source of the model error or, without one, of the residual."""
         return self.residual_dof if self.model_error is None else self.model_error.dof
 
     def coefficient_table(self) -> list[dict[str, Any]]:
@@ -151,7 +271,7 @@ class Surface(Record):
         errors = np.sqrt(np.diag(self.covariance))
         columns = self.coefficients, errors, special.stdtrit(self.residual_dof, 0.975) * errors, self.vif
         rows = []
-        for term, c, error, half, vif in zip(self.terms, *(each.tolist() for each in columns), strict=True):
+        for term, c, error, half, vif in zip(self.terms, *(column.tolist() for column in columns), strict=True):
             t = c / error if error > 0 else None
             p = None if t is None else 2 * float(special.stdtr(self.residual_dof, -abs(t)))
             judged = {"t": t, "p": p, "low": c - half, "high": c + half, "vif": None if vif != vif else vif}
@@ -192,25 +312,24 @@ def fit(
     coded : runs in coded units, shape (n, k).
     values : response of each run, shape (n,).
     name : name of the response, for messages.
-    model : "linear"; "interaction" (linear and products of two factors); "pure_quadratic" (linear and squares);
-        "quadratic" (full second order); or "reduced", which starts from the quadratic and drops the term of largest p until every p is at most
-        0.05, keeping each term that a remaining interaction or square is built on (hierarchy).
+    model : "linear"; "interaction" (linear and two-factor products); "pure_quadratic" (linear and squares); "quadratic" (full
+        second order); or "reduced", the quadratic after backward elimination. This drops the term of largest p until every p
+        is at most 0.05, except terms that a remaining interaction or square needs by hierarchy.
     centre, step : actual value of each factor at coded 0 and its change over one coded unit, shape (k,).
-    standard_errors : of each value, from the replicates of the simulation, shape (n,). They are compared with
-        the scatter of the runs, and weigh them if ``weighting`` says so; NaN where unknown.
-    replicates : number behind each standard error, shape (n,); 0 for errors that count as known exactly.
+    standard_errors : of each value by the replicates of the simulation, shape (n,), NaN where unknown. They are compared
+        with the scatter of the runs, and may weight the runs, see ``weighting``.
+    replicates : number behind each standard error, shape (n,); 0 for errors taken as exact.
     weighting : "equal", or "replicates" for weights 1 / standard_error^2.
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
-    without : places of factors that the surface does not depend on.
+    without : indices of factors that the surface does not depend on.
 
-    Raises MethodError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
-    for it, the runs cannot distinguish its terms, a transform meets a value that is not positive, or weights are
-    asked for and an error is not positive.
+    Raises MethodError when shapes differ, a value is not finite, all values are equal, or the model is unknown. It also
+    refuses runs that cannot determine the terms, a transform of values that are not positive, and such errors as weights.
     """
     if model not in MODELS:
         raise MethodError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
-    data = checked(name, coded, values, centre, step, standard_errors, replicates, block, without)
+    data = run_data(name, coded, values, centre, step, standard_errors, replicates, block, without)
     if weighting == "replicates":
         check_errors(name, standard_errors)
     return _fit(name, data, model, weighting, "none" if transform is None else transform, advised=True)
@@ -226,26 +345,30 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     check_size(name, model, terms, data.block)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
-        alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"
-        raise MethodError(f"{name}: {alike}; check the response or leave it out")
+        raise MethodError(
+            f"{name}: all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit; check the response or "
+            "leave it out"
+        )
     if np.ptp(data.values) < LEAST_SPREAD * np.abs(data.values).max():
-        near = f"values differ by {np.ptp(data.values):.3g} about {data.values.mean():.6g}, which rounding hides"
-        raise MethodError(f"{name}: {near}; subtract a constant from all")
+        raise MethodError(
+            f"{name}: values differ by {np.ptp(data.values):.3g} about {data.values.mean():.6g}, which rounding hides; subtract a "
+            "constant from all"
+        )
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
     weights = 1.0 / variances if weighting == "replicates" and variances is not None else None
     removed: list[Removal] = []
     if model == "reduced":
-        terms, removed = eliminate(terms, lambda left: solve(_columns(data, left), response, weights))
+        terms, removed = eliminate(terms, lambda subset: solve(_columns(data, subset), response, weights))
     matrix = _columns(data, terms)
     solution = solve(matrix, response, weights)
     count = len(terms)
     covariance = (solution.mean_square * solution.inverse)[:count, :count]
     groups = replicate_groups(data.points, data.block)
-    table, known = anova(terms, solution, response, data.points, data.block), None
+    table, known_variance = anova(terms, solution, response, data.points, data.block), None
     if variances is not None:
-        known = compare(solution, matrix, response, variances, data.replicates, groups, count)
-        table.insert(len(table) - 1, known.pure_error)
+        known_variance = compare(solution, matrix, response, variances, data.replicates, groups, count)
+        table.insert(len(table) - 1, known_variance.pure_error)
     coefficients = solution.coefficients[:count]
     stationary, analysis = canonical(terms, coefficients, covariance, solution.dof, data)
     open_to_transform = exponent is None and (data.values > 0).all() and solution.mean_square != 0
@@ -266,8 +389,8 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         blocks=_block_effects(data, solution.coefficients[count:]),
         elimination=removed,
         diagnostics=diagnose(solution, response),
-        known_variance=known,
-        model_error=model_error(solution, matrix, groups, table, known),
+        known_variance=known_variance,
+        model_error=model_error(solution, matrix, groups, table, known_variance),
         observation_variance=observation_variance(solution),
         weighting=weighting,
         transform=exponent,
@@ -286,7 +409,7 @@ def _exponent(name: str, data: Data, terms: Terms, transform: Transform) -> floa
     check_positive(data.values, name)
     if transform == "box_cox":
         transform = box_cox(_columns(data, terms), data.values, name=name)["recommended"]
-    # The exponent 1 would only move the response by 1.
+    # The exponent 1 would only shift the response by 1.
     return None if transform == 1 else float(transform)
 
 
@@ -312,11 +435,11 @@ DISCERNIBLE = 4.0  # adequate precision above which the surface can steer a sear
 
 
 def describe(surface: Surface) -> list[str]:
-    """Say in sentences what is significant at `ALPHA`, whether the surface fits, and what to look at."""
-    known, canonical = surface.known_variance, surface.canonical
+    """Sentences on significance at `ALPHA`, on the adequacy of the surface, and on what to check."""
+    known_variance, canonical = surface.known_variance, surface.canonical
     sentences = [
         *(_terms(surface), _lack_of_fit(surface), _removed(surface), _blocks(surface)),
-        *([] if known is None else describe_known_variance(known, ALPHA)),
+        *([] if known_variance is None else describe_known_variance(known_variance, ALPHA)),
         *(_model_error(surface), _summary(surface)),
         *describe_diagnostics(surface.diagnostics, ALPHA),
         _transform(surface),
@@ -324,34 +447,34 @@ def describe(surface: Surface) -> list[str]:
         "" if surface.rival is None else surface.rival["sentence"],
     ]
     head = f"{surface.name}: "
-    # Some name their response by themselves.
+    # Some sentences already start with the name of the response.
     return [head + sentence.removeprefix(head) for sentence in sentences if sentence]
 
 
 def _terms(surface: Surface) -> str:
     tested = [row for row in surface.anova if row["source"] in surface.terms]
-    known = {row["source"]: row["p"] for row in tested if row["p"] is not None}
-    if len(known) < len(tested):
-        return "the surface leaves no residual, so its terms cannot be tested."
-    strong = sorted((p, source) for source, p in known.items() if p <= ALPHA)
-    weak = [source for source, p in known.items() if p > ALPHA]
+    p_values = {row["source"]: row["p"] for row in tested if row["p"] is not None}
+    if len(p_values) < len(tested):
+        return "the surface has no residual, so its terms cannot be tested."
+    strong = sorted((p, source) for source, p in p_values.items() if p <= ALPHA)
+    weak = [source for source, p in p_values.items() if p > ALPHA]
     listed = ", ".join(f"{source} ({p_text(p)})" for p, source in strong)
-    head = f"significant at {ALPHA:g}: {listed}" if strong else f"no term is significant at {ALPHA:g}"
-    return head + (f"; not significant: {', '.join(weak)}." if weak else ".")
+    if not strong:
+        return f"no term is significant at {ALPHA:g}."
+    if not weak:
+        return f"significant at {ALPHA:g}: {listed}."
+    return f"significant at {ALPHA:g}: {listed}; not significant: {', '.join(weak)}."
 
 
 def _lack_of_fit(surface: Surface) -> str:
     p = surface.lack_of_fit["p"]
     if p is not None and p <= ALPHA:
-        what = (
-            f"lack of fit is significant ({p_text(p)}): the surface misses more than the scatter of replicates explains"
-        )
         return (
-            f"{what}; enlarge the model, transform the response or narrow the region, and confirm predictions by runs."
+            f"lack of fit is significant ({p_text(p)}): the error of the surface exceeds the scatter of replicates; enlarge the model, "
+            "transform the response or narrow the region, and confirm predictions by runs."
         )
     if p is not None:
-        what = "what the surface misses is within the scatter of replicates"
-        return f"lack of fit is not significant ({p_text(p)}): {what}."
+        return f"lack of fit is not significant ({p_text(p)}): the error of the surface is within the scatter of replicates."
     if surface.pure_error["df"] == 0:
         return "lack of fit cannot be tested, for no run is replicated; add centre replicates."
     if surface.lack_of_fit["df"] == 0:
@@ -363,16 +486,16 @@ def _model_error(surface: Surface) -> str:
     if (error := surface.model_error) is None:
         return ""
     return (
-        "the 95 % intervals of its mean join the error of the coefficients with what the model misses, a standard "
-        f"deviation of {error.variance**0.5:.3g} shown by {error.source} ({error.dof} degrees of freedom)."
+        f"the 95 % intervals of its mean include a model error of standard deviation {error.variance**0.5:.3g}, shown by "
+        f"{error.source} ({error.dof} degrees of freedom)."
     )
 
 
 def _removed(surface: Surface) -> str:
     if not surface.elimination:
         return ""
-    listed = ", ".join(f"{each['term']} ({p_text(each['p'])})" for each in surface.elimination)
-    return f"removed in this order: {listed}; p values of the remaining terms are optimistic, for the same runs selected them."
+    listed = ", ".join(f"{removal['term']} ({p_text(removal['p'])})" for removal in surface.elimination)
+    return f"removed in this order: {listed}; p values of the other terms are optimistic, for the same runs selected the terms."
 
 
 def _blocks(surface: Surface) -> str:
@@ -383,18 +506,20 @@ def _blocks(surface: Surface) -> str:
 
 
 def _summary(surface: Surface) -> str:
-    adjusted, predicted = surface.adjusted_r2, surface.predicted_r2
-    if adjusted is None or predicted is None:
-        return "predicted R2 cannot be computed, for a run is met exactly by its own coefficient."
-    figures = f"adjusted R2 {adjusted:.3f} and predicted R2 {predicted:.3f}"
+    adjusted_r2, predicted_r2 = surface.adjusted_r2, surface.predicted_r2
+    if adjusted_r2 is None or predicted_r2 is None:
+        return "predicted R2 cannot be computed, for the fit passes through a run whatever its value."
+    figures = f"adjusted R2 {adjusted_r2:.3f} and predicted R2 {predicted_r2:.3f}"
     precision = surface.adequate_precision
     tail = ""
     if precision is not None and precision < DISCERNIBLE:
-        tail = f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: the scatter hides the surface."
-    if adjusted - predicted > FAR_APART:
+        tail = (
+            f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: scatter exceeds the effects of the factors."
+        )
+    if adjusted_r2 - predicted_r2 > FAR_APART:
         return (
-            f"{figures} differ by more than {FAR_APART:g}: the surface predicts new runs worse than it fits its own; "
-            f"look for influential runs or drop terms.{tail}"
+            f"{figures} differ by more than {FAR_APART:g}: the surface predicts new runs worse than it fits its own runs; "
+            f"check influential runs or drop terms.{tail}"
         )
     return f"{figures} agree.{tail}"
 
@@ -402,7 +527,7 @@ def _summary(surface: Surface) -> str:
 def _transform(surface: Surface) -> str:
     if surface.transform is not None:
         return (
-            f"fitted as Box-Cox transform with exponent {surface.transform:.3g}; the analysis is on that scale, "
-            "predictions are medians in the unit of the response."
+            f"the response is fitted as its Box-Cox transform with exponent {surface.transform:.3g}; the analysis is on that "
+            "scale, predictions are medians in the unit of the response."
         )
     return "" if surface.box_cox is None else str(surface.box_cox["sentence"])

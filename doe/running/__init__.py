@@ -1,5 +1,6 @@
-"""Where points run and how they are kept; knows no bearing.
+"""Runs and their store; knows no bearing.
 
-``store`` (finished runs and failures), ``lock`` (one process at a time, which study runs where), ``runner`` (threads, the stages of a
-command and what is left of them costs), ``cluster`` (dask), ``keeper`` (the stages of a live process).
+- ``store``: finished runs and failures on disk, the lock of a store, and which study runs where
+- ``runner``: points on an engine, the agenda of a command with its stages, and the forecast of what is left
+- ``cluster``: the engine of a dask cluster
 """

@@ -1,11 +1,13 @@
-"""Finished runs on disk: one row a run in sqlite, keyed by what determines its bits; failed points as records, grouped by cause.
+"""Store of runs on disk: a row for each run in sqlite, by a key of what determines its bits; and the lock of the store.
 
-A result is there whole or not at all: sqlite appends it to its write-ahead log in frames with checksums, and a log that
-was cut short is read up to the last whole transaction. Results are committed with ``synchronous = FULL``, that is, they
-are on the disk when ``put`` returns; what is under way with ``NORMAL``, for a power cut ends it anyway. Each result also
-carries its own SHA-256, so that a row spoilt later is reported and run again, not read.
+A result is stored wholly or not at all. sqlite appends it to a write-ahead log in frames with checksums, and reads a
+truncated log up to the last whole transaction. Results are committed with ``synchronous = FULL``: they are on the disk when
+``put`` returns. Runs under way are committed with ``NORMAL``, because a power cut ends them anyway. Each result has its own
+SHA-256, so that a row spoilt later is reported and run again.
 
-One process at a time writes to a store (``lock``); any number may read it meanwhile.
+One process at a time writes to a store; any number may read it. The lock is an exclusive transaction of an empty database
+next to the store. The system ends it with its process, so that no lock outlives its owner and no clock is read. All stores
+of one process on one file share the lock. A registration states which study runs in which folder.
 """
 
 import json
@@ -16,25 +18,27 @@ import sqlite3
 import sys
 import threading
 import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
-from doe.running import lock
+from rbdyn.base.digests import user_cache
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.storage import digest_of
+from rbdyn.result import read_json
 
 T = TypeVar("T")
 
-# Runs that fail alike say the same sentence with other numbers.
+# Numbers in a sentence: runs that fail for one cause differ only in these.
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A point that failed: its label, why, its number in the design (None outside of it) and its factors."""
+    """A failed point: its label, the cause, its number in the design (None outside of it) and its factors."""
 
     label: str
     cause: str
@@ -46,7 +50,7 @@ class Failure:
 
 
 class StoppedError(RunError):
-    """Runs that something from outside has stopped; arguments: what, and the fix after which they go on."""
+    """Runs were stopped from outside; arguments: the cause, and the fix after which they go on."""
 
     def __str__(self) -> str:
         return "{}; finished runs are kept: {}".format(*self.args)
@@ -55,7 +59,7 @@ class StoppedError(RunError):
 def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     """Failures by cause, the most frequent first: ``{"cause", "runs", "labels"}``.
 
-    Causes that differ in their numbers only are one; the first of them stands for all.
+    Causes that differ only in their numbers are one, under the first of them.
     """
     groups = []
     for group in sorted(alike(failures, lambda failure: failure.cause), key=len, reverse=True):
@@ -65,7 +69,7 @@ def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
 
 
 def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
-    """Items whose texts differ in their numbers only, together."""
+    """Groups of items whose texts differ only in their numbers."""
     groups: dict[str, list[T]] = {}
     for item in items:
         groups.setdefault(_NUMBER.sub("#", text(item)), []).append(item)
@@ -73,7 +77,7 @@ def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
 
 
 def sentence(failures: Sequence[Failure]) -> str:
-    """All failures in one sentence: each cause once, with the points that it stopped."""
+    """All failures in one sentence: each cause once, with its points."""
     return "; ".join(f"{', '.join(group['labels'])}: {group['cause']}" for group in grouped(failures))
 
 
@@ -88,10 +92,10 @@ SCHEMA = (
         started REAL, ended REAL, seconds REAL, host TEXT, pid INTEGER
     )""",
 )
-# How long to wait for another process that writes [s].
+# Longest wait for another process that writes [s].
 PATIENCE_S = 30.0
-# What fixes a complaint of sqlite.
-PLACE = "see that its folder is there and that both can be written, or name another folder"
+# Fixes by the error code of sqlite.
+PLACE = "make sure that its folder exists and that both can be written, or name another folder"
 FIXES = {
     sqlite3.SQLITE_NOTADB: "it is no database; move it away or name another folder",
     sqlite3.SQLITE_CORRUPT: "it is damaged; move it away, its runs are then run again",
@@ -102,7 +106,7 @@ FIXES = {
 
 
 class Database:
-    """A file of runs, of this format and version. Raises as ``Store``."""
+    """A file of runs in this format and version. Raises as ``Store``."""
 
     def __init__(self, path: Path, read_only: bool) -> None:
         self.path = path
@@ -125,7 +129,7 @@ class Database:
     def _check(self, read_only: bool) -> None:
         tables = self._tables()
         if not tables and read_only:
-            # Just made by a process that has not written to it yet.
+            # Another process has just made it and not yet written to it.
             self._connection.close()
             self._connection = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
         if not tables:
@@ -137,14 +141,17 @@ class Database:
                 tables = self._tables()
         meta = dict(self._connection.execute("SELECT name, value FROM meta")) if "meta" in tables else {}
         version = meta.get("version", "1") if meta.get("format") == FORMAT else ""
-        # The first version was a bare table of results.
+        # The first version had only a table of results.
         if tables == {"runs"}:
             version = "1"
         if version != VERSION:
+            if not version:
+                raise InputError([f"{self.path}: not a store of runs; move it away or name another folder"])
             newer = version.isdigit() and int(version) > int(VERSION)
-            what = f"a store of version {version}, not {VERSION}" if version else "not a store of runs"
             fix = "install the newer doe that made it" if newer else "move it away"
-            raise InputError([f"{self.path}: {what}; {fix} or name another folder"])
+            raise InputError(
+                [f"{self.path}: a store of version {version}, not {VERSION}; {fix} or name another folder"]
+            )
         (sound,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
         if sound != "ok":
             raise InputError([f"{self.path}: damaged ({sound}); move it away, its runs are then run again"])
@@ -156,7 +163,7 @@ class Database:
         return {name for (name,) in rows}
 
     def _tell(self, things: Sequence[str], sentence: str) -> None:
-        """Say it of things on standard error, unless it was said of all of them."""
+        """Print a sentence on standard error, unless all ``things`` were reported before."""
         if not self._reported.issuperset(things):
             self._reported.update(things)
             print(f"{self.path}: {sentence}", file=sys.stderr)
@@ -176,19 +183,19 @@ class Database:
 
     @contextmanager
     def _faults(self) -> Iterator[None]:
-        """Turn what sqlite complains of into one sentence."""
+        """Raises InputError or StoppedError with one sentence for an error of sqlite."""
         try:
             yield
         except sqlite3.Error as error:
             if getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-                what, fix = f"{self.path}: cannot be written ({error})", "make room on the disk and start again"
-                raise StoppedError(what, fix) from None
+                cause = f"{self.path}: cannot be written ({error})"
+                raise StoppedError(cause, "make room on the disk and start again") from None
             fix = FIXES.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
             raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {fix}"]) from None
 
 
 def _address(path: Path, read_only: bool) -> str:
-    """URI of the file. One that is only read is left alone wholly: no log is begun next to it."""
+    """URI of the file. Reading alone changes nothing: no log is begun next to the file."""
     if not read_only:
         return path.absolute().as_uri()
     logs = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
@@ -196,7 +203,7 @@ def _address(path: Path, read_only: bool) -> str:
 
 
 def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
-    """Run a statement that another process, which opens the store just now, may hold up."""
+    """Run a statement that another process may delay while it opens the store."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         try:
@@ -210,7 +217,7 @@ def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
 
 @dataclass(frozen=True)
 class Point:
-    """A run to do: its key, and what a reader of the store wants to know of it."""
+    """A run to do: its key, label, number in the design and factors."""
 
     key: str
     label: str
@@ -220,7 +227,7 @@ class Point:
 
 @dataclass(frozen=True)
 class CurrentRun:
-    """A run under way: which, where, and since when [s since the epoch]."""
+    """A run under way: its key, label and number, where it runs, and since when [s since the epoch]."""
 
     key: str
     label: str
@@ -232,9 +239,9 @@ class CurrentRun:
 
 @dataclass(frozen=True)
 class EndedRun:
-    """A run that is done or failed: how long it took [s], when it began and ended [s since the epoch].
+    """An ended run: its status, "done" or "failed", its duration [s], and when it began and ended [s since the epoch].
 
-    ``seconds`` and ``started`` are None of a result that was put in by hand.
+    ``seconds`` and ``started`` are None for a result without a measured duration.
     """
 
     key: str
@@ -246,18 +253,18 @@ class EndedRun:
 
 Record = dict[str, Any]
 RunResult = Record | Failure
-# Whether a result is what the reader of the store takes it for; None: any is.
+# Check of a stored result by the reader of the store; None: every result is sound.
 Sound = Callable[[Record], bool] | None
 
 
 class Store(Database):
-    """Results by key, failures with their cause, and what is being run."""
+    """Results by key, failures with their causes, and current runs."""
 
     def __init__(self, path: Path, study: str = "", read_only: bool = False) -> None:
-        """Open or make the store; ``study`` is noted with every run.
+        """Open or make the store; ``study`` is noted with each run.
 
-        Raises InputError for a file that is no store, one of another version, or one that another process works on; RunError
-        where the disk is full.
+        Raises InputError for a file that is no store, has another version, or belongs to another live process; RunError if
+        the disk is full.
         """
         super().__init__(path, read_only)
         self._study, self._opened, self._token = study, time.time(), ""
@@ -269,12 +276,13 @@ class Store(Database):
                 raise
 
     def _enter(self) -> None:
-        """Take the lock; what an earlier process had under way is so no more."""
+        """Take the lock, and end the current runs of earlier processes."""
         with self._faults():
-            token = lock.seize(self.path)
+            token = seize_lock(self.path)
         if token is None:
-            fix = "wait until it has ended, or name another folder"
-            raise InputError([f"{self.path}: {self._holder()} works on it; {fix}"])
+            raise InputError(
+                [f"{self.path}: {self._holder()} works on it; wait until it has ended, or name another folder"]
+            )
         self._token = token
         if self._meta("lock") == token:
             return
@@ -284,7 +292,7 @@ class Store(Database):
                 facts = {"lock": token, "holder": f"process {os.getpid()} on {socket.gethostname()}"}
                 connection.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", facts.items())
         except BaseException:
-            lock.free(self.path)
+            free_lock(self.path)
             raise
 
     def _meta(self, name: str) -> str | None:
@@ -293,7 +301,7 @@ class Store(Database):
         return None if row is None else str(row[0])
 
     def _holder(self) -> str:
-        """Who works on the store, in words."""
+        """The process that works on the store, in words."""
         return self._meta("holder") or "another process"
 
     def get(self, key: str) -> Record | None:
@@ -302,9 +310,9 @@ class Store(Database):
         return outcome if isinstance(outcome, dict) else None
 
     def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, RunResult]:
-        """Results and failures of those points that have ended, by key.
+        """Results and failures of the points that have ended, by key.
 
-        A row spoilt on the disk, or whose result is not ``sound``, is reported on standard error and counts as not there.
+        A row that is spoilt or not ``sound`` is reported on standard error and counts as missing.
         """
         outcomes, spoilt = dict[str, RunResult](), list[str]()
         query = "SELECT status, result, digest, cause FROM runs WHERE key = ? AND status != 'claimed'"
@@ -319,7 +327,7 @@ class Store(Database):
         return outcomes
 
     def begin(self, point: Point) -> None:
-        """A run is under way from now on; what was kept of it, spoilt, makes room."""
+        """Note that a run is under way from now on; it replaces a spoilt row."""
         with self._transaction(durable=False) as connection:
             connection.execute(
                 "INSERT OR REPLACE INTO runs (key, status, study, label, run, factors, started, host, pid) "
@@ -333,15 +341,15 @@ class Store(Database):
     def put(
         self, key: str, result: Record, *, seconds: float | None = None, host: str | None = None, pid: int | None = None
     ) -> None:
-        """Keep a result; it is on the disk when this returns.
+        """Store a result; it is on the disk when this returns.
 
-        An equal key already done is left, for equal keys have equal bits. ``host``, ``pid``: where it ran, if not here.
+        A finished row of the same key stays, because equal keys have equal bits. ``host``, ``pid``: where it ran, if not here.
         """
         text = json.dumps(result)
         self._end(key, status="done", result=text, digest=digest_of(text), seconds=seconds, host=host, pid=pid)
 
     def fail(self, key: str, cause: str, *, seconds: float | None = None) -> None:
-        """Keep why a run could not go on."""
+        """Store the cause of a failed run."""
         self._end(key, status="failed", cause=cause, seconds=seconds)
 
     def _end(self, key: str, **facts: Any) -> None:
@@ -355,40 +363,40 @@ class Store(Database):
             connection.execute(f"{insert} {update}", (key, self._study, *facts.values()))
 
     def forget_failures(self, points: Sequence[Point]) -> None:
-        """Let points be run again that failed before this store was opened."""
+        """Delete failures of points from before this store was opened, so that they run again."""
         with self._transaction(durable=True) as connection:
             connection.executemany(
-                # One dated ahead was ended by another clock.
+                # A failure in the future was dated by another clock.
                 "DELETE FROM runs WHERE status = 'failed' AND key = ? AND ended NOT BETWEEN ? AND ?",
                 [(point.key, self._opened, time.time()) for point in points],
             )
 
     def sign(self, kind: str) -> None:
-        """Take away notes of a ``kind`` by earlier processes."""
+        """Delete notes of a ``kind`` by earlier processes."""
         with self._transaction(durable=False) as connection:
-            gone = "DELETE FROM meta WHERE name LIKE ? || '%' AND name != ?"
-            connection.execute(gone, (kind, kind + self._token))
+            statement = "DELETE FROM meta WHERE name LIKE ? || '%' AND name != ?"
+            connection.execute(statement, (kind, kind + self._token))
 
     def note(self, kind: str, text: str) -> None:
-        """Keep a note of a ``kind``, one for each process."""
+        """Store the note of a ``kind``; each process has one."""
         with self._transaction(durable=False) as connection:
             connection.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (kind + self._token, text))
 
     def notes(self, kind: str) -> list[tuple[str, bool]]:
         """Notes of a ``kind``, each with whether its process lives."""
-        live = kind + (self._meta("lock") or "") if lock.is_held(self.path) else None
+        live = kind + (self._meta("lock") or "") if is_locked(self.path) else None
         with self._lock, self._faults():
             rows = self._connection.execute("SELECT name, value FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
         return [(text, name == live) for name, text in rows]
 
     def release(self) -> None:
-        """What has not ended is under way no more."""
+        """Delete runs that have not ended."""
         with self._transaction(durable=False) as connection:
             connection.execute("DELETE FROM runs WHERE status = 'claimed'")
 
     def running(self) -> list[CurrentRun]:
         """Runs that a live process has under way."""
-        if not lock.is_held(self.path):
+        if not is_locked(self.path):
             return []
         with self._lock, self._faults():
             rows = self._connection.execute(
@@ -406,12 +414,12 @@ class Store(Database):
             return [EndedRun(*row) for row in rows]
 
     def close(self) -> None:
-        """Close the file, and open the lock unless another store of this process shares it."""
+        """Close the file, and free the lock unless another store of this process shares it."""
         with self._lock:
             self._connection.close()
         if self._token:
             self._token = ""
-            lock.free(self.path)
+            free_lock(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -421,7 +429,7 @@ class Store(Database):
 
 
 def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, cause: Any) -> RunResult | None:
-    """What a row of an ended run shows; None where it is spoilt."""
+    """Result or failure in the row of an ended run; None for a spoilt row."""
     if status == "failed":
         return Failure(point.label, cause, point.run, dict(point.factors)) if isinstance(cause, str) else None
     if not isinstance(result, str) or digest_of(result) != digest:
@@ -431,3 +439,136 @@ def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, 
     except ValueError:
         return None
     return record if isinstance(record, dict) and (sound is None or sound(record)) else None
+
+
+# Longest wait for a process that tests the lock or is just ending [s].
+LOCK_PATIENCE_S = 2.0
+# Age [s] from which a registration without a lock is stale; a younger one may be about to begin.
+STALE_S = 60.0
+
+
+@dataclass
+class _Session:
+    """A lock of this process, and the number of stores that share it."""
+
+    connection: sqlite3.Connection
+    token: str = field(default_factory=lambda: uuid.uuid4().hex)
+    users: int = 0
+
+
+_sessions: dict[Path, _Session] = {}
+_guard = threading.Lock()
+
+
+def seize_lock(store: Path) -> str | None:
+    """Take or share the lock of a store for this process. Returns its token, None if another process has it.
+
+    Each token needs one ``free_lock``. Raises sqlite3.Error for a folder that cannot be written.
+    """
+    path = store.resolve()
+    with _guard:
+        if path not in _sessions:
+            connection = sqlite3.connect(
+                _lock_file(path), timeout=LOCK_PATIENCE_S, isolation_level=None, check_same_thread=False
+            )
+            try:
+                connection.execute("BEGIN EXCLUSIVE")
+            except sqlite3.Error as error:
+                connection.close()
+                if _is_busy(error):
+                    return None
+                raise
+            _sessions[path] = _Session(connection)
+        _sessions[path].users += 1
+        return _sessions[path].token
+
+
+def free_lock(store: Path) -> None:
+    """Give back a token of ``seize_lock``; the last one frees the lock."""
+    path = store.resolve()
+    with _guard:
+        session = _sessions[path]
+        session.users -= 1
+        if not session.users:
+            session.connection.close()
+            del _sessions[path]
+
+
+def is_locked(store: Path) -> bool:
+    """Whether a process works on a store. It changes nothing."""
+    path = store.resolve()
+    with _guard:
+        if path in _sessions:
+            return True
+    with suppress(OSError):
+        if not _lock_file(path).exists():
+            return False
+        with closing(sqlite3.connect(f"{_lock_file(path).as_uri()}?mode=ro", timeout=0.0, uri=True)) as connection:
+            try:
+                connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            except sqlite3.Error as error:
+                return _is_busy(error)
+    return False
+
+
+def _lock_file(store: Path) -> Path:
+    return store.with_name(f"{store.name}-lock")
+
+
+def _is_busy(error: sqlite3.Error) -> bool:
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+
+
+@contextmanager
+def at_work(study: Path, store: Path) -> Iterator[None]:
+    """Register, while the context lasts, that this process runs the study of a file on a store.
+
+    Without a writable registry the study runs too, and is found by its folder only.
+    """
+    place = _registry()
+    note = None if place is None else place / f"{uuid.uuid4().hex}.json"
+    with suppress(OSError):
+        # A killed process leaves its registration behind.
+        for other in _registrations():
+            if time.time() - other.path.stat().st_mtime > STALE_S and not is_locked(Path(other.store)):
+                other.path.unlink(missing_ok=True)
+        if note is not None:
+            note.parent.mkdir(parents=True, exist_ok=True)
+            content = {"study": str(study.resolve()), "store": str(store.resolve())}
+            note.write_text(json.dumps(content), encoding="utf-8")
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            if note is not None:
+                note.unlink(missing_ok=True)
+
+
+def folders_of(study: Path) -> list[Path]:
+    """Folders in which live processes of this machine and user run the study of a file."""
+    with suppress(OSError):
+        mine = {Path(note.store) for note in _registrations() if note.study == str(study.resolve())}
+        return sorted(store.parent for store in mine if is_locked(store))
+    return []
+
+
+class _Registration(NamedTuple):
+    path: Path
+    study: str
+    store: str
+
+
+def _registry() -> Path | None:
+    base = user_cache()
+    return None if base is None else base / "rbdyn" / "at_work"
+
+
+def _registrations() -> Iterator[_Registration]:
+    place = _registry()
+    for path in () if place is None else place.glob("*.json"):
+        # Unfinished, deleted and spoilt registrations are skipped.
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            content = read_json(path)
+            study, store = content["study"], content["store"]
+            if isinstance(study, str) and isinstance(store, str) and "\0" not in store and Path(store).name:
+                yield _Registration(path, study, store)

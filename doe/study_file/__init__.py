@@ -1,6 +1,7 @@
-"""STUDY.toml: ``study`` is the whole file, ``sections`` its tables. Checked before anything runs.
+"""STUDY.toml and tables of runs, checked before anything runs.
 
-``table`` reads runs made elsewhere.
+- ``study``: the whole file, and the study of a table alone; ``sections``: its tables
+- ``table``: runs made elsewhere, in CSV files
 """
 
 from doe.study_file.study import Study, StudyFile

@@ -6,12 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from rbdyn.base.faults import Consistent, InputError, Strict, read_toml
-from rbdyn.base.fields import Figure, Number, Positive, no_power_of_two
+from rbdyn.base.faults import Consistent, Figure, InputError, Number, Positive, Strict, no_power_of_two, read_toml
 
-# A name that heads a column of a table: one field whoever writes or reads it.
+# A name that heads a column of a table, and is one field of CSV for any reader.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
-# Steps next to a value, or resolutions within a step, that are finer than this are lost in rounding.
+# Smallest ratio of a step to its value, and of a resolution to its step; a finer one is lost in rounding.
 FINEST = 1e-9
 
 
@@ -27,13 +26,13 @@ class Factor(Consistent):
     step: Positive
     """Change of the value per coded unit."""
     resolution: Positive | None = None
-    """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
+    """Resolution of the drawing, to which the pick is rounded; without it the pick is not rounded."""
     tolerance: Positive | None = None
     """Manufacturing tolerance, as a half width."""
     whole: bool = False
-    """Whether only whole numbers are made, such as rollers; runs and pick are rounded to them."""
+    """Whether the factor is a whole number, such as that of rollers; runs and pick are rounded."""
     allowed: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
+    """Lowest and highest value of an adaptive search; without it the search stays in the region of the design."""
 
     def faults(self) -> Iterator[str]:
         if self.step < FINEST * abs(self.centre):
@@ -52,12 +51,12 @@ class Factor(Consistent):
 
     @property
     def finest(self) -> float | None:
-        """Smallest step that is made."""
+        """Resolution of the factor; None without one."""
         return 1.0 if self.whole else self.resolution
 
 
 class Category(Consistent):
-    """A factor without numbers, which only the adaptive search changes; a whole design is made at each of its values."""
+    """A factor without numbers, which only the adaptive search changes; each of its values has a whole design."""
 
     name: Name
     """Name of the factor in tables and messages."""
@@ -66,17 +65,17 @@ class Category(Consistent):
     categories: Annotated[list[str | bool], Field(min_length=2, max_length=8)]
     """Values of the key; the first is the baseline's."""
     inactive: dict[str, list[str]] = {}
-    """By value, the names of factors that mean nothing there, such as {roller = ["guide_clearance_mm"]}: their keys stay as
-    the scene has them."""
+    """By value, the names of factors without effect there, such as {roller = ["guide_clearance_mm"]}: their keys keep the
+    values of the scene."""
 
     def inactive_at(self, place: int) -> list[str]:
-        """Names of the factors that mean nothing at the value in this place."""
+        """Names of the factors without effect at the value in this place."""
         return self.inactive.get(_in_toml(self.categories[place]), [])
 
     def faults(self) -> Iterator[str]:
-        values = [_in_toml(each) for each in self.categories]
-        fix, alien = f"write one of {', '.join(values)}", [name for name in self.inactive if name not in values]
-        yield from (f"inactive.{name}: unknown category; {fix}" for name in alien)
+        values = [_in_toml(value) for value in self.categories]
+        unknown = [name for name in self.inactive if name not in values]
+        yield from (f"inactive.{name}: unknown category; write one of {', '.join(values)}" for name in unknown)
         if len(self.categories) > len({*map(str, self.categories)}):
             yield f"categories = {self.categories}: name each value once"
 
@@ -91,7 +90,7 @@ Kind = Literal[
 ]  # fmt: skip
 Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"]
 
-# Keys that only some kinds of design know.
+# Keys of only some kinds of design.
 KEYS_OF = {
     "central_composite": {"alpha", "cube", "blocks", "cube_blocks"},
     "box_behnken": {"blocks"},
@@ -107,7 +106,7 @@ CENTRES = {"central_composite": 6, "box_behnken": 6, "definitive_screening": 1}
 
 
 class Design(Consistent):
-    """Which runs are made, and in which order. Optimal ones are so for the terms of all response models."""
+    """The runs and their order. Optimal designs are optimal for the terms of all response models."""
 
     kind: Kind = "central_composite"
     """Kind of design."""
@@ -116,22 +115,22 @@ class Design(Consistent):
     cube: Literal["full", "resolution_v"] = "full"
     """Cube of a central composite design: all corners, or a fraction of resolution V."""
     centre_replicates: Annotated[int, Field(ge=0, le=100)] | None = None
-    """Runs at the centre: 6 for central composite and Box-Behnken designs where left out, 1 for definitive screening, else
+    """Runs at the centre; by default 6 for central composite and Box-Behnken designs, 1 for definitive screening, else
     none."""
     blocks: bool = False
-    """Whether the runs are made in orthogonal blocks."""
+    """Whether the runs form orthogonal blocks."""
     cube_blocks: Literal[1, 2, 4] = 1
     """Blocks into which the cube is cut; needs blocks = true."""
     levels: Annotated[int, Field(ge=2, le=100)] = 3
     """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
-    """Runs of a Latin hypercube or Sobol sequence; of an optimal design, which has no default, those next to runs that are
-    given or at the centre."""
+    """Runs of a Latin hypercube or Sobol sequence. An optimal design needs it: its runs besides those of augment and at the
+    centre."""
     augment: str | None = None
-    """Table of runs that were made, next to the study: an optimal design keeps them as they are and adds its own, so that all
-    together show most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
+    """Table of earlier runs, next to the study: an optimal design keeps them and adds its own, so that all together are
+    optimal. Runs of this study in standard order with this seed are not simulated again in its folder."""
     order: Literal["standard", "random"] = "standard"
-    """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
+    """Order of the runs. The seed of a run is seed plus its place in the standard order, in either order."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the design and of its runs."""
 
@@ -154,12 +153,12 @@ class Design(Consistent):
 
 
 class Goal(Consistent):
-    """What is wanted of a response."""
+    """Goal and limits of a response."""
 
     goal: Literal["min", "max", "target", "none"] = "min"
-    """What is wanted: small, large, near target, or nothing (watched, or held by its limits only)."""
+    """Goal: a small value, a large one, one near target, or "none" (the response is observed, or has limits only)."""
     target: Figure | None = None
-    """Value to come near to, for goal = "target"."""
+    """Desired value, for goal = "target"."""
     lower: Figure | None = None
     """Limit that the response must not fall below."""
     upper: Figure | None = None
@@ -167,11 +166,11 @@ class Goal(Consistent):
     weight: Positive = 1.0
     """Weight in the desirability and weights picks."""
     desired: Annotated[list[Figure], Field(min_length=2, max_length=2)] | None = None
-    """Ends of the desirability: nil at one, full at the other (for a target nil at both)."""
+    """Ends of the desirability: 0 at one, 1 at the other (for a target 0 at both)."""
 
     def faults(self) -> Iterator[str]:
         if self.goal == "target" and self.target is None:
-            yield 'target: missing; goal = "target" needs the number to come near to'
+            yield 'target: missing; goal = "target" needs the desired value'
         if self.goal != "target" and self.target is not None:
             yield f'target = {self.target}: goal = "{self.goal}" has none; write goal = "target"'
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
@@ -196,36 +195,36 @@ class Front(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search."""
     pick: Literal["knee", "desirability", "weights"] = "knee"
-    """Rule that makes the pick among the points of the front that dominate the baseline."""
+    """Rule of the pick among the points of the front that dominate the baseline."""
     draws: Annotated[int, Field(ge=100, le=100000)] = 1000
-    """Surfaces drawn for the front's uncertainty."""
+    """Random draws of the surfaces for the front's uncertainty."""
     tolerance_aware: Literal["none", "worst_case", "quantile"] = "none"
-    """A second front, of what the factors' tolerances leave of a point: its worst case or its quantile."""
+    """A second front, of points within the factors' tolerances: by the worst case or by a quantile of the parts."""
     quantile: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     """Quantile of a tolerance-aware front."""
     distribution: Literal["normal", "uniform"] = "normal"
-    """How parts scatter within the tolerances."""
+    """Distribution of the parts within the tolerances."""
     tolerance_samples: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
-    """Parts drawn for a quantile."""
+    """Random parts for a quantile."""
 
 
 class Adaptive(Strict):
-    """The search with emulators, from the runs of the design on."""
+    """The search with emulators, which begins with the runs of the design."""
 
     budget: Annotated[int, Field(ge=10, le=10000)] = 100
-    """Runs, those of the design and the last fifth, fresh ones at the points of the front, included."""
+    """All runs: those of the design, those of the search, and a last fifth of fresh runs at the points of the front."""
     batch: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Runs chosen at once, so that many workers have work; the search knows a little less of each than one by one."""
+    """Runs chosen at once, so that many workers have work; one by one each would be chosen a little better."""
     extend: bool = True
-    """Whether the region grows where the front lies at its edge, as far as the factors' "allowed" permit."""
+    """Whether the region grows where the front lies at its edge, up to the factors' "allowed" ends."""
     least_clearance_um: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
-    """Diametral clearance that is left to the bearing in operation, mounted, hot and at speed, wherever the region grows: below
-    0 it would be preloaded. What the floor of the land's film needs of the guide clearance the scene itself demands."""
+    """Least diametral clearance of the bearing in operation, mounted, hot and at speed, wherever the region grows; below 0 it is
+    preloaded. The least guide clearance follows from the scene, by the floor of the land's film."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search and its runs."""
     set: list[str] = []
-    """Keys of the scene that are replaced, as "key=value". Where figures drift, a run is lengthened to twice the turns asked for
-    at most, unless numerics.extend_limit stands here or is less in the scene."""
+    """Overrides of the scene's keys, as "key=value". A run whose figures drift grows to twice its turns at most, unless
+    numerics.extend_limit is set here or is less in the scene."""
 
 
 class Robust(Consistent):
@@ -234,12 +233,11 @@ class Robust(Consistent):
     points: Annotated[int, Field(ge=32, le=1024)] = 256
     """Input sets, a power of two; the baseline and the pick are simulated at each."""
     settle: Annotated[float, Field(ge=0.0, le=4.0)] = 0.5
-    """Further simulations, as a share of the first, spent on the input sets where a gain is in doubt."""
+    """Further simulations of input sets with a doubtful gain, as a share of the first simulations."""
     front: Literal["quantile", "mean", "none"] = "quantile"
-    """A front of what holds over the unknowns: the quantile or the mean of each gain over the baseline; some of its points are
-    simulated next to the pick."""
+    """A robust front: by the quantile or the mean of each gain over the unknown inputs. Some of its points are simulated too."""
     quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
-    """Quantile of a robust front: in how many of the cases a gain may be less."""
+    """Quantile of a robust front: the share of cases in which a gain is smaller."""
 
     def faults(self) -> list[str]:
         return no_power_of_two("points = ", self.points)
@@ -251,36 +249,35 @@ class Tolerances(Strict):
     probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Probability that a part keeps its share of every predicted gain, and all limits."""
     keep: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    """Share of each predicted gain that must be kept."""
+    """Share of each predicted gain that a part must keep."""
     aim: Literal["ratios", "product", "sum"] = "ratios"
-    """"ratios" keeps the ratios of the factors' own tolerances (of their steps, where one has none); "product" and
-    "sum" maximise that of the half widths."""
+    """"ratios" keeps the ratios of the factors' own tolerances, or of their steps if one has none; "product" and "sum" of
+    the half widths are maximised."""
     distribution: Literal["normal", "uniform"] = "normal"
-    """How parts scatter within the tolerances."""
+    """Distribution of the parts within the tolerances."""
     surface_uncertainty: bool = False
     """Whether the errors of the surfaces count too."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096
-    """Parts drawn."""
+    """Random parts."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the parts."""
 
 
 class StudyChain(Consistent):
-    """Dimension chain whose closing link is the picked value of a factor. Its links stand here or in a file."""
+    """Dimension chain whose closing link is the picked value of a factor. Its links are here or in a file."""
 
     name: Annotated[str, Field(min_length=1)]
     """Name of the chain."""
     factor: str
     """The factor whose picked value the chain must close."""
     half_width_mm: Annotated[float, Field(gt=0.0)] | None = None
-    """Half width of the closing link about the pick; the tolerance that the study derives for the factor where left
-    out."""
+    """Half width of the closing link about the pick; by default the widest tolerance of the factor that the study finds."""
     file: str | None = None
-    """CHAIN.toml next to the study, which has the links under the chain's name."""
+    """CHAIN.toml next to the study, with the links under the chain's name."""
     link: list[dict[str, Any]] = []
     """Links, as in a CHAIN.toml."""
     allocate: dict[str, Any] = {}
-    """How tolerances are shared, as in a CHAIN.toml."""
+    """Allocation of the tolerances, as in a CHAIN.toml."""
     monte_carlo: dict[str, Any] = {}
     """Monte Carlo of the assemblies, as in a CHAIN.toml."""
     selective: dict[str, Any] | None = None
@@ -290,14 +287,14 @@ class StudyChain(Consistent):
         if self.file is None and not self.link:
             yield "link: missing; give the links, or the file that has them"
         if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
-            yield f"file = {self.file!r}: has the links and all about them; leave out one or the other"
+            yield f"file = {self.file!r}: states the links with all their settings; leave out the file or these"
 
 
 def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float | None = None) -> Mapping[str, Any]:
-    """CHAIN.toml contents of a study's chain at a picked value [mm]; ``folder`` is where the study lies.
+    """Contents of CHAIN.toml for a study's chain at a picked value [mm]; ``folder`` is that of the study.
 
-    ``half_width`` [mm] stands in where the chain gives none. Raises InputError where neither is there, or the chain is
-    not in its file.
+    ``half_width`` [mm] is used if the chain states none. Raises InputError without either, or if the chain is not in its
+    file.
     """
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
@@ -306,8 +303,8 @@ def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float
         )
     limits = {"lower_mm": value - half, "upper_mm": value + half}
     if chain.file is not None:
-        named = _of_file(chain.name, folder / chain.file)
-        return {**{key: each for key, each in named.items() if key != "name"}, "closing_link": limits}
+        table_of_file = _of_file(chain.name, folder / chain.file)
+        return {**{key: content for key, content in table_of_file.items() if key != "name"}, "closing_link": limits}
     table = {"closing_link": limits, "link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
     return table if chain.selective is None else table | {"selective": chain.selective}
 

@@ -1,5 +1,6 @@
-"""STUDY.toml as a whole: which scene, factors, responses, front, chains, checked before anything runs; and a study made of a table alone,
-of which some columns are factors and others responses.
+"""STUDY.toml as a whole: its scene, factors, responses, front and chains, checked before anything runs.
+
+A study can also be made from a table alone, of which some columns are factors and others responses.
 """
 
 import re
@@ -29,8 +30,17 @@ from doe.study_file.sections import (
 )
 from doe.study_file.table import COUNT, LABELS, Column, Sheet, is_number, listed, quoted, read_sheet, table_of
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import Consistent, InputError, Strict, assignment_faults, one_line, read_toml, refuse, validated
-from rbdyn.base.fields import Number
+from rbdyn.base.faults import (
+    Consistent,
+    InputError,
+    Number,
+    Strict,
+    assignment_faults,
+    one_line,
+    read_toml,
+    refuse,
+    validated,
+)
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 FORMER_TABLE = (
@@ -41,27 +51,27 @@ MOST_FACTORS = 8
 
 
 class SceneFile(Strict):
-    """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
+    """Scene of all runs; ``set`` overrides its keys for the design runs."""
 
     file: str
     """The scene file, next to the study."""
     set: list[str] = []
-    """Keys of the scene that are replaced for the design runs, as "key=value"; factors and seeds are none of them."""
+    """Overrides of the scene's keys for the design runs, as "key=value"; not of factors and seeds."""
 
 
 class Fitted(Strict):
-    """How a surface is fitted to a response."""
+    """Fit of a surface to a response."""
 
     model: Model = "quadratic"
     """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
     weighting: Literal["equal", "replicates"] = "equal"
-    """"replicates" weighs each run by the inverse of its variance, known from the replicates of the simulation."""
+    """"replicates" weighs each run by the inverse of its variance, by the replicates of the simulation."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
-    """Transform of Box and Cox before the fit: none, the recommended one, or with the exponent given."""
+    """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
 
 
 class Response(Fitted, Goal):
-    """A response of the simulation, the surface fitted to it and what is wanted of it."""
+    """A response of the simulation, the fit of its surface, its goal and its limits."""
 
     name: Name
     """Name of the response: a figure of the simulation, or a column of the table."""
@@ -71,15 +81,14 @@ class Confirmation(Strict):
     """Simulation at the baseline and at the pick."""
 
     replicates: Annotated[int, Field(ge=2, le=10000)] = 16
-    """Replicates of each confirmed point."""
+    """Replicates of each point that is simulated for confirmation."""
     limit_probability: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.95
-    """Probability with which the simulated pick must keep each limit: one chance in twenty of a broken one, as the 95 %
-    intervals leave everywhere else."""
+    """Probability with which the simulated pick must keep each limit; the default leaves 5 % for a broken limit."""
     tries: Annotated[int, Field(ge=1, le=20)] = 4
-    """Points of the front that are simulated at most until one keeps its limits: the second already knows what the
-    surfaces missed at the first; each takes a simulation and a search."""
+    """Most points of the front that are simulated until one keeps its limits. Each takes a simulation and a search, which
+    uses the errors of the surfaces at the earlier points."""
     set: list[str] = []
-    """Keys of the scene that are replaced, as "key=value"."""
+    """Overrides of the scene's keys, as "key=value"."""
 
 
 class Reference(Strict):
@@ -90,22 +99,22 @@ class Reference(Strict):
     label: str
     """Name of the source."""
     why: dict[str, str] = {}
-    """What to expect of each response, by its name."""
+    """Remark on each response, by its name, which is shown with the comparison."""
 
 
 class StudyFile(Consistent):
     """The whole file."""
 
     scene: SceneFile | None = None
-    """The scene that every run starts from; none where all runs come from a table."""
+    """The scene of all runs; none if all runs come from a table."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """The factors."""
     category: Annotated[list[Category], Field(max_length=3)] = []
-    """Factors without numbers; a [[factor]] that has "categories" is one of these."""
+    """Factors without numbers; a [[factor]] with "categories" is one of these."""
     response: Annotated[list[Response], Field(min_length=1)]
     """The responses."""
     design: Design = Design()
-    """Which runs are made."""
+    """The design of the runs."""
     front: Front = Front()
     """The search on the surfaces."""
     adaptive: Adaptive = Adaptive()
@@ -115,11 +124,11 @@ class StudyFile(Consistent):
     uncertain: Uncertain | None = None
     """Unknown inputs of the scene; they replace those that the scene declares."""
     tolerances: Tolerances | None = None
-    """The widest tolerances of the factors about the pick; none where left out."""
+    """The widest tolerances of the factors about the pick; without it none are sought."""
     confirmation: Confirmation = Confirmation()
     """The simulation at the baseline and at the pick."""
     baseline: dict[str, Number] = {}
-    """Values of the original design by factor; the centre where left out."""
+    """Values of the original design by factor; by default the centre."""
     chain: list[StudyChain] = []
     """Dimension chains that the pick's clearances close."""
     reference: Reference | None = None
@@ -131,48 +140,59 @@ class StudyFile(Consistent):
         factors = data.get("factor") if isinstance(data, dict) else None
         if not isinstance(factors, list):
             return data
-        apart = [isinstance(one, dict) and "categories" in one for one in factors]
-        moved, kept = (
-            [one for one, is_one in zip(factors, apart, strict=True) if is_one is side] for side in (True, False)
+        apart = [isinstance(table, dict) and "categories" in table for table in factors]
+        category_tables, factor_tables = (
+            [table for table, is_one in zip(factors, apart, strict=True) if is_one is side] for side in (True, False)
         )
-        return {**data, "factor": kept, "category": [*data.get("category", []), *moved]} if moved else data
+        return (
+            {**data, "factor": factor_tables, "category": [*data.get("category", []), *category_tables]}
+            if category_tables
+            else data
+        )
 
     def faults(self) -> list[str]:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
-        keys = [factor.key for factor in self.factor if factor.key] + [each.key for each in self.category]
+        keys = [factor.key for factor in self.factor if factor.key] + [category.key for category in self.category]
         faults: list[str] = []
         if self.scene is not None:
-            faults += [f"factor[{n}].key: missing; add it" for n, one in enumerate(self.factor, 1) if not one.key]
-            faults += ["factor: one is too few to simulate; add another"] * (len(names) == 1)
-        for kind, given in (
-            ("factor.name", [*names, *(each.name for each in self.category)]),
+            faults += [f"factor[{n}].key: missing; add it" for n, factor in enumerate(self.factor, 1) if not factor.key]
+            faults += ["factor: simulations need two factors; add another"] * (len(names) == 1)
+        for kind, names_of_kind in (
+            ("factor.name", [*names, *(category.name for category in self.category)]),
             ("factor.key", keys),
             ("response.name", responses),
             ("chain.name", [chain.name for chain in self.chain]),
         ):
-            repeated = [name for name, count in Counter(given).items() if count > 1]
+            repeated = [name for name, count in Counter(names_of_kind).items() if count > 1]
             faults += [f"{kind} = {name!r}: used more than once; name each once" for name in repeated]
-        taken = {COUNT, *LABELS, *(f"{name}_error" for name in responses)}
-        for kind, given, others in (("factor", names, taken | set(responses)), ("response", responses, taken)):
-            alike = [name for name in given if name in others]
-            faults += [f"{kind}.name = {name!r}: is another column of a table of runs; rename it" for name in alike]
-        known = ", ".join(names)
+        reserved_names = {COUNT, *LABELS, *(f"{name}_error" for name in responses)}
+        for kind, names_of_kind, others in (
+            ("factor", names, reserved_names | set(responses)),
+            ("response", responses, reserved_names),
+        ):
+            repeated_names = [name for name in names_of_kind if name in others]
+            faults += [
+                f"{kind}.name = {name!r}: is another column of a table of runs; rename it" for name in repeated_names
+            ]
+        choices = ", ".join(names)
         faults += [
-            f"factor.inactive of {each.name} = {name!r}: no such factor; name one of {known}"
-            for each in self.category
-            for name in dict.fromkeys(name for group in each.inactive.values() for name in group)
+            f"factor.inactive of {category.name} = {name!r}: no such factor; name one of {choices}"
+            for category in self.category
+            for name in dict.fromkeys(name for group in category.inactive.values() for name in group)
             if name not in names
         ]
-        faults += [f"baseline.{key}: no such factor; name one of {known}" for key in self.baseline if key not in names]
         faults += [
-            f"chain.factor = {chain.factor!r}: no such factor; name one of {known}"
+            f"baseline.{key}: no such factor; name one of {choices}" for key in self.baseline if key not in names
+        ]
+        faults += [
+            f"chain.factor = {chain.factor!r}: no such factor; name one of {choices}"
             for chain in self.chain
             if chain.factor not in names
         ]
         return [*faults, *self._key_faults(keys), *self._set_faults(keys)]
 
     def _key_faults(self, keys: Sequence[str]) -> Iterator[str]:
-        """Factors that no run would have."""
+        """Faults of keys whose values no run would have."""
         tables = {tuple(path[:end]) for path in (key.split(".") for key in keys) for end in range(1, len(path))}
         for key in keys:
             path = tuple(key.split("."))
@@ -182,28 +202,28 @@ class StudyFile(Consistent):
                 yield f"factor.key = {key!r}: replaces the table of another factor's key; take one of them out"
 
     def _set_faults(self, keys: Sequence[str]) -> list[str]:
-        """Assignments that no run would have, in each list of them."""
+        """Faults of overrides that no run would have."""
         claims = {tuple(key.split(".")): "is a factor, whose value each run has; leave it out" for key in keys}
         claims |= {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
         replicates = ("numerics", "replicates")
-        own: dict[str, dict[tuple[str, ...], str]] = {
+        own_claims: dict[str, dict[tuple[str, ...], str]] = {
             "confirmation": {replicates: "confirmation.replicates says it; write it there"},
             "adaptive": {replicates: "the search chooses it for each run; leave it out"},
         }
         faults = assignment_faults("scene.set", self.scene.set, claims) if self.scene else []
-        for name, more in own.items():
+        for name, more in own_claims.items():
             faults += assignment_faults(f"{name}.set", getattr(self, name).set, claims | more)
         return faults
 
 
 @dataclass(frozen=True)
 class Study:
-    """A checked study and where its file lies; paths in it are relative to that folder."""
+    """A checked study and the path of its file; paths in it are relative to its folder."""
 
     path: Path
     file: StudyFile
     levels: tuple[int, ...] = ()
-    """Places of the values of its categories; the first of each, which are the baseline's, where there are none."""
+    """Places of the values of its categories; by default the first of each, which are those of the baseline."""
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -220,7 +240,7 @@ class Study:
 
     @property
     def scene(self) -> SceneFile:
-        """Scene of the runs. Raises InputError for a study that has none."""
+        """Scene of the runs. Raises InputError for a study without one."""
         if self.file.scene is None:
             raise InputError(
                 [
@@ -252,7 +272,7 @@ class Study:
 
     @property
     def baseline(self) -> Array:
-        """Baseline in factor units; the centre unless given."""
+        """Baseline in factor units; by default the centre."""
         return np.array([self.file.baseline.get(factor.name, factor.centre) for factor in self.file.factor])
 
     def coded(self, points: Array) -> Array:
@@ -263,59 +283,66 @@ class Study:
         """Factor values of coded points (..., k)."""
         return to_actual(coded, self.centre, self.step)
 
-    def at(self, levels: tuple[int, ...]) -> Self:
+    def with_levels(self, levels: tuple[int, ...]) -> Self:
         """The study with its categories at these places."""
         return replace(self, levels=levels)
 
     @property
     def every_level(self) -> list[tuple[int, ...]]:
         """Places of all combinations of the categories' values."""
-        return list(product(*(range(len(each.categories)) for each in self.file.category)))
+        return list(product(*(range(len(category.categories)) for category in self.file.category)))
 
     @property
     def categories(self) -> dict[str, str]:
         """Values of the categories by name."""
         places = self.levels or self.every_level[0]
-        return {each.name: str(each.categories[at]) for each, at in zip(self.file.category, places, strict=True)}
+        return {
+            category.name: str(category.categories[place])
+            for category, place in zip(self.file.category, places, strict=True)
+        }
 
     @property
     def inactive(self) -> tuple[int, ...]:
-        """Places of the factors that mean nothing at the values of its categories."""
+        """Places of the factors without effect at the values of its categories."""
         places = self.levels or self.every_level[0]
-        named = {name for each, at in zip(self.file.category, places, strict=True) for name in each.inactive_at(at)}
-        return tuple(place for place, name in enumerate(self.factors) if name in named)
+        inactive_names = {
+            name
+            for category, level in zip(self.file.category, places, strict=True)
+            for name in category.inactive_at(level)
+        }
+        return tuple(place for place, name in enumerate(self.factors) if name in inactive_names)
 
     def by_factor(self, point: Array) -> dict[str, float]:
         """Values (k,) by name of the factor."""
         return dict(zip(self.factors, point.tolist(), strict=True))
 
     def rounded(self, point: Array) -> Array:
-        """A point with every factor at its resolution."""
+        """A point with each factor rounded to its resolution."""
         values = []
         for fine, x in zip((factor.finest for factor in self.file.factor), point.tolist(), strict=True):
             values.append(x if fine is None else round(round(x / fine) * fine, 12))
         return np.array(values)
 
-    def beside(self, name: str) -> Path:
-        """A file named in the study."""
+    def path_of(self, name: str) -> Path:
+        """Path of a file that the study names."""
         return self.path.parent / name
 
 
-# Texts that a date or a time of day begins with, and those that were meant as numbers.
+# Beginnings of a date or a time of day, and of a text that is nearly a number.
 DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}|\d{1,2}:\d\d")
 NEARLY_NUMBER = re.compile(r"\W{0,3}\d")
-# Responses that are fitted without being named: each takes of the order of a second.
+# Most responses that are fitted without being named: each takes about a second.
 MOST_UNNAMED = 100
 
 
 def study_of_table(path: Path, factors: list[str], responses: list[str], model: str) -> tuple[Study, tuple[str, ...]]:
-    """The study of the columns named, without a scene, and notes on columns that it leaves out.
+    """The study of the named columns of a table, without a scene, and notes on columns that it leaves out.
 
-    Where only one kind is named, the other is all further columns of numbers. A factor is 0 in coded units amid its range in
-    the table, and -1 and 1 at the ends.
+    If only factors or only responses are named, the other kind is all further columns of numbers. Coded -1 and 1 are the
+    ends of a factor's range in the table.
 
-    Raises InputError for names that are no columns, a column of which only some cells are numbers, a factor that never
-    changes, and a table that cannot be read.
+    Raises InputError for a name that is no column, a column with only some numbers, a constant factor, and a table that
+    cannot be read.
     """
     sheet = read_sheet(path)
     has = f"it has {listed(sheet.places)}"
@@ -329,17 +356,17 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
         raise InputError([f"{path}: name its factors by --factor NAME and its responses by --response NAME; {has}"])
     notes = list[str]()
     if not factors or not responses:
-        rest, notes = _rest(sheet, {*factors, *responses}, responses)
-        factors, responses = factors or rest, responses or rest
+        numbers, notes = _rest(sheet, {*factors, *responses}, responses)
+        factors, responses = factors or numbers, responses or numbers
     if not factors or not responses:
         raise InputError([*notes, f"{path}: has no further column of numbers; {has}"])
-    for kind, names, most in (("factor", factors, MOST_FACTORS), ("response", responses, MOST_UNNAMED)):
-        if len(names) > most:
-            raise InputError([f"{path}: has {len(names)} columns for {kind}s; name {most} at most by --{kind} NAME"])
+    for kind, names, limit in (("factor", factors, MOST_FACTORS), ("response", responses, MOST_UNNAMED)):
+        if len(names) > limit:
+            raise InputError([f"{path}: has {len(names)} columns for {kind}s; name {limit} at most by --{kind} NAME"])
     actual = table_of(sheet, factors, responses, path).actual
     low, high = actual.min(axis=0), actual.max(axis=0)
-    always = [(factors[place], low[place]) for place in np.flatnonzero(low == high).tolist()]
-    refuse(f"--factor {name}: is {value:g} in every row of {path}; leave it out" for name, value in always)
+    constants = [(factors[place], low[place]) for place in np.flatnonzero(low == high).tolist()]
+    refuse(f"--factor {name}: is {value:g} in every row of {path}; leave it out" for name, value in constants)
     scales = zip(factors, (0.5 * (low + high)).tolist(), (0.5 * (high - low)).tolist(), strict=True)
     data = {
         "factor": [{"name": name, "centre": centre, "step": step} for name, centre, step in scales],
@@ -348,28 +375,28 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     return Study(path, validated(StudyFile, data, str(path))), tuple(notes)
 
 
-def _rest(sheet: Sheet, named: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Columns of numbers that are not ``named``, and notes on what else is there.
+def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Columns of numbers that are not in ``excluded``, and notes on other columns.
 
-    Errors belong to ``responses``, or to the rest where that is the responses. A column that is nearly one of numbers is
-    taken for one: whoever reads it refuses its other cells.
+    Columns of errors belong to ``responses``, or else to the rest. A column of nearly numbers is one of them, and its
+    reader refuses the other cells.
     """
-    others = [name for name in sheet.places if name not in {COUNT, *LABELS, *named}]
-    of = set(responses or others)
-    errors = {f"{name}_error" for name in of}
-    idle = {f"{name}_error" for name in sheet.places if name not in of}
-    apart = errors | idle
-    words = {name: _words(sheet.column(name)) for name in others if name not in apart}
-    rest = [name for name, label in words.items() if label is None]
+    candidates = [name for name in sheet.places if name not in {COUNT, *LABELS, *excluded}]
+    owners = set(responses or candidates)
+    errors = {f"{name}_error" for name in owners}
+    idle_errors = {f"{name}_error" for name in sheet.places if name not in owners}
+    error_columns = errors | idle_errors
+    words = {name: _words(sheet.column(name)) for name in candidates if name not in error_columns}
+    numbers = [name for name, label in words.items() if label is None]
     labels = [label for label in words.values() if label is not None]
-    unused = [name for name in others if name in idle and name not in errors]
+    unused = [name for name in candidates if name in idle_errors and name not in errors]
     reasons = [("no numbers", labels), ("errors of no response", unused)]
     reasons.append(("without a name", [f"column {number}" for number in sheet.nameless]))
-    return rest, [f"{sheet.path}: left out as {why}: {listed(names)}" for why, names in reasons if names]
+    return numbers, [f"{sheet.path}: left out as {reason}: {listed(names)}" for reason, names in reasons if names]
 
 
 def _words(column: Column) -> str | None:
-    """Name and first text of a column that is clearly none of numbers; None of any other."""
+    """Name and first text of a column that is clearly not one of numbers; None for any other."""
     texts = [text for text in column.texts if text]
     if any(is_number(text) or (NEARLY_NUMBER.match(text) and not DATE.match(text)) for text in texts):
         return None

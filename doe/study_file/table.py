@@ -1,5 +1,7 @@
-"""Tables of runs: a column a factor and a response, optionally errors, replicates and blocks; and the cells of CSV files: fields by the
-names of their columns, and one bounded reader for every number in them.
+"""Tables of runs, and the CSV files that hold them.
+
+A table has a column for each factor and response, and optional ones of errors, replicates and blocks. Cells of a CSV file are
+read by the names of their columns, and all numbers by one reader with bounds.
 """
 
 import csv
@@ -24,14 +26,14 @@ from rbdyn.base.words import counted
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 # Characters of a number: every double has a shorter form, and Python converts no integer of thousands of digits.
 LONGEST_NUMBER = 400
-# What stands where a number is unknown.
+# Cells of an unknown number.
 UNKNOWN = ("", "nan")
-# Names that a message lists at most.
+# Most names that a message lists.
 MOST_NAMES = 20
 
 
 class Limits(NamedTuple):
-    """Numbers that a column may have: up to ``most`` in magnitude, 0 or at least ``least``, of this ``sign``, whole or not."""
+    """Numbers that a column may have: up to ``most`` in magnitude, 0 or at least ``least``, with a ``sign``, whole or not."""
 
     most: float
     least: float = 0.0
@@ -39,7 +41,7 @@ class Limits(NamedTuple):
     whole: bool = False
 
     def fault(self, value: float) -> str:
-        """What is wrong with a value that is not within the limits, and how to fix it."""
+        """The fault of a value outside the limits, with its fix."""
         if not math.isfinite(value) or (self.whole and value != round(value)):
             return f"is not a {'whole' if self.whole else 'finite'} number; write a plain one"
         if abs(value) > self.most:
@@ -55,33 +57,33 @@ class Limits(NamedTuple):
         return not self.broken(np.array([value]))
 
     def broken(self, values: Array) -> list[int]:
-        """Places of the values (n,) that are not within the limits."""
+        """Places of the values (n,) outside the limits."""
         size = np.abs(values)
-        within = (size <= self.most) & ((size >= self.least) | (size == 0.0))
-        within &= (values == np.round(values)) | (not self.whole)
-        within &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
-        return np.flatnonzero(~within).tolist()
+        valid = (size <= self.most) & ((size >= self.least) | (size == 0.0))
+        valid &= (values == np.round(values)) | (not self.whole)
+        valid &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
+        return np.flatnonzero(~valid).tolist()
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a CSV file: its ``name``, and the ``texts`` of its cells without blanks around them."""
+    """A column of a CSV file: its ``name``, and the stripped ``texts`` of its cells."""
 
     path: Path
     name: str
     texts: Sequence[str]
 
     def fault(self, row: int, words: str, value: bool = True) -> str:
-        """A sentence on the cell of a row, from 0, with its text unless ``value`` is False; rows count from 1 in it."""
+        """A sentence on the cell in ``row`` (from 0), with its text if ``value``; the sentence counts rows from 1."""
         text = self.texts[row]
         plain = bool(NUMBER.fullmatch(text)) and len(text) < LONGEST_NAME
-        shown = f" = {text if plain else quoted(text)}" if value else ""
-        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in row {row + 1}{shown}: {words}"
+        cell = f" = {text if plain else quoted(text)}" if value else ""
+        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in row {row + 1}{cell}: {words}"
 
     def numbers(self, limits: Limits, unknown: Collection[str] = ()) -> tuple[Array, list[str]]:
-        """Numbers (n,) of the cells, and a sentence for each cell that has none within the ``limits``.
+        """Numbers (n,) of the cells, and a sentence for each cell without a number within the ``limits``.
 
-        Cells whose text in lower case is ``unknown`` are NaN and no fault.
+        Cells whose text in lower case is in ``unknown`` are NaN, without a fault.
         """
         values = np.array([float(text) if is_number(text) else math.nan for text in self.texts])
         faults = []
@@ -93,7 +95,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A CSV file: names in its ``header``, and ``rows`` with as many fields as they are written."""
+    """A CSV file: names in its ``header``, and ``rows`` of fields as they are written."""
 
     path: Path
     header: list[str]
@@ -101,38 +103,38 @@ class Sheet:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Place of each column that has a name."""
+        """Place of each column with a name."""
         return {name: place for place, name in enumerate(self.header) if name}
 
     def __contains__(self, name: str) -> bool:
         return name in self.places
 
     def column(self, name: str) -> Column:
-        """The column of a name."""
+        """The column of this name."""
         place = self.places[name]
         return Column(self.path, name, [plain_cell(row[place].strip()) for row in self.rows])
 
     @property
     def nameless(self) -> list[int]:
-        """Numbers, from 1, of columns that have cells and no name."""
+        """Numbers, from 1, of columns with cells and no name."""
         places = [place for place, name in enumerate(self.header) if not name]
         return [place + 1 for place in places if any(row[place].strip() for row in self.rows)]
 
     def refuse_nameless(self) -> None:
-        """Raises InputError for columns that have cells and no name."""
+        """Raises InputError for columns with cells and no name."""
         refuse(f"{self.path}: column {number} has no name; name it or remove it" for number in self.nameless)
 
 
 def read_sheet(path: Path) -> Sheet:
-    """Names in the header and fields of the rows of a CSV file, as many in each; blank lines are none.
+    """Header and rows of a CSV file, without its blank lines.
 
-    Raises InputError where it is no CSV, has no rows, a name comes twice, or a row has more or fewer fields than the header.
+    Raises InputError if it is no CSV, has no rows, has a name twice, or a row has more or fewer fields than the header.
     """
     lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     fields, start = [], 1
     try:
         for row in lines:
-            # A quoted empty field is a cell; a line of blanks is none.
+            # A quoted empty field is a cell; a blank line is none.
             if len(row) > 1 or (row and (row[0] == "" or row[0].strip())):
                 fields.append(row)
             start = lines.line_num + 1
@@ -140,37 +142,37 @@ def read_sheet(path: Path) -> Sheet:
         fix = "close the quotes that open there" if "unexpected end" in str(error) else "fix that line"
         raise InputError([f"{path}: line {start}: is not CSV ({error}); {fix}"]) from None
     if not fields:
-        raise InputError([f"{path}: is empty; write a header of names and a row a run"])
+        raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
     header, rows = [plain_cell(name.strip()) for name in fields[0]], fields[1:]
     if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
         raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
-    several = {name: count for name, count in Counter(header).items() if count > 1 and name}
-    faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in several.items()]
+    repeated = {name: count for name, count in Counter(header).items() if count > 1 and name}
+    faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in repeated.items()]
     if not rows:
-        faults.append(f"{path}: has a header and no rows; add a row a run")
+        faults.append(f"{path}: has a header and no rows; add a row for each run")
     for number, row in enumerate(rows, 1):
         if len(row) != len(header):
             only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
-            fix = "remove the commas at its end" if only_commas else "give it a field a column, in the header's order"
+            fix = "remove the commas at its end" if only_commas else "give it a field for each column, in their order"
             faults.append(f"{path}: row {number} has {counted(len(row), 'field')} and the header {len(header)}; {fix}")
     refuse(faults)
     return Sheet(path, header, rows)
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number of bounded length; it may still be beyond all doubles."""
+    """Whether a text is a number of bounded length; it may still be larger than any double."""
     return len(text) <= LONGEST_NUMBER and NUMBER.fullmatch(text) is not None
 
 
 def text_of(value: Any) -> Any:
-    """What a CSV writer is given for a value, so that it reads as the same: TOML's words for booleans, no formulas."""
+    """Value for a CSV writer that reads back as the same: TOML's words for booleans, no formulas."""
     return str(value).lower() if isinstance(value, bool) else quoted_cell(value)
 
 
 def listed(names: Collection[str]) -> str:
-    """Names of columns for a message; of many the first."""
-    more = [f"{len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else []
-    return ", ".join([*(one_line(name, LONGEST_NAME) for name in islice(names, MOST_NAMES)), *more])
+    """Names of columns for a message; of many only the first."""
+    remainder = [f"{len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else []
+    return ", ".join([*(one_line(name, LONGEST_NAME) for name in islice(names, MOST_NAMES)), *remainder])
 
 
 def quoted(text: str) -> str:
@@ -179,7 +181,7 @@ def quoted(text: str) -> str:
 
 
 def _slip(text: str) -> str | None:
-    """The slip of the pen that makes a text no number, and how to fix it; None for none that is known."""
+    """The slip that makes a text no number, with its fix; None for an unknown one."""
     if len(text) > LONGEST_NUMBER:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter number"
     if text.lower() in UNKNOWN:
@@ -187,19 +189,19 @@ def _slip(text: str) -> str | None:
     return "is not a finite number; write a point for the decimal comma" if "," in text else None
 
 
-# Fourth powers of larger values overflow; larger labels and counts are no whole numbers in floating point.
+# Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")
 NUMBERED, COUNTED = Limits(1e9, whole=True), Limits(1e9, sign="not negative", whole=True)
 COUNT, LABELS = "replicates", ("block", "run")
-# Runs of which statistics in pairs take seconds and half a gigabyte, and a test of normality is still exact.
+# Most runs of a table: pairwise statistics take seconds and half a gigabyte, and a test of normality is still exact.
 MOST_RUNS = 5000
 
 
 @dataclass(frozen=True)
 class Table:
-    """Factor values (n, k), responses and their 95 % half widths (n, m; NaN where there is none).
+    """Factor values (n, k), responses (n, m) and their 95 % half widths (n, m; NaN if unknown).
 
-    ``replicates`` (n,) behind the errors (0: unknown) and ``block`` (n,) of each run (all 0 without blocks).
+    ``replicates`` (n,) of the errors (0: unknown) and ``block`` (n,) of each run (0 without blocks).
     """
 
     actual: Array
@@ -210,27 +212,28 @@ class Table:
 
 
 def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
-    """Read a CSV table in UTF-8 with a column for each factor and response, if any, commas between fields, points in numbers.
+    """Read a CSV table in UTF-8 with a column for each factor and response, commas between fields, points in numbers.
 
-    A column "<response>_error" holds 95 % half widths (empty or "nan" where unknown), "replicates" and "block" whole
-    numbers; all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a
-    column "run" are replicates: their mean is one run, with the half width of their scatter.
+    A column "<response>_error" holds 95 % half widths (empty or "nan" if unknown), "replicates" and "block" whole numbers;
+    all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a column "run"
+    are replicates: their mean is one run, with the half width of their scatter.
 
-    Raises InputError, with all faults, when the file, a column or a number is missing, a row has more or fewer fields
-    than the header, a column comes twice, a number is not finite or impossible, replicates have different factors, or there
-    are more than `MOST_RUNS` runs.
+    Raises InputError with all faults: a missing file, column or number; a row with more or fewer fields than the header; a
+    repeated column; an infinite or impossible number; replicates with different factors; more than `MOST_RUNS` runs.
     """
     return table_of(read_sheet(path), factors, responses, named_in)
 
 
 def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: Path) -> Table:
-    """The table in a CSV file that is read already, as ``read_table`` has it. Raises InputError."""
+    """The table in a CSV file that is already read. See ``read_table``."""
     path, errors = sheet.path, [f"{name}_error" for name in responses]
     limits = dict.fromkeys([*factors, *responses], RUN) | dict.fromkeys(errors, ERROR)
     limits |= {COUNT: COUNTED, **dict.fromkeys(LABELS, NUMBERED)}
-    fix = f"add it, or rename the factor or response in {named_in} to one of {listed(sheet.header)}"
     faults = [
-        f"{path}: column {quoted(name)} is missing; {fix}" for name in [*factors, *responses] if name not in sheet
+        f"{path}: column {quoted(name)} is missing; add it, or rename the factor or response in {named_in} to one of "
+        f"{listed(sheet.header)}"
+        for name in [*factors, *responses]
+        if name not in sheet
     ]
     columns, optional = {}, set(errors)
     for name in (name for name in limits if name in sheet):
@@ -240,8 +243,8 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
     if "run" in columns and len(set(columns["run"].tolist())) < len(sheet.rows):
         refuse(
             (
-                f"{path}: column {name}: rows of one run are its replicates, whose scatter gives it; remove the column, "
-                "or number the runs apart"
+                f"{path}: column {name}: rows of one run are its replicates, and it follows from their scatter; remove the "
+                "column, or number the runs apart"
             )
             for name in (*errors, COUNT)
             if name in columns
@@ -249,8 +252,9 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         columns = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
     if size > MOST_RUNS:
-        fix = f"give {MOST_RUNS} at most, or number replicates alike in a column run"
-        raise InputError([f"{path}: has {size} runs; {fix}"])
+        raise InputError(
+            [f"{path}: has {size} runs; give {MOST_RUNS} at most, or number replicates alike in a column run"]
+        )
     return Table(
         actual=np.column_stack([columns[name] for name in factors]),
         values=np.column_stack([np.empty((size, 0)), *(columns[name] for name in responses)]),
@@ -263,7 +267,7 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
 def _means_of_replicates(
     path: Path, columns: dict[str, Array], factors: list[str], responses: list[str]
 ) -> dict[str, Array]:
-    """One row a run, in the order of the first rows: mean, half width and number of its replicates."""
+    """A row for each run, in the order of the first rows: mean, half width and number of its replicates."""
     from scipy import special
 
     _, first, group, count = np.unique(columns["run"], return_index=True, return_inverse=True, return_counts=True)
@@ -276,7 +280,7 @@ def _means_of_replicates(
     )
     order = np.argsort(first)
     joined = {name: column[first[order]] for name, column in columns.items()} | {COUNT: count[order].astype(float)}
-    # Student's quantile; a run without replicates has no scatter, and its half width stays unknown.
+    # The quantile is Student's; the half width of a run without replicates is unknown.
     reach = special.stdtrit(np.maximum(count - 1, 1), 0.975) / np.sqrt(count)
     for name in responses:
         mean = np.bincount(group, columns[name]) / count

@@ -1,9 +1,8 @@
-"""Unknown inputs: what is unknown of a scene, and what it does to an answer. Methods on tables; knows no bearing.
+"""Unknown inputs of a scene and their effect on an answer. Methods on tables; they know no bearing.
 
-- ``inputs``: distributions of inputs, their dependence, sets of them, and which of many matter
-- ``propagation``: what an output ranges over, how much of that is noise, which input makes it
-- ``decision``: whether one design beats another all the same
-- ``worth``: which input decides that, and what measuring it is worth
-- ``likelihood``, ``posterior``, ``calibration``: inputs from measurements, and what these identify
-- ``verdict``: whether predictions are as wide as they state, and whether that may be called calibrated
+- ``inputs``: distributions of inputs, their dependence, sets of them, and screening of those that matter
+- ``propagation``: the range of an output, the part of it that is noise, and the inputs that cause it
+- ``decision``: whether one design is better than another all the same, and which input is decisive
+- ``posterior``: the likelihood of measurements, and samples of the inputs by it
+- ``calibration``: inputs from measurements, how far their predictions are right, and whether they may be called calibrated
 """

@@ -1,14 +1,27 @@
-"""Inputs of a simulation from measurements: waves of history matching, then a sampled posterior that is simulated again.
+"""Unknown inputs from measurements: history matching, a posterior that is simulated again, and how far its predictions are right.
 
-History matching: input sets at which the simulation cannot be what was measured are ruled out, in waves.
+History matching. Input sets at which the simulation cannot agree with the measurements are ruled out, in waves. The
+implausibility of a cell is |z - m|/sqrt(V): the distance of the measured value from the emulator's mean in standard deviations
+of rig, emulator, integration and discrepancy together. New input sets spread over the plausible rest.
 
-The implausibility of a cell is |z - m|/sqrt(V): the distance of the measured value from the emulator's mean in standard
-deviations of rig, emulator, integration and discrepancy together. New input sets spread over what is left.
+Predictions. Rows held out are predicted from the training rows. If there are too few of them, every row is predicted from all
+others: particles of the power that serves best are weighted by the likelihood of those others. Predicted are the measured
+values, with biases as the conditioning rows determine them and with the errors of rig and simulation.
 
-Source: Vernon, Goldstein and Bower, Galaxy formation: a Bayesian uncertainty analysis, Bayesian Analysis 5 (2010) 619.
+Width. Predictions that are too wide and predictions that are too narrow both count against a calibration. Rows are predicted
+in turn, each from those before it, so residuals of different rows are independent. Each cell becomes a normal score by its
+rank among the draws of its prediction. The scores of a row are made independent by their correlation among the draws. The
+sum of their squares is small if predictions are too wide and large if they are too narrow. It is judged for all cells together
+and for each output apart; the draws themselves show how small the smallest of these chances may be.
+
+Sources: Vernon, Goldstein and Bower, Galaxy formation: a Bayesian uncertainty analysis, Bayesian Analysis 5 (2010) 619
+(history matching); Gneiting and Raftery, Strictly proper scoring rules, J. Am. Statist. Assoc. 102 (2007) 359 (CRPS); Vehtari,
+Gelman and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation (2017); Kass and Raftery, Bayes
+factors, J. Am. Statist. Assoc. 90 (1995) 773; Dawid, Statistical theory: the prequential approach, J. R. Statist. Soc. A 147
+(1984) 278; Westfall and Young, Resampling-based multiple testing (1993), section 2.3, for the smallest of several chances.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -16,23 +29,38 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.unknown.inputs import nested
-from doe.unknown.likelihood import BY_ROW, Cells, Errors, Joint, Measured, fit_cells, joint
-from doe.unknown.posterior import PARTICLES, Sampled, sampled
+from doe.unknown.inputs import nested, spread_out
+from doe.unknown.posterior import (
+    BEYOND,
+    BY_ROW,
+    PARTICLES,
+    Cells,
+    Errors,
+    Joint,
+    Level,
+    Measured,
+    Sampled,
+    effective,
+    fit_cells,
+    joint,
+    sampled,
+)
 from rbdyn.base.arrays import Array, Mask, Whole
 
+# Implausibility from which an input set is ruled out.
 RULED_OUT = 3.0
-# Emulators are good enough whose variance is below this share of the rest, and volumes steady that change by less than this.
+# Share of the other variances below which emulators are good enough; relative change below which a volume is steady.
 GOOD, STEADY = 0.25, 0.1
-# Rounds in which points that are left beget others, where few are left.
+# Rounds in which plausible input sets propose others, if there are few.
 ROUNDS = 12
 
 
 def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[Array, Array]:
-    """Implausibility (n, k) of the training cells at quantiles (n, d), and the share (n, k) that the emulator has in what
-    the cell is compared with row by row."""
+    """Implausibility (n, k) of the training cells at quantiles (n, d), and the emulators' variance as a share of the others.
+
+    The others are the variances (n, k) of rig, integration and discrepancy by row."""
     learnt = measured.learnt
-    mean, doubt = (each[:, learnt] for each in cells.predict(quantiles))
+    mean, doubt = (prediction[:, learnt] for prediction in cells.predict(quantiles))
     emulator = (doubt**2).sum(axis=2) + cells.rest[learnt]
     square = measured.scales[measured.output[learnt]] ** 2
     apart, rig = np.abs(measured.values[learnt] - mean), measured.variances[learnt]
@@ -41,44 +69,34 @@ def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[
 
 
 def plausible(implausible: Array, wave: int) -> Mask:
-    """Which input sets (n,) are left: in the first wave one cell may be off, as emulators are poor still."""
+    """Plausible input sets (n,): in the first wave one cell may be off, as emulators are still poor."""
     place = max(implausible.shape[1] - (2 if wave == 0 else 1), 0)
     worst = np.partition(implausible, place, axis=1)[:, place]
     return worst < RULED_OUT
 
 
 def ruling_out(implausible: Array) -> Whole:
-    """Places of the cells that rule out every input set (n, k); where none does so alone, of the worst."""
+    """Places of the cells that rule out every input set (n, k); if no single one does, of the two worst."""
     alone = np.flatnonzero((implausible >= RULED_OUT).all(axis=0))
     return alone if alone.size else np.argsort(-np.median(implausible, axis=0))[:2]
 
 
-def more_sets(left: Array, fits: Callable[[Array], Mask], wanted: int, random: np.random.Generator) -> Array:
-    """At least ``wanted`` quantiles where there are as many, of those left (n, d) and of others next to them that fit."""
+def more_sets(plausible_sets: Array, fits: Callable[[Array], Mask], count: int, random: np.random.Generator) -> Array:
+    """Plausible quantiles (n, d) and others near them that ``fits`` accepts, ``count`` or more if there are as many."""
     for _ in range(ROUNDS):
-        if len(left) >= wanted or len(left) < 3:
+        if len(plausible_sets) >= count or len(plausible_sets) < 3:
             break
-        scores = special.ndtri(left)
-        first, second, third = random.integers(0, len(left), (3, 4 * wanted))
-        tried = special.ndtr(scores[first] + 0.5 * (scores[second] - scores[third]))
-        tried = tried.clip(1e-6, 1.0 - 1e-6)
-        left = np.vstack([left, tried[fits(tried)]])
-    return left
+        scores = special.ndtri(plausible_sets)
+        first, second, third = random.integers(0, len(plausible_sets), (3, 4 * count))
+        proposals = special.ndtr(scores[first] + 0.5 * (scores[second] - scores[third]))
+        proposals = proposals.clip(1e-6, 1.0 - 1e-6)
+        plausible_sets = np.vstack([plausible_sets, proposals[fits(proposals)]])
+    return plausible_sets
 
 
-def spread_out(candidates: Array, count: int) -> Array:
-    """``count`` of the candidates (n, d), each the farthest from the first and from those before it."""
-    distance = ((candidates - candidates[0]) ** 2).sum(axis=1)
-    places: list[int] = []
-    for _ in range(min(count, len(candidates))):
-        places.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, ((candidates - candidates[places[-1]]) ** 2).sum(axis=1))
-    return candidates[places]
-
-
-# Input sets of a wave: so many, and so many an input; candidates that show what is left; sets that try the posterior.
+# Input sets of a wave, at least and per input; candidates that measure a volume; sets simulated from the posterior.
 FEWEST, EACH, CANDIDATES, TRIED = 64, 10, 16384, 50
-# Emulators miss where squared residuals of the posterior's simulations average more than this.
+# Mean square of standardized residuals of the posterior's runs above which emulators fail to predict them.
 MISSED = 2.0
 
 
@@ -91,23 +109,27 @@ class Batch(NamedTuple):
     freedom: Whole
 
     def joined(self, other: "Batch") -> "Batch":
-        """Both."""
-        return Batch(*(np.concatenate(each) for each in zip(self, other, strict=True)))
+        """Both batches as one."""
+        return Batch(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """``inputs`` that are to be found: ``at`` turns normal scores (n, d) into quantiles, as they depend on each other."""
+    """Number of unknown inputs; ``quantiles`` turns normal scores (n, d) into their quantiles by the inputs' dependence."""
 
     inputs: int
-    at: Callable[[Array], Array] = special.ndtr
+    quantiles: Callable[[Array], Array] = special.ndtr
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """What was found. ``volumes``: share of the prior that each wave left; ``refuted``: places of the cells that rule out
-    everything, else none; ``sampled``: the posterior, None where everything is refuted and the simulation is taken as exact;
-    ``tried``: its simulations, and the mean square ``misfit`` of the emulators there."""
+    """The result of a calibration.
+
+    volumes : share of the prior that is plausible after each wave
+    refuted : places of the cells that rule out every input set, else none
+    sampled : the posterior; None where everything is refuted and the simulation is taken as exact
+    posterior_runs, misfit : simulations of the posterior, and the mean square of standardized residuals there
+    """
 
     measured: Measured
     unknowns: Unknowns
@@ -116,12 +138,12 @@ class Matched:
     volumes: list[float]
     refuted: list[int]
     sampled: Sampled | None
-    tried: Batch | None
+    posterior_runs: Batch | None
     misfit: float
 
     def quantiles(self, points: Array) -> Array:
         """Quantiles (n, d) of the inputs of particles."""
-        return self.unknowns.at(points[:, : self.unknowns.inputs])
+        return self.unknowns.quantiles(points[:, : self.unknowns.inputs])
 
     def errors(self, points: Array) -> Errors:
         """Errors of the simulation at particles, by output."""
@@ -136,14 +158,14 @@ Simulate = Callable[[Array, int], Batch]
 
 
 def sets_a_wave(inputs: int) -> int:
-    """Input sets that a wave simulates for so many unknown inputs."""
+    """Number of input sets that a wave simulates for so many unknown inputs."""
     return max(FEWEST, EACH * inputs)
 
 
 def matched(
     simulate: Simulate, measured: Measured, unknowns: Unknowns, seed: int, waves: int = 4, particles: int = PARTICLES
 ) -> Matched:
-    """Find the inputs whose simulation is like what was measured.
+    """Calibrate the inputs: find those whose simulation agrees with the measurements.
 
     ``simulate(quantiles, number)`` runs input sets of the stage of that number. Raises what that raises, and RunError.
     """
@@ -167,37 +189,37 @@ def matched(
             break
         points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
     assert batch is not None and cells is not None
-    found = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
-    # A larger discrepancy than was allowed may still show patterns; an exact simulation that is refuted shows nothing.
-    return found if refuted and not measured.scales.any() else _posterior(simulate, found, seed, particles, random)
+    match = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
+    # A discrepancy beyond the allowed one may still show patterns; an exact simulation that is refuted identifies nothing.
+    return match if refuted and not measured.scales.any() else _posterior(simulate, match, seed, particles, random)
 
 
-def _posterior(simulate: Simulate, found: Matched, seed: int, particles: int, random: np.random.Generator) -> Matched:
-    """Sample, simulate some of the posterior; where emulators miss it, they learn from that and it is sampled again."""
+def _posterior(simulate: Simulate, match: Matched, seed: int, particles: int, random: np.random.Generator) -> Matched:
+    """Sample the posterior and simulate some of it; where emulators fail there, they learn from these runs and it is sampled again."""
     for stage in (0, 1):
-        size = found.unknowns.inputs + found.measured.scales.size
-        sample = sampled(partial(_density, found), size, seed, particles)
+        size = match.unknowns.inputs + match.measured.scales.size
+        sample = sampled(partial(_density, match), size, seed, particles)
         rows = random.choice(particles, TRIED, replace=False)
-        tried = simulate(found.quantiles(sample.points[rows]), 100 + stage)
-        found = replace(found, sampled=sample, tried=tried, misfit=_misfit(found.cells, tried))
-        if found.misfit < MISSED:
+        trial = simulate(match.quantiles(sample.points[rows]), 100 + stage)
+        match = replace(match, sampled=sample, posterior_runs=trial, misfit=_misfit(match.cells, trial))
+        if match.misfit < MISSED:
             break
         if stage == 0:
-            batch = found.batch.joined(tried)
-            found = replace(found, batch=batch, cells=_emulated(batch, found.measured, found.cells))
-    return found
+            batch = match.batch.joined(trial)
+            match = replace(match, batch=batch, cells=_emulated(batch, match.measured, match.cells))
+    return match
 
 
-def _density(found: Matched, points: Array) -> Array:
-    return found.joint(points).log_density(found.measured.values, found.measured.learnt)
+def _density(match: Matched, points: Array) -> Array:
+    return match.joint(points).log_density(match.measured.values, match.measured.learnt)
 
 
 def _dependent(unknowns: Unknowns, quantiles: Array) -> Array:
-    return unknowns.at(special.ndtri(quantiles.clip(1e-9, 1.0 - 1e-9)))
+    return unknowns.quantiles(special.ndtri(quantiles.clip(1e-9, 1.0 - 1e-9)))
 
 
 def _spread_over(
-    left: Array,
+    plausible_sets: Array,
     unknowns: Unknowns,
     cells: Cells,
     measured: Measured,
@@ -208,21 +230,369 @@ def _spread_over(
     def fits(quantiles: Array) -> Mask:
         return plausible(implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
 
-    candidates = more_sets(left, fits, 4 * count, random)
+    candidates = more_sets(plausible_sets, fits, 4 * count, random)
     if len(candidates) > 20 * count:
         candidates = random.permutation(candidates)[: 20 * count]
     return spread_out(candidates, count)
 
 
 def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:
-    compared = measured.variances + (BY_ROW * measured.scales[measured.output]) ** 2
-    # An exact rig and no discrepancy still leave what the runs themselves scatter.
-    compared = np.maximum(compared, 1e-3 * batch.values.var(axis=0) + 1e-12)
-    return fit_cells(*batch, compared=compared, before=before)
+    allowance = measured.variances + (BY_ROW * measured.scales[measured.output]) ** 2
+    # With an exact rig and no discrepancy the scatter of the runs themselves remains.
+    allowance = np.maximum(allowance, 1e-3 * batch.values.var(axis=0) + 1e-12)
+    return fit_cells(*batch, allowance=allowance, before=before)
 
 
-def _misfit(cells: Cells, tried: Batch) -> float:
-    """Mean square of how far simulations lie from the emulators, in their doubt and the runs' own error."""
-    mean, doubt = cells.predict(tried.quantiles)
-    whole = (doubt**2).sum(axis=2) + cells.rest + tried.variances.mean(axis=0)
-    return float(((tried.values - mean) ** 2 / whole).mean())
+def _misfit(cells: Cells, trial: Batch) -> float:
+    """Mean square of residuals of simulations from the emulators, in standard deviations of emulators and runs."""
+    mean, doubt = cells.predict(trial.quantiles)
+    whole = (doubt**2).sum(axis=2) + cells.rest + trial.variances.mean(axis=0)
+    return float(((trial.values - mean) ** 2 / whole).mean())
+
+
+# Probability of a rejection, of either side, if predictions are right.
+LEVEL = 0.05
+# Predictions this factor too wide or too narrow must be rejected at least this often, else the cells are too few.
+TWICE, OFTEN = 2.0, 0.5
+
+
+class Scores(NamedTuple):
+    """Predicted cells as independent standard normal scores.
+
+    They are of the measured values (k,) and of draws of the predictions (s, k); ``output`` (k,) is that of each cell."""
+
+    measured: Array
+    draws: Array
+    output: Whole
+
+
+@dataclass(frozen=True)
+class Width:
+    """The width of predictions of ``cells`` many cells.
+
+    ratio : scatter of the residuals over the predicted scatter
+    chance : probability of as much in either direction if predictions are right
+    output, worst : place of the output that shows it most (None: all together), and its own ratio
+    power : probabilities of rejecting predictions that are twice too wide, and twice too narrow
+    """
+
+    cells: int
+    ratio: float
+    chance: float
+    output: int | None
+    worst: float
+    power: tuple[float, float]
+
+    @property
+    def rejected(self) -> bool:
+        """Whether predictions are too wide or too narrow."""
+        return self.chance <= LEVEL
+
+    @property
+    def enough(self) -> bool:
+        """Whether the cells would show predictions that are twice too wide or too narrow."""
+        return min(self.power) >= OFTEN
+
+
+def scores_of(draws: Array, measured: Array, output: Whole) -> Scores:
+    """Scores of the cells of a row, by draws (s, a) of its joint prediction."""
+    count = len(draws)
+    ranks = np.argsort(np.argsort(draws, axis=0, kind="stable"), axis=0)
+    places = np.vstack([(draws < measured).sum(axis=0) * (count / (count + 1.0)), ranks])
+    scores = special.ndtri((places + 0.5) / count)
+    correlation = np.corrcoef(scores[1:].T).reshape(measured.size, measured.size)
+    # Cells of one sensor may be almost identical.
+    root = np.linalg.cholesky(correlation + 1e-6 * np.eye(measured.size))
+    independent = np.linalg.solve(root, scores.T).T
+    return Scores(independent[0], independent[1:], output)
+
+
+def width(parts: Sequence[Scores]) -> Width:
+    """The width of predictions, from the scores of all predicted rows."""
+    output = np.concatenate([row.output for row in parts])
+    squares = np.hstack([np.vstack([row.measured, row.draws]) for row in parts]) ** 2
+    names = np.unique(output)
+    groups = np.column_stack([np.ones(output.size), *(output == name for name in names)]).astype(float)
+    groups = groups if names.size > 1 else groups[:, :1]
+    sums = squares @ groups
+    sorted_sums = np.sort(sums[1:], axis=0)
+    count = len(sorted_sums)
+
+    def chances(of: Array) -> Array:
+        """Probabilities (n, g) of sums (n, g) as small or as large among the draws, the smaller of both."""
+        below = np.column_stack([np.searchsorted(s, v, "right") for s, v in zip(sorted_sums.T, of.T, strict=True)])
+        above = count - np.column_stack([np.searchsorted(s, v) for s, v in zip(sorted_sums.T, of.T, strict=True)])
+        return (1.0 + np.minimum(below, above)) / (count + 1.0)
+
+    least = np.sort(chances(sums[1:]).min(axis=1))
+    limit = least[max(int(LEVEL * count) - 1, 0)]
+    observed = chances(sums[:1])[0]
+    worst = int(np.argmin(observed))
+    # Measured values that scatter half as much as predicted, or twice.
+    power = [float((chances(sums[1:] * by).min(axis=1) <= limit).mean()) for by in (TWICE**-2, TWICE**2)]
+    ratios = np.sqrt(sums[0] / groups.sum(axis=0))
+    chance = (1.0 + float(np.searchsorted(least, observed.min(), "right"))) / (count + 1.0)
+    name = None if worst == 0 else int(names[worst - 1])
+    return Width(output.size, float(ratios[0]), chance, name, float(ratios[worst]), (power[0], power[1]))
+
+
+# Validation rows that suffice by themselves; share of cells that an interval should hold.
+ENOUGH, INSIDE = 3, 0.9
+# Standard deviations beyond which a residual is an outlier; Bayes factor that is strong evidence that an output is not
+# explained, and the largest that particles resolve.
+FAR, STRONG, MOST = 3.0, 10.0, 1e6
+# Draws of a cell, draws of a row for its width, and particles of each power that these are drawn from.
+DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
+ENDS = (0.5, 0.05, 0.95)
+# Standard deviations from which a bias is visible, and the fewest particles that resolve it.
+VISIBLE, FEWEST_BEYOND = 3.0, 30
+
+JointAt = Callable[[Array], Joint]
+
+
+class Prediction(NamedTuple):
+    """Cells at ``places`` predicted by the others: draws (s, k) after and before learning, ``residuals`` (k,) over their sd."""
+
+    places: Whole
+    after: Array
+    before: Array
+    residuals: Array
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How well the cells of a prediction were predicted."""
+
+    validation: bool
+    cells: int
+    inside: int
+    crps: float
+    crps_before: float
+    width: Width
+
+
+class Explanation(NamedTuple):
+    """Whether the simulation explains an output.
+
+    bias : how far measured values are constantly above simulated ones, in logarithms (median, 5 and 95 %)
+    allowed : scale of the allowed bias
+    evidence : Bayes factor of an error beyond that; None where the simulation is taken as exact
+    resolution : the least visible bias, as smaller ones are taken for inputs; None where undecided
+    """
+
+    name: str
+    bias: tuple[float, float, float]
+    allowed: float
+    evidence: float | None
+    resolution: float | None
+
+    @property
+    def explained(self) -> bool:
+        """Whether there is no strong evidence of an error beyond the allowed one; none is sought where none is allowed."""
+        return self.evidence is None or self.evidence < STRONG
+
+
+@dataclass(frozen=True, eq=False)
+class Particles:
+    """Some particles of every power, in no order, and the measured cells there."""
+
+    levels: list[Level]
+    joints: list[Joint]
+    measured: Measured
+
+    @classmethod
+    def of(cls, sample: Sampled, joint_at: JointAt, measured: Measured) -> "Particles":
+        """Particles of a sample."""
+        levels = [
+            Level(level.power, level.points[:ENOUGH_OF], level.log_likelihood[:ENOUGH_OF]) for level in sample.levels
+        ]
+        return cls(levels, [joint_at(level.points) for level in levels], measured)
+
+    def draw(self, conditions: Whole, count: int, random: np.random.Generator) -> tuple[Array, Joint]:
+        """Particles (count, d) of the posterior by the cells ``conditions`` alone, of the best power, and the cells there."""
+        weighed = [
+            joint.log_density(self.measured.values, conditions) - level.power * level.log_likelihood
+            for level, joint in zip(self.levels, self.joints, strict=True)
+        ]
+        best = int(np.argmax([effective(logs) for logs in weighed]))
+        weights = np.exp(weighed[best] - weighed[best].max())
+        rows = random.choice(len(weights), count, p=weights / weights.sum())
+        return self.levels[best].points[rows], Joint(*(array[rows] for array in self.joints[best]))
+
+    def predictions(self, conditions: Whole, targets: Whole, count: int, random: np.random.Generator) -> Array:
+        """Draws (count, a) of the cells ``targets``, conditional on the measured values of ``conditions``."""
+        mean, own, roots = self.draw(conditions, count, random)[1].conditional(
+            self.measured.values, conditions, targets
+        )
+        common = (roots @ random.standard_normal((count, roots.shape[2], 1)))[:, :, 0]
+        return mean + common + np.sqrt(own) * random.standard_normal(mean.shape)
+
+
+def by_others(particles: Particles, seed: int) -> Prediction:
+    """Every training row, predicted by the others."""
+    random, measured = np.random.default_rng(seed), particles.measured
+    row = measured.row[measured.learnt]
+    parts = [
+        _prediction(particles, measured.learnt[row != number], measured.learnt[row == number], random)
+        for number in np.unique(row)
+    ]
+    return Prediction(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
+
+
+def held_out(particles: Particles, seed: int) -> Prediction:
+    """The rows held out, predicted by all training rows."""
+    measured = particles.measured
+    return _prediction(particles, measured.learnt, np.flatnonzero(measured.validation), np.random.default_rng(seed))
+
+
+def reweighed(particles: Particles, conditions: Whole, seed: int) -> Array:
+    """Particles (s, d) of the posterior by the cells ``conditions`` alone."""
+    return particles.draw(conditions, DRAWS, np.random.default_rng(seed))[0]
+
+
+def _prediction(particles: Particles, conditions: Whole, targets: Whole, random: np.random.Generator) -> Prediction:
+    after = particles.predictions(conditions, targets, DRAWS, random)
+    before = particles.predictions(conditions[:0], targets, DRAWS, random)
+    residuals = (particles.measured.values[targets] - after.mean(axis=0)) / after.std(axis=0)
+    return Prediction(targets, after, before, residuals)
+
+
+def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
+    """Scores of half of the training rows and of the validation rows, each by all rows before it, in random order."""
+    random, measured = np.random.default_rng(seed), particles.measured
+    rows = [
+        [places[measured.row[places] == row] for row in random.permutation(np.unique(measured.row[places]))]
+        for places in (measured.learnt, np.flatnonzero(measured.validation))
+    ]
+    order, start = [*rows[0], *rows[1]], (len(rows[0]) + 1) // 2
+    for place in range(start, len(order)):
+        conditions, targets = np.concatenate(order[:place]), order[place]
+        draws = particles.predictions(conditions, targets, WIDTH_DRAWS, random)
+        yield scores_of(draws, measured.values[targets], measured.output[targets])
+
+
+def trial(prediction: Prediction, particles: Particles, seed: int, *, validation: bool) -> Trial:
+    """How well cells were predicted."""
+    truth = particles.measured.values[prediction.places]
+    low, high = np.quantile(prediction.after, [0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE], axis=0)
+    inside = int(((truth >= low) & (truth <= high)).sum())
+    after, before = (_crps(draws, truth) for draws in (prediction.after, prediction.before))
+    return Trial(validation, truth.size, inside, after, before, width(list(sequential_scores(particles, seed))))
+
+
+def _crps(draws: Array, truth: Array) -> float:
+    """Mean continuous ranked probability score of draws (s, k), in units of the truth (k,)."""
+    half = len(draws) // 2
+    apart = 0.5 * np.abs(draws[:half] - draws[half : 2 * half]).mean(axis=0)
+    return float((np.abs(draws - truth).mean(axis=0) - apart).mean())
+
+
+def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measured, seed: int) -> list[Explanation]:
+    """Whether the simulation explains each output, by particles of the posterior.
+
+    ``joint``: the cells there; ``beyond`` (n, m): which errors exceed what is allowed."""
+    middle, root = joint.latent(measured.values, measured.learnt)
+    random = np.random.default_rng(seed)
+    latent = middle + (root @ random.standard_normal((*middle.shape, 1)))[:, :, 0]
+    listed = []
+    for place, name in enumerate(names):
+        cell = int(np.flatnonzero(measured.output == place)[0])
+        biases = latent[:, place] * joint.roots[:, cell, place]
+        median, low, high = np.quantile(biases, ENDS).tolist()
+        # The uncertainty of any bias beyond what is allowed.
+        wide = biases[beyond[:, place]]
+        resolution = float(VISIBLE * wide.std()) if wide.size >= FEWEST_BEYOND else None
+        exact = measured.scales[place] == 0.0
+        factor = None if exact else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
+        listed.append(Explanation(name, (median, low, high), float(measured.scales[place]), factor, resolution))
+    return listed
+
+
+def bayes_factor(share: float, before: float) -> float:
+    """Odds of a share of the posterior over the odds of the prior share, as far as particles resolve them."""
+    odds = share * (1.0 - before) / max((1.0 - share) * before, 1e-300)
+    return float(np.clip(odds, 1.0 / MOST, MOST))
+
+
+def joint_factor(beyond: Mask) -> float:
+    """The Bayes factor of an error beyond the allowed one in any output, from particles (n, m)."""
+    return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * BEYOND) ** beyond.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What may be claimed of a calibration.
+
+    trial, outputs : how well cells were predicted, and whether each output is explained
+    any_factor : Bayes factor of an error beyond the allowed one in any output
+    residuals : (c,), of all cells, each predicted by the others
+    particles : those behind it
+    """
+
+    trial: Trial
+    outputs: list[Explanation]
+    any_factor: float
+    residuals: Array
+    particles: Particles
+
+
+def judge(match: Matched, names: Sequence[str], seed: int) -> Judgement:
+    """Judge a calibration that has a sample; ``names`` are those of the outputs."""
+    assert match.sampled is not None
+    measured, points = match.measured, match.sampled.points
+    particles = Particles.of(match.sampled, match.joint, measured)
+    parts = [by_others(particles, seed)]
+    enough = len(np.unique(measured.row[measured.validation])) >= ENOUGH
+    if enough:
+        parts.append(held_out(particles, seed))
+    residuals = np.zeros(measured.values.size)
+    for part in parts:
+        residuals[part.places] = part.residuals
+    beyond = match.errors(points).beyond
+    outputs = explanations(names, match.joint(points), beyond, measured, seed)
+    return Judgement(
+        trial(parts[-1], particles, seed, validation=enough), outputs, joint_factor(beyond), residuals, particles
+    )
+
+
+def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[str]:
+    """Reasons why inputs may not be called calibrated; none where they may.
+
+    ``anything``: whether anything was learned; ``emulated``: whether emulators predict the simulation there."""
+    result, outputs = judgement.trial, judgement.outputs
+    sentences = []
+    for output in outputs:
+        if not output.explained:
+            off = f"{100.0 * np.expm1(output.bias[0]):+.2g} % off its level, {100.0 * output.allowed:.2g} % allowed"
+            cause = "its sensor is biased or physics is missing"
+            sentences.append(f"{output.name} is not explained: {off}, Bayes factor {output.evidence:.3g}; {cause}")
+    if judgement.any_factor >= STRONG and not sentences:
+        listed = " or ".join(
+            output.name for output in sorted(outputs, key=lambda output: -(output.evidence or 0.0))[:2]
+        )
+        sentences.append(
+            f"{listed} is not explained, but it is undecided which: Bayes factor {judgement.any_factor:.3g}"
+        )
+    if result.width.rejected:
+        sentences.append(_width_words(result.width, [output.name for output in outputs]))
+    elif not result.width.enough:
+        wide, narrow = (100.0 * share for share in result.width.power)
+        shares = (
+            f"intervals twice too wide would show in {wide:.0f} % of such tables, twice too narrow in {narrow:.0f} %"
+        )
+        sentences.append(f"{result.width.cells} predicted values are too few to judge intervals: {shares}")
+    if not result.crps < result.crps_before:
+        sentences.append("measured values are predicted no better than before")
+    if not anything:
+        sentences.append("no input or combination of inputs was learned")
+    if not emulated:
+        sentences.append("emulators do not predict the simulation at the inputs found")
+    return sentences
+
+
+def _width_words(width: Width, names: list[str]) -> str:
+    """The sentence that predictions are too wide or too narrow, and where."""
+    where = "measured values" if width.output is None else names[width.output]
+    side = "wide" if width.worst < 1.0 else "narrow"
+    words = f"predictions of {where} are too {side}: residuals scatter {width.worst:.2g} times as much as predicted"
+    return f"{words} (chance {100.0 * width.chance:.2g} %)"

@@ -1,11 +1,11 @@
-"""Unknown inputs: their distributions, how they depend on each other, nested and shared sets of them, and which of many matter.
+"""Unknown inputs: their distributions and dependence, nested sets of them, and screening of those that matter.
 
-Declared inputs depend on each other through a Gaussian copula, those of a posterior sample by coming in its rows. The last
-input of a set does nothing: it shows what chance does.
+Declared inputs depend on each other through a Gaussian copula, those of a posterior sample by being drawn as its rows. The last
+input of a set does nothing: it shows the effect of chance.
 
 Screening is by main effects, in a two-level design of its own or in the very runs of an answer. Sources: Box, Hunter and Hunter,
-Statistics for Experimenters, second edition, sections 5 and 6; Efroymson, Multiple regression analysis, in Mathematical Methods for
-Digital Computers (1960) (forward selection).
+Statistics for Experimenters, second edition, sections 5 and 6; Efroymson, Multiple regression analysis, in Mathematical Methods
+for Digital Computers (1960) (forward selection).
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.scene.uncertain import Correlation, Law, Sampled
 
-# Numbers nearer to 0 and 1 than this are as good as at the ends.
+# Quantiles are kept this far from 0 and 1.
 EDGE = 1e-12
 
 
@@ -70,10 +70,10 @@ def _distribution(law: Law) -> Any:
 
 
 def copula(names: Sequence[str], pairs: Sequence[Correlation], source: str = "scene") -> Array | None:
-    """Cholesky factor (d, d) of the normal correlations whose rank correlations are given; None where there are none.
+    """Cholesky factor (d, d) of normal correlations that have the stated rank correlations; None without any.
 
     A rank correlation rho is one of 2 sin(pi rho/6) of the normal scores (Pearson 1907). Raises InputError, which names the
-    ``source``, where the correlations contradict each other.
+    ``source``, if the correlations contradict each other.
     """
     if not pairs:
         return None
@@ -85,12 +85,12 @@ def copula(names: Sequence[str], pairs: Sequence[Correlation], source: str = "sc
         return np.asarray(np.linalg.cholesky(matrix), float)
     except np.linalg.LinAlgError:
         ranks_of = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
-        why = "contradict each other; no inputs can go together so, bring them nearer to 0"
+        why = "these rank correlations contradict each other; bring them nearer to 0"
         raise InputError([f"{source}: uncertain.correlation: {ranks_of}: {why}"]) from None
 
 
 def dependent(quantiles: Array, factor: Array | None) -> Array:
-    """Quantiles (n, d) that go together as the copula says, of independent ones."""
+    """Quantiles (n, d) that depend on each other by the copula, from independent ones."""
     return quantiles if factor is None else special.ndtr(special.ndtri(quantiles.clip(EDGE, 1.0 - EDGE)) @ factor.T)
 
 
@@ -105,21 +105,21 @@ def table_of(laws: Mapping[str, Law | Sampled], quantiles: Array) -> list[dict[s
     return [dict(zip(laws, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-# Rows next to one of a sample that are as good as on it.
+# Nearest rows of a sample that may replace one.
 NEAR = 8
 
 
 def nested(inputs: int, points: int, seed: int) -> Array:
-    """Quantiles (points, inputs) of scrambled Sobol' points; ``points`` is a power of two, and half as many are the first half."""
+    """Quantiles (points, inputs) of scrambled Sobol' points; ``points`` is a power of two, and its half gives the first half."""
     return qmc.Sobol(inputs, rng=np.random.default_rng(seed)).random_base2(int(points).bit_length() - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """How ``inputs`` many inputs depend on each other.
+    """Dependence of the inputs, of which there are ``inputs``.
 
-    ``factor`` (d, d): Cholesky factor of the correlations of their normal scores, None without any; ``rows`` (r, s):
-    quantiles of a sample, whose columns are the inputs at ``columns`` (s,).
+    factor : (d, d), Cholesky factor of the correlations of their normal scores; None without any
+    rows, columns : (r, s), quantiles of a sample, and the places (s,) of its inputs
     """
 
     inputs: int
@@ -129,7 +129,7 @@ class Joint:
 
     @property
     def independent(self) -> bool:
-        """Whether no input shows anything of another."""
+        """Whether no input depends on another."""
         return self.factor is None and self.rows is None
 
     def sets(self, points: int, seed: int) -> Array:
@@ -137,46 +137,59 @@ class Joint:
         return self.placed(nested(self.inputs + 1, points, seed))
 
     def placed(self, even: Array) -> Array:
-        """Quantiles (n, d + 1) of input sets, of evenly spread ones."""
-        found = np.column_stack([dependent(even[:, :-1], self.factor), even[:, -1]])
+        """Quantiles (n, d + 1) of input sets, from evenly spread ones."""
+        sets = np.column_stack([dependent(even[:, :-1], self.factor), even[:, -1]])
         if self.rows is not None:
-            found[:, self.columns] = self.rows[(even[:, self.columns[0]] * len(self.rows)).astype(np.int64)]
-        return found
+            sets[:, self.columns] = self.rows[(even[:, self.columns[0]] * len(self.rows)).astype(np.int64)]
+        return sets
 
     def redrawn(self, sets: Array, shared: Array, fresh: Array) -> Array:
-        """Other input sets (n, d + 1) that have the inputs where ``shared`` (d + 1,) in common with ``sets``, and of the rest
-        what is likely next to these, by ``fresh`` evenly spread ones: drawn from the copula, or of a near row of the
-        sample."""
+        """Input sets (n, d + 1) that share the inputs where ``shared`` (d + 1,) with ``sets``, the others being drawn anew.
+
+        The others are conditional on the shared ones. They come from ``fresh`` evenly spread quantiles (n, d + 1), by the copula,
+        or from a near row of the sample.
+        """
         keep, redraw = (np.flatnonzero(shared[:-1] == which) for which in (True, False))
-        found = np.where(shared, sets, fresh)
+        new_sets = np.where(shared, sets, fresh)
         if self.factor is not None:
-            scores, even = (special.ndtri(each[:, :-1].clip(EDGE, 1.0 - EDGE)) for each in (sets, fresh))
+            scores, even = (special.ndtri(quantiles[:, :-1].clip(EDGE, 1.0 - EDGE)) for quantiles in (sets, fresh))
             whole = self.factor @ self.factor.T
             slopes = np.linalg.solve(whole[np.ix_(keep, keep)], whole[np.ix_(keep, redraw)])
             root = np.linalg.cholesky(whole[np.ix_(redraw, redraw)] - whole[np.ix_(redraw, keep)] @ slopes)
-            found[:, redraw] = special.ndtr(scores[:, keep] @ slopes + even[:, redraw] @ root.T)
+            new_sets[:, redraw] = special.ndtr(scores[:, keep] @ slopes + even[:, redraw] @ root.T)
         if self.rows is not None:
             columns = np.array(self.columns)
-            known = shared[columns]
-            if known.any():
+            common = shared[columns]
+            if common.any():
                 # The nearest is the row itself; one of the next few is drawn.
-                several = KDTree(self.rows[:, known]).query(sets[:, columns[known]], k=min(NEAR + 1, len(self.rows)))[1]
-                drawn = 1 + (fresh[:, columns[0]] * (several.shape[1] - 1)).astype(np.int64)
-                near = several[np.arange(len(sets)), drawn]
+                tree, count = KDTree(self.rows[:, common]), min(NEAR + 1, len(self.rows))
+                several = tree.query(sets[:, columns[common]], k=count)[1]
+                choice = 1 + (fresh[:, columns[0]] * (several.shape[1] - 1)).astype(np.int64)
+                near = several[np.arange(len(sets)), choice]
             else:
                 near = (fresh[:, columns[0]] * len(self.rows)).astype(np.int64)
-            found[:, columns[~known]] = self.rows[near][:, ~known]
-        return found
+            new_sets[:, columns[~common]] = self.rows[near][:, ~common]
+        return new_sets
+
+
+def spread_out(candidates: Array, count: int) -> Array:
+    """``count`` of the candidates (n, d), each the farthest from the first and from those before it."""
+    distance = ((candidates - candidates[0]) ** 2).sum(axis=1)
+    places: list[int] = []
+    for _ in range(min(count, len(candidates))):
+        places.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((candidates - candidates[places[-1]]) ** 2).sum(axis=1))
+    return candidates[places]
 
 
 # Quantiles at which a screening sets an input low and high.
 LOW, HIGH = 0.1, 0.9
-# Terms of a main effect in runs that are spread evenly, and what of a column counts as nothing.
+# Terms of a main effect in evenly spread runs, and the relative size of a column that counts as zero.
 TERMS, NOTHING = 2, 1e-9
 
 
 def screening_design(inputs: int) -> Array:
-    """Quantiles (n, inputs) of a folded-over two-level design: main effects free of each other and of all pairs.
+    """Quantiles (n, inputs) of a folded-over two-level design: main effects are free of each other and of all pairs.
 
     Hadamard's matrix and its mirror image (Plackett and Burman 1946; Box and Wilson 1951 for the fold).
     """
@@ -186,64 +199,71 @@ def screening_design(inputs: int) -> Array:
 
 
 def effect_shares(quantiles: Array, values: Array) -> Array:
-    """Share (d, m) that each input has in the variance of each output (n, m) which main effects make, by least squares on
-    the quantiles (n, d)."""
+    """Share (d, m) of each input in the variance of each output (n, m) that is due to main effects.
+
+    The effects are by least squares on the quantiles (n, d).
+    """
     coded = quantiles - quantiles.mean(axis=0)
     effects = np.linalg.lstsq(coded, values - values.mean(axis=0), rcond=None)[0]
-    made = (effects * coded.std(axis=0)[:, None]) ** 2
-    whole = made.sum(axis=0)
-    return np.divide(made, whole, out=np.zeros_like(made), where=whole > 0.0)
+    variances = (effects * coded.std(axis=0)[:, None]) ** 2
+    whole = variances.sum(axis=0)
+    return np.divide(variances, whole, out=np.zeros_like(variances), where=whole > 0.0)
 
 
 def retained(shares_: Array, always: list[int], most: int) -> list[int]:
-    """Places of the inputs that stay, sorted: those ``always`` and the ones of the largest share in any output, ``most`` in
-    all."""
+    """Sorted places of ``most`` inputs: those ``always``, then those with the largest share (d, m) in any output."""
     ranked = np.argsort(-shares_.max(axis=1), kind="stable").tolist()
     rest = [place for place in ranked if place not in always]
     return sorted([*always, *rest[: max(most - len(always), 0)]])
 
 
 def main_effects(quantiles: Array, values: Array) -> Array:
-    """Share (d, m) of the variance of each output (n, m) that the main effect of each input makes, straight and bent, less
-    what chance makes of so few runs; quantiles (n, d)."""
+    """Share (d, m) of the variance of each output (n, m) due to the main effect of each input, linear and quadratic.
+
+    The share that chance would have in so few runs is subtracted; quantiles (n, d).
+    """
     runs, outputs = len(quantiles), _unit(values)
-    made = np.array([((_base(one).T @ outputs) ** 2).sum(axis=0) for one in quantiles.T])
+    variances = np.array([((_base(one).T @ outputs) ** 2).sum(axis=0) for one in quantiles.T])
     chance = TERMS / max(runs - 1, TERMS + 1)
-    return ((made - chance) / (1.0 - chance)).clip(0.0)
+    return ((variances - chance) / (1.0 - chance)).clip(0.0)
 
 
 def strongest(quantiles: Array, values: Array, most: int, always: Sequence[int] = ()) -> list[int]:
-    """Places, sorted, of the inputs that matter most in any output (n, m): those ``always``, then each that explains most of
-    what those before it leave, ``most`` in all; quantiles (n, d)."""
-    picked, left, basis = list[int](), _unit(values), np.ones((len(quantiles), 1)) / np.sqrt(len(quantiles))
+    """Sorted places of the ``most`` inputs that matter most in any output (n, m), from quantiles (n, d).
+
+    After those ``always``, each is the one that explains most of the variance that those before it do not.
+    """
+    picked, residuals, basis = list[int](), _unit(values), np.ones((len(quantiles), 1)) / np.sqrt(len(quantiles))
     rest = [place for place in range(quantiles.shape[1]) if place not in always]
     count = min(max(most, len(always)), quantiles.shape[1])
     while len(picked) < count:
         candidates = list(always[len(picked) : len(picked) + 1]) or rest
-        # Of columns that those before explain nothing new is left.
+        # A column that those before explain has no basis left.
         bases = [_base(quantiles[:, place], basis) for place in candidates]
-        gains = [float(((base.T @ left) ** 2).sum(axis=0).max()) for base in bases]
+        gains = [float(((base.T @ residuals) ** 2).sum(axis=0).max()) for base in bases]
         best = int(np.argmax(gains))
         picked.append(candidates[best])
         basis = np.column_stack([basis, bases[best]])
-        left = left - bases[best] @ (bases[best].T @ left)
+        residuals = residuals - bases[best] @ (bases[best].T @ residuals)
         rest = [place for place in rest if place != picked[-1]]
     return sorted(picked)
 
 
 def _unit(values: Array) -> Array:
-    """Outputs (n, m) about their means, each of length 1; nothing of one that does not vary."""
+    """Outputs (n, m) less their means, each of length 1; zero for one that does not vary."""
     centred = values - values.mean(axis=0)
     length = np.sqrt((centred**2).sum(axis=0))
     return np.divide(centred, length, out=np.zeros_like(centred), where=length > 0.0)
 
 
 def _base(quantile: Array, others: Array | None = None) -> Array:
-    """Orthonormal columns (n, 0 to 2) of an input's straight and bent effect, orthogonal to those of ``others`` (n, p), the
-    mean alone unless given."""
+    """Orthonormal columns (n, 0 to 2) of the linear and quadratic effect of an input.
+
+    They are orthogonal to ``others`` (n, p), by default to the mean alone.
+    """
     columns = np.column_stack([2.0 * quantile - 1.0, 6.0 * quantile * (quantile - 1.0) + 1.0])
     basis = np.ones((len(quantile), 1)) / np.sqrt(len(quantile)) if others is None else others
-    for _ in range(2):  # once leaves rounding
+    for _ in range(2):  # a second time removes rounding
         columns = columns - basis @ (basis.T @ columns)
     root, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(root[:, sizes > NOTHING * np.sqrt(len(quantile))])

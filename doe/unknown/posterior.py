@@ -1,33 +1,231 @@
-"""Posterior samples of inputs, and what measurements identify of these: single inputs, combinations, what was not seen.
+"""Posterior samples of unknown inputs: the likelihood of measurements, sampling, and the inputs that measurements identify.
 
-Samples of a posterior by sequential Monte Carlo: the likelihood is switched on in powers from 0 to 1.
+Emulators. The measured cells of a table are correlated, so a few principal components hold the effect of the inputs on all
+of them; each component has an emulator of its own. Cells are in units of their allowed deviation. Components are left out once
+the signal in the rest is small compared with it. The known part of the scatter is subtracted from components and rest.
 
-Particles are in normal scores, whose prior is standard normal. Each power is the one at which half of the particles still
-count; these are drawn again and moved by differences of others, which point along ridges and from mode to mode. Halves move
-in turn, each by differences within the other, so that every move keeps the posterior.
+Likelihood, in logarithms: z_cj = eta_j(c, theta) + b_j + e_cj + eps. Output j has one bias b_j ~ N(0, tau_j^2) in all rows c
+and an error e_cj ~ N(0, (0.3 rho_j)^2) in each. A constant offset is absorbed by the bias; only differences between rows and
+outputs identify the inputs. Biases and errors are integrated out: cells are jointly normal with covariance diag(V) + U U'.
+U has a column for each bias and for each component of the emulators' error. tau_j and rho_j are sampled with the inputs.
 
-Sources: Del Moral, Doucet and Jasra, Sequential Monte Carlo samplers (2006); Jasra et al., Inference for Levy-driven
-stochastic volatility models via adaptive SMC (2011) for the powers; ter Braak, Differential evolution Markov chain (2006).
+Each output is of one of three kinds, so that the sample itself shows whether the model explains it:
+- as allowed: tau_j is half-normal of the allowed scale, rho_j = tau_j
+- off in its level: tau_j is half-normal of the range of the output, rho_j is at most the allowed scale; a biased sensor
+- off row by row: the same tau_j, and rho_j = tau_j; missing physics
+The odds of the last two kinds in the posterior over those in the prior are a Bayes factor.
+
+Sampling is by sequential Monte Carlo: the likelihood is switched on in powers from 0 to 1. Particles are in normal scores,
+whose prior is standard normal. At each power half of the particles still count; these are drawn again and moved by differences
+of others, which point along ridges and from mode to mode. Each half is moved by differences within the other half, so every
+move keeps the posterior.
 
 Contraction is 1 - sd after / sd before in quantiles of the prior, so it does not depend on units or laws. Along a ridge no
-input contracts and yet a combination is known: one of logarithms whose variance is a small share of the prior's.
+input contracts and yet a combination is identified: one of logarithms whose variance is a small share of the prior's.
+
+Sources: Kennedy and O'Hagan, Bayesian calibration of computer models, J. R. Statist. Soc. B 63 (2001) 425; Higdon, Gattiker,
+Williams and Rightley, Computer model calibration using high-dimensional output, Journal of the American Statistical
+Association 103 (2008) 570; Box and Tiao, A Bayesian approach to some outlier problems, Biometrika 55 (1968) 119, for the wide
+alternative next to the usual error; Del Moral, Doucet and Jasra, Sequential Monte Carlo samplers (2006); Jasra et al.,
+Inference for Levy-driven stochastic volatility models via adaptive SMC (2011) for the powers; ter Braak, Differential
+evolution Markov chain (2006).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 
+from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.threads import one_thread
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.faults import RunError
 
+# Signal that may be left out, as a share of the variance that a cell is compared with; components at most.
+LEFT_OUT, MOST = 0.05, 12
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Emulators of components: ``middle`` (c,) and ``axes`` (p, c) of the cells, and the variance (c,) of what is left out."""
+
+    middle: Array
+    axes: Array
+    emulators: list[Emulator]
+    rest: Array
+
+    def mean(self, quantiles: Array) -> Array:
+        """Cells (n, c) at quantiles (n, d)."""
+        return self.middle + np.column_stack([emulator.mean(quantiles) for emulator in self.emulators]) @ self.axes
+
+    def predict(self, quantiles: Array) -> tuple[Array, Array]:
+        """Cells (n, c) and their standard errors by component (n, c, p): their squares and ``rest`` sum to the variance."""
+        mean, sd = (
+            np.column_stack(column) for column in zip(*(e.predict(quantiles) for e in self.emulators), strict=True)
+        )
+        return self.middle + mean @ self.axes, sd[:, None, :] * self.axes.T[None]
+
+
+def fit_cells(
+    quantiles: Array, values: Array, variances: Array, freedom: Whole, allowance: Array, before: Cells | None = None
+) -> Cells:
+    """Emulators of cells (n, c) at quantiles (n, d) with variances (n, c) by ``freedom`` (n, c) degrees of freedom.
+
+    ``allowance`` (c,): variance that a deviation of each cell is compared with; ``before``: emulators of most of these runs.
+    """
+    unit = np.sqrt(allowance)
+    noise = np.column_stack([pooled_variances(quantiles, v, f) for v, f in zip(variances.T, freedom.T, strict=True)])
+    noise = noise / allowance
+    middle = values.mean(axis=0)
+    coded = (values - middle) / unit
+    _, sizes, axes = np.linalg.svd(coded, full_matrices=False)
+    # The variance of a component less the part of scatter.
+    signal = (sizes**2 / len(coded) - axes**2 @ noise.mean(axis=0)).clip(0.0)
+    remainder = np.append(np.cumsum(signal[::-1])[::-1][1:], 0.0)
+    count = min(int(np.argmax(remainder <= LEFT_OUT * unit.size)) + 1, MOST, len(signal))
+    axes = axes[:count]
+    scores = coded @ axes.T
+    # Scatter that the components do not contain.
+    scatter = (np.eye(unit.size) - axes.T @ axes) ** 2 @ noise.mean(axis=0)
+    rest = ((coded - scores @ axes) ** 2).mean(axis=0) - scatter
+    emulators = []
+    for place, column in enumerate(scores.T):
+        same = before is not None and place < len(before.emulators)
+        start = before.emulators[place].hyperparameters if before is not None and same else None
+        emulators.append(fit_emulator(quantiles, column, noise @ axes[place] ** 2, trend="quadratic", start=start))
+    return Cells(middle, axes * unit, emulators, rest.clip(0.0) * allowance)
+
+
+# Scatter of the simulation's error from row to row, as a share of its bias.
+BY_ROW = 0.3
+# Allowed unless a scale is stated: this share of the scatter of an output over the unknown inputs. A tenth leaves the patterns
+# of the inputs visible: if one output alone identifies an input, such an error moves it by a tenth of its range.
+SHARE = 0.1
+# Prior probability of each of the two kinds beyond what is allowed, and their least scale in allowed scales.
+BEYOND, WIDER = 0.05, 3.0
+
+
+class Errors(NamedTuple):
+    """Sizes of the simulation's errors at n particles by output.
+
+    level, rows : (n, m), tau of the bias and rho of the rows
+    beyond : (n, m), whether they exceed what is allowed
+    """
+
+    level: Array
+    rows: Array
+    beyond: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measured cells, in logarithms.
+
+    values, variances : (c,), measured, and variances of rig and integration
+    output, row : (c,), to which each cell belongs
+    scales : (m,), of the discrepancy that is allowed of each output; NaN until ``with_scales`` where none is stated
+    validation : (c,), whether a cell is held out
+    spread : (m,), scatter of each output over the prior of the inputs
+    """
+
+    values: Array
+    variances: Array
+    output: Whole
+    row: Whole
+    scales: Array
+    validation: Mask
+    spread: Array | None = None
+
+    @property
+    def learnt(self) -> Whole:
+        """Places of the training cells."""
+        return np.flatnonzero(~self.validation)
+
+    @property
+    def wide(self) -> Array:
+        """Scales (m,) of discrepancies beyond the allowed ones."""
+        spread = np.zeros(self.scales.size) if self.spread is None else self.spread
+        return np.where(self.scales > 0.0, np.maximum(spread, WIDER * self.scales), 0.0)
+
+    def with_scales(self, simulated: Array) -> "Measured":
+        """The same with default scales where none is stated, from cells (n, c) simulated over the prior of the inputs.
+
+        A default is a share of the standard deviation within rows: differences between rows are no uncertainty of the inputs.
+        """
+        square = simulated.var(axis=0)
+        outputs = range(self.scales.size)
+        spread = np.sqrt([square[self.output == place].mean() for place in outputs]).clip(1e-6)
+        return replace(self, scales=np.where(np.isnan(self.scales), SHARE * spread, self.scales), spread=spread)
+
+    def errors(self, scores: Array) -> Errors:
+        """Errors of the simulation at normal scores (n, m), which are quantiles of the prior of each output's errors."""
+        quantiles = special.ndtr(scores)
+        within = 1.0 - 2.0 * BEYOND
+        beyond, rows_too = quantiles > within, quantiles > 1.0 - BEYOND
+        share = np.where(beyond, (quantiles - np.where(rows_too, 1.0 - BEYOND, within)) / BEYOND, quantiles / within)
+        size = special.ndtri(0.5 + 0.5 * share.clip(0.0, 1.0 - 1e-15))
+        level = size * np.where(beyond, self.wide, self.scales)
+        rows = np.where(beyond & ~rows_too, np.minimum(level, self.scales), level)
+        return Errors(level, rows, beyond & (self.scales > 0.0))
+
+
+class Joint(NamedTuple):
+    """Cells as jointly normal at n input sets: mean (n, c), own variances (n, c), common roots U (n, c, r)."""
+
+    mean: Array
+    own: Array
+    roots: Array
+
+    def log_density(self, values: Array, cells: Whole) -> Array:
+        """Logarithm (n,) of the density of the ``values`` (c,) at the places ``cells`` (k,), by Woodbury's identity."""
+        own, roots = self.own[:, cells], self.roots[:, cells]
+        off = values[cells] - self.mean[:, cells]
+        weighed = roots / own[:, :, None]
+        factor = np.linalg.cholesky(np.eye(roots.shape[2]) + np.swapaxes(roots, 1, 2) @ weighed)
+        inside = np.linalg.solve(factor, np.einsum("ncr,nc->nr", weighed, off)[:, :, None])[:, :, 0]
+        determinant = np.log(own).sum(axis=1) + 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        return -0.5 * (
+            (off**2 / own).sum(axis=1) - (inside**2).sum(axis=1) + determinant + cells.size * np.log(2.0 * np.pi)
+        )
+
+    def latent(self, values: Array, conditions: Whole) -> tuple[Array, Array]:
+        """Mean (n, r) and root C (n, r, r) of the covariance CC' of the latent variables behind the common roots.
+
+        They are conditional on the ``values`` (c,) at the places ``conditions`` (k,). U times them is common to all cells.
+        """
+        roots = np.swapaxes(self.roots[:, conditions] / self.own[:, conditions, None], 1, 2)
+        information = np.eye(self.roots.shape[2]) + roots @ self.roots[:, conditions]
+        inverse = np.linalg.inv(np.linalg.cholesky(information))
+        mean = np.swapaxes(inverse, 1, 2) @ (
+            inverse @ (roots @ (values[conditions] - self.mean[:, conditions])[:, :, None])
+        )
+        return mean[:, :, 0], np.swapaxes(inverse, 1, 2)
+
+    def conditional(self, values: Array, conditions: Whole, targets: Whole) -> tuple[Array, Array, Array]:
+        """Cells at the places ``targets`` (a,), conditional on the ``values`` (c,) at the places ``conditions`` (k,).
+
+        Returns their mean (n, a), own variances (n, a) and common roots (n, a, r).
+        """
+        middle, root = self.latent(values, conditions)
+        across = self.roots[:, targets]
+        return self.mean[:, targets] + (across @ middle[:, :, None])[:, :, 0], self.own[:, targets], across @ root
+
+
+def joint(cells: Cells, measured: Measured, quantiles: Array, errors: Errors) -> Joint:
+    """Measured cells at input sets (n, d) with errors of the simulation (n, m)."""
+    mean, doubt = cells.predict(quantiles)
+    own = measured.variances + cells.rest + (BY_ROW * errors.rows[:, measured.output]) ** 2
+    level = errors.level[:, measured.output, None]
+    biases = level * (measured.output[:, None] == np.arange(measured.scales.size))
+    return Joint(mean, own, np.concatenate([biases, doubt], axis=2))
+
+
 PARTICLES = 4000
-# Share of particles that still count at the next power; accepted moves of each particle there, and at the last; sweeps at most.
+# Effective share of particles at the next power; accepted moves per particle there, and at the last power; most sweeps.
 COUNTING, ACCEPTED, ACCEPTED_LAST, MOST_SWEEPS = 0.5, 2.0, 4.0, 24
-# Accepted share that the length of moves aims at; share of moves of full length, from mode to mode; scatter next to a line.
+# Acceptance rate that the length of moves aims at; share of moves of full length, from mode to mode; scatter off the line.
 AIM, LEAPS, BESIDE = 0.25, 0.1, 1e-3
 
 LogDensity = Callable[[Array], Array]
@@ -43,7 +241,7 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Sampled:
-    """Particles at every power, of which the last is 1, and the logarithm of the evidence: of the likelihood's prior mean."""
+    """Particles at every power, the last of which is 1, and the logarithm of the evidence, the prior mean of the likelihood."""
 
     levels: list[Level]
     log_evidence: float
@@ -56,7 +254,10 @@ class Sampled:
 
 @one_thread
 def sampled(log_likelihood: LogDensity, inputs: int, seed: int, particles: int = PARTICLES) -> Sampled:
-    """Sample a posterior over ``inputs`` normal scores; ``particles`` is even. Raises RunError where nothing is likely."""
+    """Sample a posterior over ``inputs`` normal scores by an even number of ``particles``.
+
+    Raises RunError if no input set has a finite likelihood.
+    """
     random = np.random.default_rng(seed)
     points = random.standard_normal((particles, inputs))
     logs = log_likelihood(points)
@@ -75,34 +276,34 @@ def sampled(log_likelihood: LogDensity, inputs: int, seed: int, particles: int =
 
 
 def effective(log_weights: Array) -> float:
-    """How many equally weighted particles would carry as much."""
+    """Effective sample size: the number of equally weighted particles of the same variance."""
     weights = _weights(log_weights)[0]
     return float(1.0 / (weights**2).sum())
 
 
 def _weights(logs: Array) -> tuple[Array, float]:
-    """Weights (n,) that sum to 1, and the logarithm of the mean of what they are of."""
+    """Weights (n,) that sum to 1, and the logarithm of the mean of the weights before that."""
     most = float(logs.max())
     weights = np.exp(logs - most)
     return weights / weights.sum(), most + float(np.log(weights.mean()))
 
 
-def _step(logs: Array, left: float) -> float:
-    """By how much the power may rise until only the share COUNTING of the particles counts."""
-    if effective(left * logs) >= COUNTING * logs.size:
-        return left
-    low, high = 0.0, left
+def _step(logs: Array, rest: float) -> float:
+    """Increase of the power, ``rest`` at most, at which the effective share of particles falls to COUNTING."""
+    if effective(rest * logs) >= COUNTING * logs.size:
+        return rest
+    low, high = 0.0, rest
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if effective(middle * logs) >= COUNTING * logs.size else (low, middle)
-    # Never no step at all, be the likelihood as steep as it may.
+    # However steep the likelihood is, the power increases.
     return max(low, 1e-12)
 
 
 def _moved(
     points: Array, logs: Array, power: float, length: float, log_likelihood: LogDensity, random: np.random.Generator
 ) -> tuple[Array, Array, float]:
-    """Particles moved until each has been accepted often enough on average, and the length of moves that this took."""
+    """Particles after enough accepted moves on average, the logarithms of their likelihood, and the length of moves."""
     points, logs = points.copy(), logs.copy()
     half, inputs = len(points) // 2, points.shape[1]
     usual, accepted = 2.38 / np.sqrt(2.0 * inputs), 0.0
@@ -112,13 +313,13 @@ def _moved(
             here, there = points[mine], points[other]
             pairs = random.integers(0, len(there), (2, len(here)))
             leap = np.where(random.random(len(here)) < LEAPS, 1.0, length * usual)
-            tried = here + leap[:, None] * (there[pairs[0]] - there[pairs[1]])
-            tried += BESIDE * random.standard_normal(here.shape)
-            found = log_likelihood(tried)
-            ratio = power * (found - logs[mine]) - 0.5 * ((tried**2).sum(axis=1) - (here**2).sum(axis=1))
+            proposals = here + leap[:, None] * (there[pairs[0]] - there[pairs[1]])
+            proposals += BESIDE * random.standard_normal(here.shape)
+            densities = log_likelihood(proposals)
+            ratio = power * (densities - logs[mine]) - 0.5 * ((proposals**2).sum(axis=1) - (here**2).sum(axis=1))
             take = np.log(random.random(len(here))) < ratio
-            points[mine] = np.where(take[:, None], tried, here)
-            logs[mine] = np.where(take, found, logs[mine])
+            points[mine] = np.where(take[:, None], proposals, here)
+            logs[mine] = np.where(take, densities, logs[mine])
             share.append(float(take.mean()))
         accepted += float(np.mean(share))
         length = float(np.clip(length * np.exp(np.mean(share) - AIM), 0.1, 2.0))
@@ -127,18 +328,18 @@ def _moved(
     return points, logs, length
 
 
-# Contractions from which an input is learned, or partly; shares of the prior's variance below which a combination is known.
+# Contraction from which an input is learned, or partly; share of the prior's variance below which a combination is identified.
 LEARNED, PARTLY, KNOWN = 0.5, 0.2, 0.1
 INSIDE = 0.9  # of an interval
-# A range is too narrow where this share of the posterior lies within so much of one of its ends.
+# A range is too narrow if more than this share of the posterior is within so much of one of its ends.
 CROWD, END = 0.2, 0.05
-# Powers below this share of the largest, in standard deviations of their inputs, are none.
+# Powers below this share of the largest, in standard deviations of their inputs, count as zero.
 SMALL = 0.25
 PRIOR_SD = 12.0**-0.5  # of a quantile
 
 
 class Combination(NamedTuple):
-    """A product of powers of inputs, by their places, and the standard deviation of its logarithm after and before."""
+    """A product of powers of inputs by their places, and the standard deviation of its logarithm after and before learning."""
 
     powers: dict[int, float]
     after: float
@@ -147,7 +348,7 @@ class Combination(NamedTuple):
 
 @dataclass(frozen=True)
 class Learnt:
-    """Contraction (d,) of each input, known combinations, share (d,) that is left unseen, places of inputs at an end."""
+    """Contraction (d,) of each input, identified combinations, and places of inputs whose posterior is at an end of the range."""
 
     contraction: Array
     combinations: list[Combination]
@@ -160,8 +361,10 @@ class Learnt:
 
 
 def learnt(quantiles: Array, logarithms: Array, before: Array) -> Learnt:
-    """What was learned, from quantiles (n, d) of inputs after, and their logarithms (n, d) after and before; the logarithm of
-    an input that has none is NaN."""
+    """Learned inputs, from quantiles (n, d) of inputs after, and their logarithms (n, d) after and before.
+
+    The logarithm of an input that has none is NaN.
+    """
     crowded = np.maximum((quantiles < END).mean(axis=0), (quantiles > 1.0 - END).mean(axis=0))
     return Learnt(contraction(quantiles), _combinations(logarithms, before), np.flatnonzero(crowded > CROWD).tolist())
 
@@ -172,8 +375,11 @@ def contraction(quantiles: Array) -> Array:
 
 
 def densest_intervals(quantiles: Array) -> Array:
-    """Ends (2, d) of the shortest intervals that hold the share INSIDE of quantiles (n, d): of highest density where there is
-    one mode. One that begins at the outermost particle reaches to the end of the range, which equal tails never do."""
+    """Ends (2, d) of the shortest intervals that hold the share INSIDE of quantiles (n, d).
+
+    They are of highest density if there is one mode. An interval that begins at the outermost particle reaches to the end of
+    the range, which one of equal tails never does.
+    """
     ordered, count = np.sort(quantiles, axis=0), len(quantiles)
     span = int(np.ceil(INSIDE * count)) - 1
     first = np.argmin(ordered[span:] - ordered[: count - span], axis=0)
@@ -182,13 +388,13 @@ def densest_intervals(quantiles: Array) -> Array:
     return np.array([low, np.where(first == count - span - 1, 1.0, ordered[first + span, columns])])
 
 
-def seen(share: float) -> str:
-    """What a contraction means."""
+def contraction_words(share: float) -> str:
+    """A contraction in words, as reports write it."""
     return "learned" if share >= LEARNED else "partly" if share >= PARTLY else "not seen"
 
 
 def _combinations(after: Array, before: Array) -> list[Combination]:
-    """Combinations of two inputs or more that are known, the best first: eigenvectors of one covariance by the other."""
+    """Identified combinations of two or more inputs, the best first: eigenvectors of one covariance relative to the other."""
     numbers = np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0)
     places = np.flatnonzero(numbers & (before.std(axis=0) > 0.0))
     if places.size < 2:
@@ -196,7 +402,7 @@ def _combinations(after: Array, before: Array) -> list[Combination]:
     spread = before[:, places].std(axis=0)
     covariances = [np.cov(logs[:, places].T / spread[:, None]) for logs in (after, before)]
     shares, vectors = linalg.eigh(*covariances)
-    found = []
+    combinations = []
     for share, vector in zip(shares, vectors.T, strict=True):
         part = np.where(np.abs(vector) >= SMALL * np.abs(vector).max(), vector, 0.0)
         if share >= KNOWN or (part != 0.0).sum() < 2:
@@ -206,5 +412,5 @@ def _combinations(after: Array, before: Array) -> list[Combination]:
         sds = [float((logs[:, places] @ powers).std()) for logs in (after, before)]
         if sds[0] ** 2 < KNOWN * sds[1] ** 2:
             listed = {int(place): float(power) for place, power in zip(places, powers, strict=True) if power != 0.0}
-            found.append(Combination(listed, *sds))
-    return found
+            combinations.append(Combination(listed, *sds))
+    return combinations

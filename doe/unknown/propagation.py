@@ -1,29 +1,28 @@
-"""What an output ranges over while its inputs are unknown, how much of that is noise of the simulation, and which input makes it.
+"""The range of an output over its unknown inputs, the part of it that is simulation noise, and the inputs that cause it.
 
 Runs at n input sets scatter for three causes: their inputs, their own statistical error, and the integration. The variance
-that the inputs make is what is left of the whole, V_in = s^2(y) - mean s_i^2 - numerical variance. An emulator covers some
-of the inputs; the others vary in every run all the same and count as scatter, of which the emulator's nugget holds the size.
+due to the inputs is the remainder of the whole, V_in = s^2(y) - mean s_i^2 - numerical variance. An emulator covers some of the
+inputs. The others vary in every run all the same and count as scatter, whose size is in the emulator's nugget.
 
-The range over all inputs has the emulator's mean for a control: its distribution over many fresh input sets, with a residual
-added to each, is moved by as much as the runs' own distribution lies off what the emulator makes of these very runs, each
-predicted by the others. An emulator that predicts nothing leaves the order statistics of the runs. Residuals are drawn together
-by what of them is noise.
+The range over all inputs uses the emulator's mean as a control variate: its distribution over many fresh input sets, with a
+residual added to each. That distribution is corrected by the difference, at the runs, between their own distribution and the
+emulator's, each run predicted by the others. If an emulator predicts nothing, the order statistics of the runs remain.
+Residuals are shrunk by the share of them that is noise.
 
-Source: Hsu and Nelson, Control variates for quantile estimation, Management Science 36 (1990) 835.
+Sobol' indices of independent inputs: the first-order index is the share of the output's variance that would vanish if the input
+were known. The total index is the share that would remain if all others were known. Both are by scipy's Saltelli scheme on the emulator's
+mean, as shares of the variance over all inputs; inputs outside the emulator and its own error are part of the whole. An input
+that does nothing shows the effect of chance. Intervals are by parametric bootstrap: functions drawn from the emulator replace
+the truth, are sampled with fresh noise, and are emulated anew from the last hyperparameters on. The mean of the errors of their
+indices is subtracted as bias, their scatter is the error.
 
-Which input makes an output vary: Sobol' indices of an emulator, with intervals, next to an input that does nothing.
+Shapley's effects share the variance among inputs that depend on each other, for which Sobol' indices mean nothing. An effect is
+the increase in the explained variance, Var E[y | known inputs], on average over all orders in which the inputs become known.
 
-First-order index of an input: the share of the output's variance that would vanish if the input were known; total index:
-the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean, and shares of the
-variance over all inputs: what inputs outside the emulator make, and what it misses, is in the whole. Intervals by
-parametric bootstrap: functions drawn from the emulator take the truth's place, are run with fresh noise and emulated anew
-from the last hyperparameters on; by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
-other these indices mean nothing. There Shapley's effects share the variance: what an input adds to the variance explained,
-Var E[y | those known], on average over all orders in which the inputs become known.
-
-Sources: Saltelli et al., Computer Physics Communications 181 (2010) 259; Marrel et al., Reliability Engineering and System
-Safety 94 (2009) 742; Song, Nelson and Staum, SIAM/ASA J. Uncertainty Quantification 4 (2016) 1060; Broto, Bachoc and Depecker,
-SIAM/ASA J. Uncertainty Quantification 8 (2020) 693 (nearest neighbours in place of conditional draws).
+Sources: Hsu and Nelson, Control variates for quantile estimation, Management Science 36 (1990) 835; Saltelli et al., Computer
+Physics Communications 181 (2010) 259; Marrel et al., Reliability Engineering and System Safety 94 (2009) 742; Song, Nelson and
+Staum, SIAM/ASA J. Uncertainty Quantification 4 (2016) 1060; Broto, Bachoc and Depecker, SIAM/ASA J. Uncertainty Quantification
+8 (2020) 693 (nearest neighbours in place of conditional draws).
 """
 
 from collections.abc import Callable, Sequence
@@ -55,8 +54,11 @@ class Share(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Outputs (n,) of runs at quantiles (n, d) of their inputs; variances (n,) of these outputs by their replicates, and the
-    degrees of freedom (n,) behind those; ``numerical``: variance that the integration adds."""
+    """Runs at quantiles (n, d) of their inputs.
+
+    values, variances, freedom : (n,), outputs, their variances by replicates, and the degrees of freedom of these
+    numerical : variance due to the integration
+    """
 
     quantiles: Array
     values: Array
@@ -67,8 +69,12 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Emulated:
-    """Emulator of an output over the quantiles of its inputs at ``columns``, of its logarithm where all runs are positive;
-    ``noise``: mean variance of a run's output by its replicates, smoothed over the inputs."""
+    """Emulator of an output over the quantiles of its inputs at ``columns``.
+
+    logarithmic : whether it emulates logarithms, as it does if all outputs are positive
+    noise : mean variance of a run's output by its replicates, smoothed over the inputs
+    q2, ceiling : share of the variance that it predicts of left-out runs, and the most that their noise allows
+    """
 
     emulator: Emulator
     columns: Whole
@@ -91,27 +97,32 @@ class Emulated:
         return self.back(self.emulator.mean(quantiles))
 
     def back(self, values: Array) -> Array:
-        """Outputs of the emulator's values."""
+        """Outputs from values of the emulator."""
         return np.exp(values) if self.logarithmic else values
 
     @cached_property
     def residuals(self) -> Array:
-        """What the other runs leave open of each (n,), in the emulator's values, drawn together by what of it is noise."""
+        """Residuals (n,) of each run predicted by the others, in values of the emulator, shrunk by their share of noise."""
         missed = self.emulator.values - self.emulator.leave_one_out()[0]
         whole = float((missed**2).mean())
         return missed * np.sqrt(residual_variance(self.emulator) / whole) if whole > 0.0 else missed
 
 
 def residual_variance(emulator: Emulator) -> float:
-    """Variance of what the other runs leave open of each, less that of noise: of inputs outside the emulator, and its own error."""
+    """Variance of these residuals without noise: due to inputs outside the emulator, and to its own error."""
     missed = emulator.values - emulator.leave_one_out()[0]
     return max(float((missed**2).mean() - emulator.variances.mean()), 0.0)
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Range of an output over its inputs: its 5 %, 50 % and 95 % ends with their standard errors; shares of the variance of
-    single runs; whether the inputs show above the noise."""
+    """Range of an output over its inputs.
+
+    low, median, high, errors : 5 %, 50 % and 95 % quantiles and their standard errors
+    variance : shares of the variance of single runs by cause
+    hidden : whether simulation noise exceeds the effect of the inputs
+    by_emulator, q2, ceiling : whether the emulator is trusted, its predicted share of variance, and the most possible
+    """
 
     low: float
     median: float
@@ -124,18 +135,20 @@ class Spread:
     ceiling: float
 
     @property
-    def known(self) -> float:
-        """Standard error of the worse known end over the width of the range; infinite without a range."""
+    def relative_error(self) -> float:
+        """Standard error of the less accurate end over the width of the range; infinite without a range."""
         width = self.high - self.low
         return max(self.errors[0], self.errors[2]) / width if width > 0.0 else np.inf
 
 
 @one_thread
 def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), logarithms: bool = True) -> Emulated:
-    """Emulator of the runs, their variances smoothed over the inputs.
+    """Emulator of the runs, with their variances smoothed over the inputs.
 
-    ``most``: inputs that it covers at most, those ``always`` and the ones that matter most in these runs; all unless given.
-    ``logarithms``: whether outputs that are all positive are emulated by theirs. Raises ValueError for fewer than two runs.
+    most, always : inputs that it covers at most, all unless stated: those ``always``, then the ones that matter most here
+    logarithms : whether outputs that are all positive are emulated by their logarithms
+
+    Raises ValueError for fewer than two runs.
     """
     logarithmic = logarithms and bool((runs.values > 0.0).all())
     values = np.log(runs.values) if logarithmic else runs.values
@@ -143,7 +156,7 @@ def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), lo
     smooth = pooled_variances(runs.quantiles, runs.variances / unit, runs.freedom)
     columns = np.arange(runs.quantiles.shape[1])
     if most is not None:
-        # The last is an input that does nothing, which stays for comparison.
+        # The last input does nothing and stays for comparison.
         columns = np.array([*strongest(runs.quantiles[:, :-1], values[:, None], most, always), columns[-1]])
     emulator = fit_emulator(runs.quantiles[:, columns], values, smooth, trend="linear")
     whole = float(values.var(ddof=1))
@@ -153,17 +166,17 @@ def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), lo
 
 @one_thread
 def spread_of(runs: Runs, fitted: Emulated, fresh: Array, seed: int) -> Spread:
-    """Range of an output; ``fresh``: quantiles (m, d) of many input sets as likely as those of the runs."""
+    """Range of an output; ``fresh``: quantiles (m, d) of many input sets of the same distribution as those of the runs."""
     random = np.random.default_rng(seed)
     whole = float(runs.values.var(ddof=1))
-    left = max(whole - fitted.noise - runs.numerical, 0.0)
-    shares = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": left}
+    inputs = max(whole - fitted.noise - runs.numerical, 0.0)
+    shares = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": inputs}
     total = sum(shares.values()) or 1.0
     shares = {name: value / total for name, value in shares.items()}
     ends, errors = _quantiles(fitted, fresh, random)
     by_emulator = fitted.trusted, fitted.q2, fitted.ceiling
     low, median, high = ends.tolist()
-    return Spread(low, median, high, tuple(errors.tolist()), shares, left == 0.0, *by_emulator)
+    return Spread(low, median, high, tuple(errors.tolist()), shares, inputs == 0.0, *by_emulator)
 
 
 def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> tuple[Array, Array]:
@@ -175,14 +188,14 @@ def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> t
     runs = (others + rest)[:, None] <= values
     control = np.searchsorted(np.sort(rest), values - others[:, None], side="right") / count
     off = runs - control
-    # Between ends known from so few runs 90 % of further sets lie on average (Wilks 1941).
+    # Between these ends of so few runs are 90 % of further input sets on average (Wilks 1941).
     levels = (np.array(ENDS) * (count + 1) - 0.5) / count
-    # A distribution that a correction bends back is put in order (Chernozhukov, Fernandez-Val and Galichon 2010).
-    found = [
+    # A distribution that the correction makes non-monotonic is sorted (Chernozhukov, Fernandez-Val and Galichon 2010).
+    ends = [
         np.interp(levels, np.sort(emulator + weights @ off / count), values)
         for weights in (np.ones(count), *random.multinomial(count, np.full(count, 1.0 / count), DRAWS))
     ]
-    ends, *again = fitted.back(np.array(found))
+    ends, *again = fitted.back(np.array(ends))
     return ends, np.std(again, axis=0, ddof=1)
 
 
@@ -208,22 +221,27 @@ def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of the independent inputs of an emulator, uniform in their quantiles."""
     even: Sample = lambda points, seed: nested(inputs, points, seed)  # noqa: E731
     ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), even, seed)
-    first, total = ([Share(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
+    first, total = ([Share(*map(float, ends[:, kind, column])) for column in range(inputs)] for kind in (0, 1))
     return Indices(first, total)
 
 
 @one_thread
 def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
-    """Shapley's effects of the inputs of an emulator, which depend on each other, and of one that does nothing, the last; their
-    sum is the share of the variance that the emulator explains."""
-    # Rows of a sample are no even plan: they need more of them.
+    """Shapley's effects of the dependent inputs of an emulator and, as the last, of an input that does nothing.
+
+    Their sum is the share of the variance that the emulator explains.
+    """
+    # Rows of a sample are not evenly spread, so more points are needed.
     ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), joint.sets, seed, 4 * POINTS)
-    return [Share(*map(float, each)) for each in ends.T]
+    return [Share(*map(float, column)) for column in ends.T]
 
 
 def explained(fitted: Emulated, values: Array, rest: float) -> float:
-    """Share of an output's variance over all inputs that a function makes whose outputs are ``values`` (n,) at likely input
-    sets; ``rest``: variance of what comes on top in the emulator's values."""
+    """Share of an output's variance over all inputs that the emulator explains.
+
+    values : (n,), of the emulator at input sets of their distribution
+    rest : variance that residuals add in values of the emulator
+    """
     mean, square = float(values.mean()), float((values**2).mean())
     # Of y = g exp(e) with normal e: E[y | g] = g exp(rest/2), E[y^2] = E[g^2] exp(2 rest).
     whole = np.exp(rest) * square - mean**2 if fitted.logarithmic else square - mean**2 + rest
@@ -245,11 +263,11 @@ def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: in
         truth = emulator.draw(1, random)
         values = truth(emulator.points)[0] + noise * random.standard_normal(noise.size)
         refit = replace(fitted, emulator=fit_emulator(emulator.points, values, emulator.variances, **like))
-        drawn: Function = lambda at, truth=truth: fitted.back(truth(at)[0])  # type: ignore[misc]  # noqa: E731
-        # Both by the same points, whose own error then hardly shows in the difference.
+        simulated: Function = lambda quantiles, truth=truth: fitted.back(truth(quantiles)[0])  # type: ignore[misc]  # noqa: E731
+        # Both by the same points, whose own error then almost cancels in the difference.
         by = POINTS_OF_REFITS, seed + 1 + again
         ours = shares(refit.at_columns, residual_variance(refit.emulator), *by)
-        misses.append(ours - shares(drawn, emulator.hyperparameters.nugget, *by))
+        misses.append(ours - shares(simulated, emulator.hyperparameters.nugget, *by))
     middle = whole - np.mean(misses, axis=0)
     student = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1)
     half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
@@ -258,35 +276,35 @@ def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: in
 
 def _indices(inputs: int, function: Function, points: int, seed: int) -> tuple[Array, Array]:
     """First and total indices (d,) of a function of quantiles (n, d)."""
-    found = stats.sobol_indices(
+    indices = stats.sobol_indices(
         func=lambda columns: function(columns.T)[None],
         n=points,
         dists=[stats.uniform()] * inputs,
         rng=np.random.default_rng(seed),
     )
-    return np.asarray(found.first_order).reshape(inputs), np.asarray(found.total_order).reshape(inputs)
+    return np.asarray(indices.first_order).reshape(inputs), np.asarray(indices.total_order).reshape(inputs)
 
 
 def _effects(joint: Joint, function: Function, points: int, seed: int) -> Array:
     """Shapley's effects (d + 1,) of a function, as shares of its variance."""
     random = np.random.default_rng(seed)
     count = joint.inputs + 1
-    # Points of one sequence: of two, whatever their scrambling, those at one place go together.
+    # Points of one sequence, as those of two are correlated, however they are scrambled.
     even = nested(2 * count, points, seed)
     sets, fresh = joint.placed(even[:, :count]), even[:, count:]
     values = function(sets)
     whole = float(values.var())
-    # Known of nothing and of everything.
+    # Variance explained by no input and by all of them.
     explained = {bytes(count): 0.0, bytes([1] * count): whole}
-    found = np.zeros(count)
+    effects = np.zeros(count)
     for order in (order for _ in range(ORDERS) for one in (random.permutation(count),) for order in (one, one[::-1])):
-        known, before = np.zeros(count, dtype=bool), 0.0
+        subset, before = np.zeros(count, dtype=bool), 0.0
         for place in order:
-            known[place] = True
-            if (key := known.tobytes()) not in explained:
-                again = function(joint.redrawn(sets, known, fresh))
-                # Half of what two sets with these inputs in common differ by is what the others make (Jansen 1999).
+            subset[place] = True
+            if (key := subset.tobytes()) not in explained:
+                again = function(joint.redrawn(sets, subset, fresh))
+                # Half of the mean square difference of two sets with these inputs in common is due to the others (Jansen 1999).
                 explained[key] = whole - 0.5 * float(((values - again) ** 2).mean())
-            found[place] += explained[key] - before
+            effects[place] += explained[key] - before
             before = explained[key]
-    return found / (2 * ORDERS * whole)
+    return effects / (2 * ORDERS * whole)

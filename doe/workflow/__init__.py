@@ -1,9 +1,9 @@
-"""The study that joins the steps, and what it is made of.
+"""The steps of a study, and the whole study that joins them.
 
-- ``runs``: design and runs; ``goals``: goals, tolerances and region; ``surfaces``: a surface for each response, draws of it, predictions, a published table next to it
-- ``confirmation``: fresh runs at chosen points, intervals, limits; ``front``: the front on surfaces, back-off, shares of parts
-- ``adaptive``: the front found by emulators; ``pick``: which point, how far it is limited by region and tolerances
-- ``input_sets``, ``uncertainty``, ``robust``: unknown inputs, what they do, whether the pick is better all the same
-- ``rig``, ``calibration``: measurements, and inputs from them
-- ``status``, ``stages_unknown``: what a command runs, and where it stands; ``whole``: the study
+- ``runs``: the design with its region, and its runs; ``surfaces``: goals, fits, predictions, random draws, a published table
+- ``confirmation``: simulated points, intervals, limits; ``front``: tolerances, the front on surfaces, back-off from limits
+- ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region, the widest tolerances
+- ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: judgement of the pick
+- ``rig``: measurements; ``calibration``: inputs from measurements
+- ``status``: stages and status of a command; ``whole``: the study
 """

@@ -1,4 +1,7 @@
-"""Inputs of a scene from measurements on a rig: ``doe calibrate``. What is asked of scene and table is checked before anything runs."""
+"""Calibration of a scene's unknown inputs by measurements on a rig: ``doe calibrate``.
+
+The question, a scene and a table, is checked before anything runs.
+"""
 
 import copy
 import json
@@ -13,13 +16,25 @@ from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
-from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
-from doe.unknown.likelihood import Measured
-from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
-from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
+from doe.unknown.calibration import (
+    FAR,
+    MISSED,
+    TRIED,
+    Batch,
+    Judgement,
+    Matched,
+    Unknowns,
+    judge,
+    matched,
+    objections,
+    reweighed,
+    sets_a_wave,
+)
+from doe.unknown.posterior import Learnt, Measured, contraction, densest_intervals, learnt
 from doe.workflow.input_sets import (
     NORMAL,
     Case,
@@ -27,11 +42,13 @@ from doe.workflow.input_sets import (
     check_holes,
     check_overrides,
     impossible,
+    laws_of,
     outcomes,
-    overriding,
-    scattered,
-    screened,
+    outputs_with_scatter,
+    override_notes,
+    screen_inputs,
     tables_of,
+    work_of_set,
 )
 from doe.workflow.rig import Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
@@ -45,101 +62,102 @@ from rbdyn.scene.unknown import Input, put, value_of
 
 
 class Question(NamedTuple):
-    """A scene with its unknown inputs, the inputs that are ``sought``, a rig's table, and notes."""
+    """A scene with its unknown inputs, the ``targets`` among them, a rig's table, and notes."""
 
     case: Case
-    sought: list[Input]
+    targets: list[Input]
     rig: Rig
     notes: tuple[str, ...]
 
 
 def question_of(question: Question) -> str:
-    """What distinguishes one question from another: its scene, its rig, what is sought, and the code that answers it."""
-    case, sought, rig, _ = question
-    sought_of = [[each.key, each.law.model_dump(mode="json")] for each in sought]
+    """Digest of a question: its scene, its rig, its targets, and the code that answers it."""
+    case, targets, rig, _ = question
+    target_laws = [[target.key, target.law.model_dump(mode="json")] for target in targets]
     declared = [case.uncertain.model_dump(mode="json"), case.scene.calibrate.model_dump(mode="json")]
-    rows = [[row.keys, row.values, row.sds, row.turns, row.held] for row in rig.rows]
+    rows = [[row.keys, row.values, row.sds, row.turns, row.hold] for row in rig.rows]
     scene = case.scene.model_dump(mode="json")
     version = code_version(clearance.SIMULATION, "doe.workflow.calibration")
-    told = [version, scene, declared, sought_of, rows, case.source, str(rig.path)]
-    return digest_of(json.dumps(told, sort_keys=True))
+    content = [version, scene, declared, target_laws, rows, case.source, str(rig.path)]
+    return digest_of(json.dumps(content, sort_keys=True))
 
 
 def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
-    """What is asked of a scene and a rig's table; ``free``: keys that are sought, all unknown ones unless named.
+    """The question about a scene and a rig's table; ``free``: keys of the targets, by default all unknown ones.
 
-    Raises InputError for all that is wrong with them, before anything runs.
+    Raises InputError with all faults, before anything runs.
     """
     rig = read_rig(data)
     tables = tables_of(path, overrides)
     base = Scene.from_dict(tables, str(path))
-    given = getattr(base, "uncertain", None) or Uncertain()
-    refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
-    known = {each.key for each in documented()}
-    laid, settled = set(given.laws), Claims({key_path(each): each for each in given.set})
+    uncertain = getattr(base, "uncertain", None) or Uncertain()
+    refuse([f"{path}: uncertain.sample: is a result of calibration; leave it out"] if uncertain.sample else [])
+    documented_keys = {entry.key for entry in documented()}
+    law_keys = set(uncertain.laws)
+    override_claims = Claims({key_path(override): override for override in uncertain.set})
     refuse(
-        [f"{data}: column {key}: {why}" for key in rig.keys if (why := RUN_KEYS.on(tuple(key.split("."))))]
+        [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
         + [
-            f"{data}: column {key} is sought too ({path}: uncertain or --free); take it out of one of them"
+            f"{data}: column {key} is a target too ({path}: uncertain or --free); take it out of one of them"
             for key in rig.keys
-            if key in laid or key in free
+            if key in law_keys or key in free
         ]
         + [
             f'--free {key}: has neither a law in uncertain nor a documented range; write uncertain."{key}" = {{law = ...}}'
             for key in free
-            if key not in laid and key not in known
+            if key not in law_keys and key not in documented_keys
         ]
         + [
             f"--free {key}: uncertain.set gives its value; take it out there"
             for key in free
-            if settled.on(tuple(key.split(".")))
+            if override_claims.on(tuple(key.split(".")))
         ]
     )
-    asked = [key for key in free if key not in laid]
-    named = {"estimated": [*given.estimated, *asked], "defaults": "documented"}
-    declared = given.model_copy(update=named if free else {})
+    estimated_keys = [key for key in free if key not in law_keys]
+    changes = {"estimated": [*uncertain.estimated, *estimated_keys], "defaults": "documented"}
+    declared = uncertain.model_copy(update=changes if free else {})
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
     case = case_of(str(path), tables, rig.outputs, declared, fixed)
-    sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
-    check_overrides(overrides, sought, fixed)
+    targets = [
+        candidate for candidate in case.every if candidate.law.kind == "unknown" and (not free or candidate.key in free)
+    ]
+    check_overrides(overrides, targets, fixed)
     notes = [
         *rig.notes,
         *case.remarks,
-        *overriding(case, overrides),
+        *override_notes(case, overrides),
         *(
             (
-                f"{each.key} varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the "
-                "key that it multiplies"
+                f"{candidate.key} varies, so it has no single value to identify; it keeps the scene's value, or its ratio to "
+                "the key that it multiplies"
             )
-            for each in case.every
-            if each.law.kind == "varies"
+            for candidate in case.every
+            if candidate.law.kind == "varies"
         ),
     ]
     refuse(
-        f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
+        f"--free {key}: its documented range does not apply to this scene (rbdyn keys {key}); give it a law"
         for key in free
-        if key not in {each.key for each in case.every}
+        if key not in {candidate.key for candidate in case.every}
     )
-    refuse([] if sought else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
+    refuse([] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
     if case.scene.calibrate.discrepancy == "none":
-        notes.append(
-            "discrepancy = none: the simulation is taken as exact; where it is not, intervals are far too narrow"
-        )
+        notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
         refuse(
-            f"{path}: calibrate.discrepancy: {name} is not measured; known are {', '.join(rig.outputs)}"
+            f"{path}: calibrate.discrepancy: {name} is not measured; name one of {', '.join(rig.outputs)}"
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    # What is wrong at one condition alone is reported once.
-    refuse(dict.fromkeys(fault for each in cases_of(case, rig) for fault in impossible(each)))
-    return Question(case, sought, rig, tuple(notes))
+    # A fault at several conditions is reported once.
+    refuse(dict.fromkeys(fault for condition in cases_of(case, rig) for fault in impossible(condition)))
+    return Question(case, targets, rig, tuple(notes))
 
 
 def cases_of(case: Case, rig: Rig) -> list[Case]:
-    """The case at every condition. Raises InputError for conditions that no scene has."""
+    """The case at each condition of the rig. Raises InputError for impossible conditions."""
     cases, faults = [], dict[str, None]()
-    first = {tuple(each.keys.items()): each.number for each in reversed(rig.rows)}
+    first = {tuple(rig_row.keys.items()): rig_row.number for rig_row in reversed(rig.rows)}
     for keys in rig.conditions:
         row = first[tuple(keys.items())]
         tables, scene_of = copy.deepcopy(case.data), f"{rig.path}: row {row}"
@@ -156,15 +174,19 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
 
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
-# Rows of the posterior sample, and input sets that show what was likely before.
+# Rows of the posterior sample, and input sets of the prior.
 SAMPLE, BEFORE = 1000, 2000
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Everything a report needs. ``case`` is the scene with its unknowns, ``inputs`` those that were sought, ``screened`` what
-    was left at its value; ``cells``: row, output; ``nominal``: cells as the scene says, in logarithms; ``before`` and ``after``:
-    cells over the prior and the posterior (n, c); ``after`` and what is judged by it None where nothing is left."""
+    """Everything a report needs.
+
+    ``case``: the scene with its unknown inputs; ``inputs``: the targets; ``screened``: inputs kept at their values.
+    ``cells``: (row, output) of each measurement; ``nominal`` (c,): their logarithms at the scene's own inputs.
+    ``before`` and ``after`` (n, c): cells over the prior and the posterior. ``after`` and all that follows from it are None
+    if no input set fits the measurements; ``without``: contraction by key without the outliers among the cells.
+    """
 
     case: Case
     rig: Rig
@@ -172,31 +194,29 @@ class Calibration:
     screened: dict[str, float]
     cells: list[tuple[int, str]]
     nominal: Array
-    found: Matched
+    match: Matched
     before: Array
-    after: Array | None
-    learnt: Learnt | None
-    judgement: Judgement | None
-    without: dict[str, float] | None
-    objections: tuple[str, ...]
     runs: int
     notes: tuple[str, ...]
+    after: Array | None = None
+    learnt: Learnt | None = None
+    judgement: Judgement | None = None
+    without: dict[str, float] | None = None
+    objections: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
-        """calibrated or not calibrated."""
+        """Either "calibrated" or "not calibrated"."""
         return "not calibrated" if self.reasons else "calibrated"
 
     @property
     def reasons(self) -> list[str]:
-        """Why inputs may not be called calibrated."""
-        cells = [self.cells[place] for place in self.found.refuted]
-        told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
+        """Sentences on why the inputs are not calibrated; none if they are."""
+        cells = [self.cells[place] for place in self.match.refuted]
+        cell_names = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
         return [
             *(
-                [
-                    f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
-                ]
+                [f"refuted: no input set within the laws predicts these within the allowed discrepancy: {cell_names}"]
                 if cells
                 else []
             ),
@@ -205,28 +225,36 @@ class Calibration:
 
     @property
     def quantiles(self) -> Array:
-        """Quantiles (n, d) of the inputs, as likely as the posterior."""
-        if self.found.sampled is None:
+        """Quantiles (n, d) of the inputs, drawn from the posterior."""
+        if self.match.sampled is None:
             raise RunError("calibration: no input set is left to sample")
-        points = self.found.sampled.points
-        return self.found.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
+        points = self.match.sampled.points
+        return self.match.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
 
     @property
     def ends(self) -> Array:
         """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie."""
-        if self.found.sampled is None:
+        if self.match.sampled is None:
             raise RunError("calibration: no input set is left to sample")
-        return densest_intervals(self.found.quantiles(self.found.sampled.points))
+        return densest_intervals(self.match.quantiles(self.match.sampled.points))
 
     @cached_property
     def sample(self) -> list[dict[str, Any]]:
-        """What the scene has at each input, and at each key that multiplies one, in the input sets of ``quantiles``."""
-        inputs = [each.key for each in self.inputs]
-        tied = [each.key for each in self.case.every if each.key not in inputs and each.law.times in inputs]
-        rows = unknown.table_of({each.key: each.law for each in self.inputs}, self.quantiles)
+        """Values of each input, and of each key that multiplies one, in the input sets of ``quantiles``."""
+        inputs = [unknown_input.key for unknown_input in self.inputs]
+        tied_keys = [
+            unknown_input.key
+            for unknown_input in self.case.every
+            if unknown_input.key not in inputs and unknown_input.law.times in inputs
+        ]
+        rows = unknown.table_of(laws_of(self.inputs), self.quantiles)
         scenes = self.case.scenes(self.inputs, rows, 0)
-        # A set that is impossible in the scene itself, though not at the rig's conditions, is none.
-        return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
+        # A set may be possible at the rig's conditions and impossible in the scene itself.
+        return [
+            {key: value_of(scene, key) for key in (*inputs, *tied_keys)}
+            for scene in scenes
+            if not isinstance(scene, str)
+        ]
 
     def outliers(self) -> list[int]:
         """Places of the cells that the others predict badly."""
@@ -235,7 +263,7 @@ class Calibration:
 
 @dataclass
 class _Rows:
-    """Simulations of all conditions: a case a condition, and where each measured cell is found in them."""
+    """Simulations at all conditions: a case for each condition, and (condition, output) of each measured cell."""
 
     cases: list[Case]
     inputs: list[Input]
@@ -245,9 +273,9 @@ class _Rows:
     runs: int = 0
 
     def simulate(self, quantiles: Array, stage: int) -> Batch:
-        """Input sets at all conditions. Raises RunError where too many are impossible or fail."""
+        """Input sets at all conditions. Raises RunError if too many are impossible or fail."""
         title = f"wave {stage + 1}" if stage < 100 else "posterior"
-        values = unknown.table_of({each.key: each.law for each in self.inputs}, quantiles)
+        values = unknown.table_of(laws_of(self.inputs), quantiles)
         first = clearance.CALIBRATION_SEEDS + stage * STAGE_SEEDS
         scenes = [
             scene
@@ -257,14 +285,14 @@ class _Rows:
         labels = [
             f"{title}, input set {n + 1}, condition {c + 1}" for c in range(len(self.cases)) for n in range(len(values))
         ]
-        ran = self.run(scenes, labels, title)
-        table = [ran[place :: len(values)] for place in range(len(values))]
-        good = [n for n, row in enumerate(table) if not any(isinstance(each, Failure | str) for each in row)]
-        failures = [each for each in ran if isinstance(each, Failure)]
-        impossible = [each for each in ran if isinstance(each, str)]
-        check_holes(len(table) - len(good), len(table), failures, impossible, " at some condition")
-        cells, variances, freedom = self.figures([each for n in good for each in table[n]])
-        return Batch(quantiles[good], cells, variances, freedom)
+        results = self.run(scenes, labels, title)
+        table = [results[place :: len(values)] for place in range(len(values))]
+        complete = [n for n, row in enumerate(table) if not any(isinstance(outcome, Failure | str) for outcome in row)]
+        failures = [outcome for outcome in results if isinstance(outcome, Failure)]
+        impossible = [outcome for outcome in results if isinstance(outcome, str)]
+        check_holes(len(table) - len(complete), len(table), failures, impossible, " at some condition")
+        cells, variances, freedom = self.figures([result for n in complete for result in table[n]])
+        return Batch(quantiles[complete], cells, variances, freedom)
 
     def run(self, scenes: Sequence[Scene | str], labels: Sequence[str], title: str) -> list[Any]:
         """Results, failures, or why there is no scene."""
@@ -272,12 +300,12 @@ class _Rows:
         return outcomes(scenes, labels, self.simulations, title)
 
     def figures(self, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-        """Cells (n, c) in logarithms, their variances and the degrees of freedom behind these, of results by condition."""
-        outputs, variances, freedom = scattered(self.outputs, results)
+        """Cells (n, c) in logarithms, their variances and the degrees of freedom of these, of results by condition."""
+        outputs, variances, freedom = outputs_with_scatter(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
             raise RunError(
-                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
+                f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; leave its column out"
             )
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
@@ -290,39 +318,50 @@ class _Rows:
 
 @one_thread
 def find_calibration(question: Question, simulations: Simulations) -> Calibration:
-    """Find the unknown inputs of a scene from a rig's table. Raises RunError, KeyboardInterrupt."""
-    case, sought, rig, notes = question
+    """Identify the unknown inputs of a scene from a rig's table. Raises RunError, KeyboardInterrupt."""
+    case, targets, rig, notes = question
     conditions = rig.conditions
     cases = cases_of(case, rig)
-    inputs, rest = screened(replace(case, every=sought), simulations)
+    inputs, fixed_shares = screen_inputs(replace(case, every=targets), simulations)
     places = [(row, name) for row in rig.rows for name in row.values]
-    at = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
-    rows = _Rows(cases, inputs, rig.outputs, at, simulations)
+    cell_places = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
+    rows = _Rows(cases, inputs, rig.outputs, cell_places, simulations)
     nominal, variances, turns, numerical = _nominal(rows)
     measured = _measured(rows, rig, variances, turns, numerical)
-    asked = case.scene.calibrate
-    found = matched(rows.simulate, measured, _unknowns(case, inputs), asked.seed, asked.waves)
+    settings = case.scene.calibrate
+    match = matched(rows.simulate, measured, _unknowns(case, inputs), settings.seed, settings.waves)
     cells = [(row.number, name) for row, name in places]
-    before = found.cells.mean(found.unknowns.at(np.random.default_rng(0).standard_normal((BEFORE, len(inputs)))))
-    whole = Calibration(
-        case, rig, inputs, rest, cells, nominal, found, before, None, None, None, None, (), rows.runs, notes
+    prior_cells = match.cells.mean(
+        match.unknowns.quantiles(np.random.default_rng(0).standard_normal((BEFORE, len(inputs))))
     )
-    return whole if found.sampled is None else _judged(whole)
+    calibration = Calibration(
+        case=case,
+        rig=rig,
+        inputs=inputs,
+        screened=fixed_shares,
+        cells=cells,
+        nominal=nominal,
+        match=match,
+        before=prior_cells,
+        runs=rows.runs,
+        notes=notes,
+    )
+    return calibration if match.sampled is None else _with_judgement(calibration)
 
 
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
-    """Cells as the scene says, in logarithms, variances of one run of each, its counted turns, variances by integration."""
+    """Cells (c,) at the scene's own inputs: logarithms, variances of one run, counted turns, numerical variances."""
     scenes = [
         Scene.from_dict(case.data, case.source, [*case.uncertain.set, "numerics.companion=true"]) for case in rows.cases
     ]
     labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
-    ran = rows.run(scenes, labels, "as the scene says")
-    for result, label in zip(ran, labels, strict=True):
+    results = rows.run(scenes, labels, "as the scene says")
+    for result, label in zip(results, labels, strict=True):
         if isinstance(result, Failure):
             raise RunError(f"{label}: {result.cause}")
-    values, variances, _ = rows.figures(ran)
-    turns = np.array([result.counted_turns * result.replicates for result in ran])
-    records = [result.as_dict() for result in ran]
+    values, variances, _ = rows.figures(results)
+    turns = np.array([result.counted_turns * result.replicates for result in results])
+    records = [result.as_dict() for result in results]
     numerical = [
         (records[condition][rows.outputs[name]]["numerical_error"] or 0.0) / NORMAL / np.exp(value)
         for (condition, name), value in zip(rows.cells, values[0], strict=True)
@@ -333,77 +372,110 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
 def _measured(rows: _Rows, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
     scales = rows.cases[0].scene.calibrate.discrepancy
     cells = [(row, name) for row in rig.rows for name in row.values]
-    found = []
+    relative_variances = []
     for place, (row, name) in enumerate(cells):
         sd = row.sds[name]
-        # A run as long as the measurement scatters as that does.
-        found.append((sd / row.values[name]) ** 2 if sd else variances[place] * turns[place] / (row.turns or 1.0))
+        # The measurement scatters like a run of as many turns.
+        relative_variances.append(
+            (sd / row.values[name]) ** 2 if sd else variances[place] * turns[place] / (row.turns or 1.0)
+        )
     conditions, outputs = np.array(rows.cells).T
     return Measured(
         np.log([row.values[name] for row, name in cells]),
-        np.array(found) + numerical,
+        np.array(relative_variances) + numerical,
         outputs,
         conditions,
         np.array([0.0 if scales == "none" else scales.get(name, np.nan) for name in rig.outputs]),
-        np.array([row.held for row, _ in cells]),
+        np.array([row.hold for row, _ in cells]),
     )
 
 
 def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
     factor = case.joint(inputs).factor
-    given = [each.law for each in inputs]
-    choices = {place: law for place, law in enumerate(given) if isinstance(law, Law) and law.law == "choices"}
+    laws = [unknown_input.law for unknown_input in inputs]
+    choices = {place: law for place, law in enumerate(laws) if isinstance(law, Law) and law.law == "choices"}
 
-    def at(scores: Array) -> Array:
+    def quantiles_at(scores: Array) -> Array:
         quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
         for place, law in choices.items():
             quantiles[:, place] = unknown.quantiles_of(law, unknown.values_of(law, quantiles[:, place]))
         return quantiles
 
-    return Unknowns(len(inputs), at)
+    return Unknowns(len(inputs), quantiles_at)
 
 
-def _judged(given: Calibration) -> Calibration:
-    """What was learned, how well the rest is predicted, and what may be claimed."""
-    found, seed = given.found, given.case.scene.calibrate.seed
-    assert found.sampled is not None
-    points = found.sampled.points
-    judgement = judge(found, [quantity(name)[0] for name in given.rig.outputs], seed)
-    quantiles = found.quantiles(points)
-    prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
-    gained = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
-    against = objections(judgement, anything=gained.anything, emulated=found.misfit < MISSED)
+def _with_judgement(calibration: Calibration) -> Calibration:
+    """The calibration with its posterior, the judgement of its predictions, and the objections."""
+    match, seed = calibration.match, calibration.case.scene.calibrate.seed
+    assert match.sampled is not None
+    points = match.sampled.points
+    judgement = judge(match, [quantity(name)[0] for name in calibration.rig.outputs], seed)
+    quantiles = match.quantiles(points)
+    prior = match.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(calibration.inputs))))
+    gained = learnt(quantiles, _logarithms(calibration.inputs, quantiles), _logarithms(calibration.inputs, prior))
+    objection_list = objections(judgement, anything=gained.anything, emulated=match.misfit < MISSED)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
-    after = found.cells.mean(quantiles[rows])
+    posterior_cells = match.cells.mean(quantiles[rows])
     notes = (
-        *given.notes,
+        *calibration.notes,
         *(
-            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
+            f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow"
             for place in gained.narrow
         ),
     )
-    whole = replace(given, after=after, learnt=gained, judgement=judgement, objections=tuple(against), notes=notes)
-    return replace(whole, without=_without(whole))
+    result = replace(
+        calibration,
+        after=posterior_cells,
+        learnt=gained,
+        judgement=judgement,
+        objections=tuple(objection_list),
+        notes=notes,
+    )
+    return replace(result, without=_contraction_without_outliers(result))
 
 
-def _without(given: Calibration) -> dict[str, float] | None:
-    """Contraction by key without the cells that the others predict badly; None where there are no training cells."""
-    found = given.found
-    assert given.judgement is not None
-    left = np.setdiff1d(found.measured.learnt, given.outliers())
-    if left.size in (0, found.measured.learnt.size):
+def _contraction_without_outliers(calibration: Calibration) -> dict[str, float] | None:
+    """Contraction by key without the outliers among the cells; None without outliers or without other cells."""
+    match = calibration.match
+    assert calibration.judgement is not None
+    cells = np.setdiff1d(match.measured.learnt, calibration.outliers())
+    if cells.size in (0, match.measured.learnt.size):
         return None
-    points = reweighed(given.judgement.particles, left, given.case.scene.calibrate.seed)
-    shares = contraction(found.quantiles(points)).tolist()
-    return dict(zip((each.key for each in given.inputs), shares, strict=True))
+    points = reweighed(calibration.judgement.particles, cells, calibration.case.scene.calibrate.seed)
+    shares = contraction(match.quantiles(points)).tolist()
+    return dict(zip((unknown_input.key for unknown_input in calibration.inputs), shares, strict=True))
 
 
 def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
     """Logarithms (n, d) of inputs that are positive numbers; NaN of the others."""
-    found = np.full(quantiles.shape, np.nan)
-    for place, each in enumerate(inputs):
-        if each.law.law != "choices":
-            values = np.array(unknown.values_of(each.law, quantiles[:, place]))
+    logarithms = np.full(quantiles.shape, np.nan)
+    for place, unknown_input in enumerate(inputs):
+        if unknown_input.law.law != "choices":
+            values = np.array(unknown.values_of(unknown_input.law, quantiles[:, place]))
             if (values > 0.0).all():
-                found[:, place] = np.log(values)
-    return found
+                logarithms[:, place] = np.log(values)
+    return logarithms
+
+
+def calibration_stages(question: Question) -> list[Stage]:
+    """Stages of ``doe calibrate``; fewer waves may do. Raises InputError."""
+    case, targets = question.case, question.targets
+    conditions, work = len(cases_of(case, question.rig)), work_of_set(case)
+    screening_runs = _screening_runs(replace(case, every=targets))
+    waves, sets = case.scene.calibrate.waves, sets_a_wave(min(len(targets), case.uncertain.inputs)) * conditions
+    return [
+        *([Stage.of("screening", screening_runs, work)] if screening_runs else []),
+        Stage.of("as the scene says", conditions, work),
+        Stage.of("waves", waves * sets, work, "wave", fewest=sets),
+        # If emulators miss the posterior, it is simulated once more.
+        Stage.of("posterior", TRIED * conditions, work, most=2 * TRIED * conditions),
+        Stage(ANSWER, besides_s=ANSWER_S),
+    ]
+
+
+def _screening_runs(case: Case) -> int:
+    """Runs of a screening, which only too many inputs need; else 0."""
+    candidates = [candidate for candidate in case.every if candidate.key not in case.sample]
+    if len(case.every) <= case.uncertain.inputs or not candidates:
+        return 0
+    return len(unknown.screening_design(len(candidates)))

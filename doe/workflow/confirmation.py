@@ -1,6 +1,6 @@
-"""Simulations at chosen points: whether what they gain over the baseline is more than their error, and whether they keep the limits.
+"""Confirmation of points by simulation: gains over the baseline with their errors, and the verdict on each limit.
 
-Intervals are Student's at the degrees of freedom that are behind the errors; a limit is kept, broken or undecided.
+Intervals are Student's at the degrees of freedom of the errors. A limit is kept, broken or undecided.
 """
 
 import math
@@ -18,39 +18,37 @@ from doe.running.store import Failure
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
-from doe.workflow.goals import goals_of
-from doe.workflow.surfaces import gain_verdict
+from doe.workflow.surfaces import gain_verdict, goals_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
 from rbdyn.result import SimulationResult
 
-LEVEL = 0.95  # that a stated interval holds the truth
+LEVEL = 0.95  # probability that a stated interval holds the truth
 
 
 def standard_errors(half_widths: ArrayLike, freedom: ArrayLike) -> Array:
-    """Standard errors from half-widths of 95 %, any shape; of an unknown half-width (NaN) none."""
+    """Standard errors from half-widths of 95 %, any shape; 0 for an unknown half-width (NaN)."""
     return np.nan_to_num(np.asarray(half_widths, float)) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
 
 
 def joint_freedom(errors: Sequence[Array], freedom: Sequence[Array]) -> Array:
-    """Degrees of freedom of the root sum square of independent standard ``errors``, each with its own; infinitely many of
-    none."""
-    variances = [each**2 for each in errors]
-    spread = np.sum([each**2 / behind for each, behind in zip(variances, freedom, strict=True)], axis=0)
+    """Degrees of freedom of the root sum square of independent standard ``errors``; infinite where all errors are 0."""
+    variances = [error**2 for error in errors]
+    spread = np.sum([variance**2 / dof for variance, dof in zip(variances, freedom, strict=True)], axis=0)
     total = np.sum(variances, axis=0)
     return np.divide(total**2, spread, out=np.full_like(total, np.inf), where=spread > 0.0)
 
 
 def times_wider(freedom: ArrayLike, count: int) -> Array:
-    """How many times wider half-widths of 95 % are where ``count`` of them are to hold together (Bonferroni)."""
-    together = 1.0 - 0.5 * (1.0 - LEVEL) / count
-    return np.asarray(special.stdtrit(freedom, together) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
+    """Factor by which half-widths of 95 % grow so that ``count`` of them hold together (Bonferroni)."""
+    level = 1.0 - 0.5 * (1.0 - LEVEL) / count
+    return np.asarray(special.stdtrit(freedom, level) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
 
 
 def one_sided(freedom: ArrayLike, probability: float) -> Array:
-    """What part of a half-width of 95 % holds on one side with a ``probability``."""
+    """Share of a half-width of 95 % that holds on one side with a ``probability``."""
     return np.asarray(special.stdtrit(freedom, probability) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
 
 
@@ -65,7 +63,7 @@ WHIRL = "whirl_deviation_ratio"
 
 @dataclass(frozen=True)
 class Choice:
-    """A point (k,) in factor units, at the resolution of the drawing, and why it was chosen."""
+    """A point (k,) in factor units, at the resolution of the drawing, and the reason for its choice."""
 
     point: Array
     reason: str
@@ -75,11 +73,12 @@ class Choice:
 class Confirmed:
     """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths.
 
-    Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
-    numerical half-width, as of independent errors. ``freedom`` (m,): degrees of freedom of the statistical ones, infinitely
-    many unless given; the numerical ones have that. ``power_terms``: power losses [W] by contact; ``reason``: why the point
-    was chosen; ``orbit_share``: radius of the cage's orbit over its play where that is of a jitter, else None;
-    ``friction_check``: the maker's friction, None without a designation.
+    Intervals use `error`: the root sum square of both half-widths, as of independent errors. ``freedom`` (m,): degrees
+    of freedom of the statistical half-widths, infinite unless stated, as those of the numerical ones are.
+
+    ``power_terms``: power losses [W] by contact. ``reason``: why the point was chosen. ``orbit_share``: radius of the
+    cage's orbit over its play if the cage trembles, else None. ``friction_check``: friction by the maker's model, None
+    without a designation.
     """
 
     point: Array
@@ -95,17 +94,17 @@ class Confirmed:
     @property
     def error(self) -> Array:
         """Joint 95 % half-widths (m,); NaN where neither part is known."""
-        known = np.isfinite(self.statistical) | np.isfinite(self.numerical)
+        mask = np.isfinite(self.statistical) | np.isfinite(self.numerical)
         joint: Array = np.hypot(np.nan_to_num(self.statistical), np.nan_to_num(self.numerical))
-        return np.where(known, joint, np.nan)
+        return np.where(mask, joint, np.nan)
 
     @property
     def parts(self) -> tuple[list[Array], list[Array]]:
         """Statistical and numerical standard errors (m,), 0 where unknown, and the degrees of freedom of each."""
-        many = np.full_like(self.values, np.inf)
-        freedom = [many if self.freedom is None else self.freedom, many]
+        infinite = np.full_like(self.values, np.inf)
+        freedom = [infinite if self.freedom is None else self.freedom, infinite]
         halves = (self.statistical, self.numerical)
-        return [standard_errors(*each) for each in zip(halves, freedom, strict=True)], freedom
+        return [standard_errors(*pair) for pair in zip(halves, freedom, strict=True)], freedom
 
     @property
     def standard_error(self) -> Array:
@@ -121,8 +120,8 @@ class Confirmed:
 class Gain(Record):
     """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width.
 
-    ``verdict``: whether the change is larger than its error; ``goal``: what is wanted of the response; ``freedom``: degrees
-    of freedom of the error.
+    ``verdict``: whether the change exceeds its error; ``goal``: "min", "max" or a target; ``freedom``: degrees of freedom
+    of the error.
     """
 
     response: str = outside_json()
@@ -133,7 +132,7 @@ class Gain(Record):
     freedom: float = outside_json(default=np.inf)
 
     def error_among(self, count: int) -> float:
-        """Half-width that holds together with those of so many gains."""
+        """Half-width that holds together with those of ``count`` gains."""
         return self.error * float(times_wider(self.freedom, count))
 
 
@@ -141,18 +140,18 @@ class Gain(Record):
 def confirm(
     study: Study, choices: Mapping[str, Choice], simulations: Simulations
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
-    """Simulate the baseline and the choices with fresh seeds; returns what went well and what failed.
+    """Simulate the baseline and the choices with fresh seeds. Returns the simulated points and the failures.
 
     Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
-    wanted = {"baseline": Choice(study.baseline, "the original design"), **choices}
+    points = {"baseline": Choice(study.baseline, "the original design"), **choices}
     scenes = [
-        clearance.confirmation_scene(study.at(()) if name == "baseline" else study, choice.point)
-        for name, choice in wanted.items()
+        clearance.confirmation_scene(study.with_levels(()) if name == "baseline" else study, choice.point)
+        for name, choice in points.items()
     ]
-    results = simulations.run(scenes, list(wanted), simulations.progress("confirmation"))
+    results = simulations.run(scenes, list(points), simulations.progress("confirmation"))
     confirmed, failures = {}, []
-    for (name, choice), result in zip(wanted.items(), results, strict=True):
+    for (name, choice), result in zip(points.items(), results, strict=True):
         if not isinstance(result, Failure):
             confirmed[name] = confirmed_from(study, choice, result)
         elif name in ("baseline", "pick"):
@@ -170,51 +169,50 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
         np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
         for key in ("value", "statistical_error", "numerical_error")
     )
-    behind = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
+    freedom = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
     errors = statistical, numerical
     terms, check, orbit = result.power_terms, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
-    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(behind), jitter, check)
+    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
-    """Improvements of all responses with a goal, with the joint errors of both runs as independent."""
+    """Improvements of all responses with a goal; the errors of both runs are independent."""
     goals = goals_of(study)
-    chosen = goals.objectives
+    objectives = goals.objectives
     error, freedom = error_of_difference(baseline, pick)
-    scale = 100.0 / np.abs(baseline.values[chosen])
+    scale = 100.0 / np.abs(baseline.values[objectives])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
-    columns = zip(chosen, percent, error[chosen] * scale, freedom[chosen], strict=True)
+    columns = zip(objectives, percent, error[objectives] * scale, freedom[objectives], strict=True)
     return [
-        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal, float(behind))
-        for index, p, e, behind in columns
+        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal, float(dof))
+        for index, p, e, dof in columns
     ]
 
 
-def error_of_difference(one: Confirmed, other: Confirmed) -> tuple[Array, Array]:
+def error_of_difference(first: Confirmed, second: Confirmed) -> tuple[Array, Array]:
     """95 % half-widths (m,) of the differences of two simulated points, and the degrees of freedom behind them (Welch)."""
-    errors, behind = zip(one.parts, other.parts, strict=True)
-    every, freedom = [*errors[0], *errors[1]], joint_freedom([*errors[0], *errors[1]], [*behind[0], *behind[1]])
-    total = np.sqrt(np.sum([each**2 for each in every], axis=0))
+    errors, dofs = zip(first.parts, second.parts, strict=True)
+    all_errors, freedom = [*errors[0], *errors[1]], joint_freedom([*errors[0], *errors[1]], [*dofs[0], *dofs[1]])
+    total = np.sqrt(np.sum([error**2 for error in all_errors], axis=0))
     return total * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL), freedom
 
 
 def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:
-    """Where a study has a goal for the whirl deviation ratio and that is of a jitter, at baseline or pick; else empty."""
-    wanted = [study.responses[index] for index in goals_of(study).objectives]
+    """A warning that the whirl deviation ratio, which has a goal, is that of a trembling cage; else empty."""
+    objectives = [study.responses[index] for index in goals_of(study).objectives]
     shares = {name: confirmed[name].orbit_share for name in ("baseline", "pick")}
-    known = {name: share for name, share in shares.items() if share is not None}
-    if WHIRL not in wanted or not known:
+    jitter_shares = {name: share for name, share in shares.items() if share is not None}
+    if WHIRL not in objectives or not jitter_shares:
         return ""
-    radii = " and ".join(f"{share:.2g} of its play at the {name}" for name, share in known.items())
-    return f"{WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
+    radii = " and ".join(f"{share:.2g} of its play at the {name}" for name, share in jitter_shares.items())
+    return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
 
 
 def statement(gains: Sequence[Gain]) -> str:
     """Whether the gains are real, in words.
 
-    A gain counts as real where it is more than its error with all responses judged at once: the intervals are widened
-    so that together they hold with 95 % (Bonferroni).
+    A gain is real if it exceeds its error; the intervals of all gains hold together with 95 % (Bonferroni).
     """
     count = len(gains)
     by_words = {
@@ -225,14 +223,14 @@ def statement(gains: Sequence[Gain]) -> str:
         ],
     }
     parts = [
-        f"{', '.join(_improved(each, count) for each in group)}: {words}" for words, group in by_words.items() if group
+        f"{', '.join(_improved(gain, count) for gain in group)}: {words}" for words, group in by_words.items() if group
     ]
-    together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
-    return f"Simulated changes from the baseline{together}: {'; '.join(parts)}."
+    intervals = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
+    return f"Simulated changes from the baseline{intervals}: {'; '.join(parts)}."
 
 
 def _improved(gain: Gain, count: int) -> str:
-    """A gain in words, with the error that holds together with those of so many."""
+    """A gain in words, with the error that holds together with those of ``count`` gains."""
     return f"{gain.response} {improvement(gain.percent, gain.error_among(count), gain.goal)}"
 
 
@@ -244,9 +242,9 @@ ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit of a response against its simulated ``value`` with its joint 95 % half-width ``error`` (NaN: unknown).
+    """A limit of a response, its simulated ``value`` and the joint 95 % half-width ``error`` of that (NaN: unknown).
 
-    ``one_sided`` times the half-width is the error on one side at the probability that the study asks for; ``freedom``:
+    ``one_sided`` times the half-width is the one-sided error at the probability that the study asks for. ``freedom``:
     degrees of freedom of the error.
     """
 
@@ -272,36 +270,38 @@ class Limit:
 
     @property
     def probability(self) -> float:
-        """With which the bound is kept, by the error of the value; NaN where that is unknown."""
+        """Probability that the bound is kept, by the error of the value; NaN where that is unknown."""
         if not self.error > 0.0:
             return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
         return float(chance_above(self.room, self.error, self.freedom))
 
     @property
-    def shown(self) -> str:
+    def text(self) -> str:
         """The limit with its value in words."""
-        sure = "error unknown" if math.isnan(self.error) else f"probability {chance(self.probability)}"
-        return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {sure})"
+        probability = "error unknown" if math.isnan(self.error) else f"probability {chance(self.probability)}"
+        return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {probability})"
 
 
 def every_limit(study: Study, confirmed: Confirmed) -> list[Limit]:
-    """All limits of the study at a simulated point, a lower and an upper one of a response each by itself."""
+    """All limits of the study at a simulated point; the lower and the upper limit of a response are two."""
     freedom = confirmed.joint_freedom
     sides = one_sided(freedom, study.file.confirmation.limit_probability).tolist()
     columns = (confirmed.values.tolist(), confirmed.error.tolist(), sides, freedom.tolist())
-    known = list(zip(*columns, strict=True))
+    figures = list(zip(*columns, strict=True))
     return [
-        Limit(study.responses[index], sense, bound, *known[index]) for index, sense, bound in goals_of(study).limited
+        Limit(study.responses[index], sense, bound, *figures[index]) for index, sense, bound in goals_of(study).limited
     ]
 
 
 def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
-    """The limits of the study at a simulated point, one a response: of a lower and an upper one that with the worse
-    verdict, or with less room."""
+    """The limits of the study at a simulated point, one per response.
+
+    Of a lower and an upper limit it is the one with the worse verdict, or with less room.
+    """
     worst: dict[str, Limit] = {}
     for limit in every_limit(study, confirmed):
-        known = worst.get(limit.response)
-        if known is None or _badness(limit) > _badness(known):
+        current = worst.get(limit.response)
+        if current is None or _badness(limit) > _badness(current):
             worst[limit.response] = limit
     return [worst[name] for name in study.responses if name in worst]
 
@@ -311,8 +311,8 @@ def verdict_of(limits: Sequence[Limit]) -> Verdict:
     return max((limit.verdict for limit in limits), key=ORDER.index, default="kept")
 
 
-def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
-    """What became of the limits at the pick, the bad ones first; empty without limits."""
+def sentence(limits: Sequence[Limit], probability: float, tries: int) -> str:
+    """The verdicts on the limits at the pick, the worst first; empty without limits. ``tries``: simulated points."""
     if not limits:
         return ""
     words = {
@@ -322,18 +322,21 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
     }
     parts = []
     for verdict in reversed(ORDER):
-        group = [limit.shown for limit in limits if limit.verdict == verdict]
+        group = [limit.text for limit in limits if limit.verdict == verdict]
         parts += [words[verdict].format(", ".join(group))] if group else []
-    tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
-    return f"{'. '.join(parts)} ({tries})."
+    points = "first point simulated" if tries == 1 else f"{tries} points simulated"
+    return f"{'. '.join(parts)} ({points})."
 
 
 def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
-    """How likely the pick keeps its limits over the unknown inputs, or the command that computes it; empty without limits."""
+    """Probability that the pick keeps its limits over the unknown inputs, or the command for it; empty without limits."""
     if not goals_of(study).limited:
         return ""
     if odds is None:
-        return f"The odds of keeping the limits over the unknown inputs: doe study {study.path.name} --robust."
+        return (
+            "The probability of keeping the limits over the unknown inputs is computed by: "
+            f"doe study {study.path.name} --robust."
+        )
     shares = ", ".join(
         f"{name} {100.0 * p:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %)" for name, (p, low, high) in odds.items()
     )

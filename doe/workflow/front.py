@@ -1,11 +1,14 @@
-"""The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it. How far a pick stays back from a limit because predictions err; shares of the parts
-made about a point.
+"""The Pareto front of a study on its response surfaces, its uncertainty, and the tolerance-aware front.
+
+A point backs off from a limit by the errors of its prediction. Of the parts made about a point, the share that keeps its
+gains has an interval.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 from typing import Self, TypeVar
 
 import numpy as np
@@ -23,222 +26,39 @@ from doe.pareto.manufacture import (
     tolerance_aware_front,
 )
 from doe.pareto.search import Archive, Doubt, dominates
-from doe.pareto.tolerance import Kept
+from doe.pareto.tolerance import PartCount
 from doe.response_surface import Surface
-from doe.response_surface.model_error import correlation
+from doe.response_surface.adequacy import correlation
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed
-from doe.workflow.goals import check_goals, goals_of, region_of, tolerance_box
-from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
-from rbdyn.base.arrays import Array, Rows
-from rbdyn.base.faults import InputError, MethodError
+from doe.workflow.runs import region_of
+from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, goals_of, predict_all, predict_draws, quadratics
+from rbdyn.base.arrays import Array, Mask, Rows
+from rbdyn.base.faults import InputError, MethodError, refuse
 
-SCALES = np.geomspace(1.0, 100.0, 81)  # of the standard errors, tried against the misses
-MOST_RUNS = 300  # design runs whose misses count; of more, evenly spread ones
-
-
-@dataclass(frozen=True, eq=False)
-class Missed:
-    """What was simulated of one response at coded points (c, k) less what was predicted: ``misses`` (c,), with the
-    standard errors of the simulation (c,) and of the forecast (c,)."""
-
-    points: Array
-    misses: Array
-    errors: Array
-    stated: Array
-
-    def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Self:
-        """With more points."""
-        more = zip((self.points, self.misses, self.errors, self.stated), (points, misses, errors, stated), strict=True)
-        return type(self)(*(np.concatenate(pair) for pair in more))
-
-
-class Conditioned:
-    """The error of a forecast as a field, given what was missed."""
-
-    def __init__(self, missed: Missed) -> None:
-        prior = correlation(missed.points, missed.points) * np.outer(missed.stated, missed.stated)
-        self._missed, self._noise = missed, np.diag(missed.errors**2)
-        self._scale = _scale(prior, self._noise, missed.misses)
-        self._solve = np.linalg.pinv(self._scale**2 * prior + self._noise, hermitian=True)
-
-    def __call__(self, coded: Array, stated: Array) -> tuple[Array, Array]:
-        """Mean (n,) and standard deviation (n,) of the error at coded points (n, k) of ``stated`` standard errors (n,)."""
-        link = self._scale**2 * correlation(coded, self._missed.points) * np.outer(stated, self._missed.stated)
-        projected = link @ self._solve
-        left = (self._scale * stated) ** 2 - (projected * link).sum(axis=1)
-        return projected @ self._missed.misses, np.sqrt(left.clip(0.0))
-
-
-class SurfaceDoubt:
-    """How far the limited responses may lie off their surfaces, from what these missed at the design runs and at points
-    ``simulated``."""
-
-    def __init__(self, study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
-        self._surfaces, self._probability = surfaces, study.file.confirmation.limit_probability
-        self._fields: dict[int, Conditioned] = {}
-        # The error of one more simulation counts too.
-        self._more: dict[int, float] = {}
-        for index in sorted({index for index, _, _ in goals_of(study).limited}):
-            surface = surfaces[index]
-            missed = _at_design(surface)
-            if simulated:
-                at = study.coded(np.array([each.point for each in simulated]))
-                errors = standard_errors_of(simulated)[:, index]
-                misses = np.array([each.values[index] for each in simulated]) - surface.predict(at)
-                missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))
-                self._more[index] = float(errors.max())
-            self._fields[index] = Conditioned(missed)
-
-    def _off(self, index: int, coded: Array) -> tuple[Array, Array]:
-        """Mean (n,) and standard deviation (n,) of what a response lies off its surface."""
-        shift, deviation = self._fields[index](coded, self._surfaces[index].prediction_standard_error(coded))
-        return shift, np.hypot(deviation, self._more.get(index, 0.0))
-
-    def at_share(self, share: float) -> Doubt:
-        """Range in which the responses lie with the study's probability, or a share of it."""
-
-        def doubt(coded: Array) -> tuple[Array, Array]:
-            shift, margin = np.zeros((2, len(coded), len(self._surfaces)))
-            for index in self._fields:
-                quantile = float(special.stdtrit(self._surfaces[index].interval_dof, self._probability))
-                shift[:, index], deviation = self._off(index, coded)
-                margin[:, index] = quantile * deviation
-            # A limit is never loosened: the surface itself keeps it too.
-            return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
-
-        return doubt
-
-    def kept_with(self, index: int, sense: str, bound: float, coded: Array) -> float:
-        """Probability with which a limited response keeps a bound ("<=" or ">=") at a coded point (k,)."""
-        shift, deviation = (float(each[0]) for each in self._off(index, coded[None]))
-        room = bound - float(self._surfaces[index].predict(coded)) - shift
-        room = room if sense == "<=" else -room
-        if deviation == 0.0:
-            return float(room >= 0.0)
-        return float(special.stdtr(self._surfaces[index].interval_dof, room / deviation))
-
-
-def standard_errors_of(simulated: Sequence[Confirmed]) -> Array:
-    """Standard errors (c, m) of simulated points."""
-    return np.array([each.standard_error for each in simulated])
-
-
-def _at_design(surface: Surface) -> Missed:
-    """What the surface missed at its own runs, whose error is that of their replicates, of repeats, or of all the rest."""
-    data = surface.data
-    rows = np.unique(np.linspace(0, len(data.values) - 1, MOST_RUNS).round().astype(int))
-    if data.standard_errors is not None:
-        errors = data.standard_errors
-    else:
-        pure = surface.pure_error["ms"] if surface.model_error is not None else None
-        one = surface.residual_mean_square if pure is None else pure
-        errors = np.full(len(data.values), np.sqrt(one if surface.transform is None else 0.0))
-    points, misses = data.points[rows], data.values[rows] - surface.predict(data.points[rows])
-    return Missed(points, misses, errors[rows], surface.prediction_standard_error(points))
-
-
-def _scale(prior: Array, noise: Array, misses: Array) -> float:
-    """How many times the stated standard errors make the misses most likely; 1 at least."""
-    likelihood = []
-    for scale in SCALES:
-        covariance = scale**2 * prior + noise
-        sign, logarithm = np.linalg.slogdet(covariance)
-        if sign <= 0:
-            return 1.0
-        likelihood.append(-0.5 * (logarithm + misses @ np.linalg.solve(covariance, misses)))
-    return float(SCALES[int(np.argmax(likelihood))]) if likelihood else 1.0
-
-
-DRAWS = 500  # surfaces, all responses of one draw together
-# Coded points (n, k) to their responses (d, n, m) on drawn surfaces, some draws at a time.
-Drawn = Callable[[Array], Iterator[Array]]
-
-
-def draws_of(
-    study: Study, surfaces: Sequence[Surface], confirmed: Mapping[str, Confirmed] | None = None, draws: int = DRAWS
-) -> Drawn:
-    """Draws of the surfaces; those of points that were simulated pass what was found there."""
-    points = list((confirmed or {}).values())
-    known = None
-    if points:
-        at, values, errors = (
-            np.array([getattr(each, name) for each in points]) for name in ("point", "values", "standard_error")
-        )
-        known = Simulated(study.coded(at), values, errors)
-    return partial(drawn_responses, surfaces, draws=draws, seed=study.file.front.seed, simulated=known)
-
-
-def keeping(study: Study, drawn: Drawn, point: Array, free: Rows, least: Array) -> Kept:
-    """Counts the parts that gain at least so much (q,) over the baseline in every cost and keep all limits.
-
-    Parts (n, f) are values of the ``free`` factors (f,) about a ``point`` (k,).
-    """
-    goals = goals_of(study)
-
-    def kept(parts: Array) -> Array:
-        points = np.tile(point, (len(parts) + 1, 1))
-        points[:-1, free] = parts
-        points[-1] = study.baseline
-        counts = []
-        for values in drawn(study.coded(points)):
-            costs, made = goals.costs(values), values[:, :-1]
-            good = (costs[:, :-1] <= costs[:, -1:] - least).all(axis=2)
-            counts.append((good & (goals.violations(made, made) <= 0.0).all(axis=2)).sum(axis=1))
-        return np.concatenate(counts)
-
-    return kept
-
-
-def surviving(study: Study, drawn: Drawn, coded: Array, box: ToleranceBox) -> Interval:
-    """Interval of the share of the parts made at a ``coded`` point (k,) that dominate the nominal baseline."""
-    goals = goals_of(study)
-    made = coded + box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
-    counts = []
-    for values in drawn(np.vstack([made, study.coded(study.baseline)])):
-        costs = goals.costs(values)
-        counts.append(dominates(costs[:, :-1], costs[:, -1:]).sum(axis=1))
-    return interval_of_share(np.concatenate(counts), len(made))
-
-
-def open_errors(surfaces: Sequence[Surface], searched: bool = False) -> str:
-    """What the interval of a share of parts holds, and what it takes as exact, in sentences."""
-    form = "" if searched or all(surface.model_error for surface in surfaces) else "the form of the surfaces, "
-    source = "what the search leaves open" if searched else "the errors of the surfaces"
-    return (
-        f"The interval holds {source} and the count of the parts; {form}numerical errors and the scene's inputs count as "
-        "exact."
-    )
-
-
-Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
-
-
-# Shares of the back-off from limits that are tried: where no point keeps all of it, the largest that any point keeps.
+# Shares of the back-off from limits: the search takes the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
-# Keys of [front] that the searches know by the same names.
+# Keys of [front] that are arguments of the searches.
 SEARCH = {"population", "generations", "seed", "pick"}
+AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
 
 
 @one_thread
 def find_front(
     study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> ParetoFront:
-    """Pareto front on the surfaces within the region of the design, with its uncertainty, and the tolerance-aware one
-    where the study asks for it.
+    """The Pareto front on the surfaces with its uncertainty, and the tolerance-aware front if the study asks for it.
 
-    Its points keep every limit with the probability that the study asks for, by the standard errors of the surfaces and
-    by what these missed at points ``simulated``; where no point does, with as much of that back-off as any point keeps.
-    Each of the ``failed`` points, picked so before and yet not kept, shows the errors to be larger: the back-off grows by
-    its own size.
+    Its points keep every limit with the probability that the study asks for. The back-off follows from the standard
+    errors of the surfaces and from their misses at points ``simulated``; it shrinks where no point keeps all of it. Each
+    of the ``failed`` earlier picks shows that the errors are larger: the back-off grows by its own size.
 
     Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
     """
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
-
     doubt = SurfaceDoubt(study, surfaces, simulated)
 
     def plain(share: float) -> ParetoFront:
@@ -253,42 +73,44 @@ def find_front(
         )
 
     with named_faults(study, goals, lambda point: point, ""):
-        found = _idle_at(study, study.centre, _backed_off(study, plain, failed))
-    found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
+        pareto = _with_inactive_at(study, study.centre, _backed_off(study, plain, failed))
+    pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
     if box is None:
-        return found
+        return pareto
     with named_faults(study, goals, study.actual, " after manufacture"):
         aware = _backed_off(
-            study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
+            study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt.at_share(share)), failed
         )
-    return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+    return replace(pareto, tolerance_aware=_with_inactive_at(study, np.zeros_like(study.centre), aware))
 
 
 @one_thread
 def with_survival(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
+    study: Study, surfaces: Sequence[Surface], pareto: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
 ) -> ParetoFront:
-    """The front with the intervals of the shares of parts that still dominate the baseline; ``confirmed`` points, which were
-    simulated, narrow what the surfaces leave open."""
-    aware = found.tolerance_aware
+    """The front with the intervals of the shares of parts that dominate the baseline.
+
+    The ``confirmed`` points, which were simulated, narrow the errors of the surfaces.
+    """
+    aware = pareto.tolerance_aware
     if aware is None:
-        return found
-    drawn = draws_of(study, surfaces, confirmed)
+        return pareto
+    draws = draws_of(study, surfaces, confirmed)
     plain, pick = (
-        surviving(study, drawn, point, aware.box)
-        for point in (study.coded(found.points[found.pick]), aware.points[aware.pick])
+        survival(study, draws, point, aware.box)
+        for point in (study.coded(pareto.points[pareto.pick]), aware.points[aware.pick])
     )
-    return replace(found, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
+    return replace(pareto, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
 
 
-def _idle_at(study: Study, centre: Array, found: Found) -> Found:
-    """The same points with the factors that mean nothing, for which the search takes anything, at a centre (k,)."""
-    idle = np.isin(np.arange(centre.size), study.inactive)
-    return replace(found, points=np.where(idle, centre, found.points)) if idle.any() else found
+def _with_inactive_at(study: Study, centre: Array, pareto: AnyFront) -> AnyFront:
+    """The same points with the inactive factors, whose values mean nothing, at a centre (k,)."""
+    inactive = np.isin(np.arange(centre.size), study.inactive)
+    return replace(pareto, points=np.where(inactive, centre, pareto.points)) if inactive.any() else pareto
 
 
-def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
-    """What a search finds with the largest share of the back-off that leaves any point. Raises InfeasibleError."""
+def _backed_off(study: Study, search: Callable[[float], AnyFront], failed: int) -> AnyFront:
+    """The front with the largest share of the back-off that any point keeps. Raises InfeasibleError."""
     if not goals_of(study).limited:
         return search(0.0)
     for share in (1.0 + failed, *SHARES)[failed == 0 :]:
@@ -299,18 +121,17 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
                 raise
             continue
         probability = study.file.confirmation.limit_probability
-        words = f"; limits keep the margin for the demanded probability of {probability:g}"
-        if share < 1.0:
-            words = f"; limits keep {100.0 * share:g} % of the margin for the demanded probability of {probability:g}"
+        margin = "the margin" if share >= 1.0 else f"{100.0 * share:g} % of the margin"
+        words = f"; limits keep {margin} for the demanded probability of {probability:g}"
         return replace(searched, pick_reason=searched.pick_reason + words)
     raise AssertionError("the last share either returns or raises")
 
 
 def _uncertainty(study: Study, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
     assert pareto.baseline_values is not None
-    drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
+    coefficients = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([pareto.points, study.baseline])
-    values = predict_draws(surfaces, drawn, study.coded(points), study.file.front.seed)
+    values = predict_draws(surfaces, coefficients, study.coded(points), study.file.front.seed)
     baseline = values[:, -1], pareto.baseline_values
     pick = pareto.goals, pareto.values, pareto.pick, study.file.front.pick
     return front_uncertainty(values[:, :-1], *pick, *baseline)
@@ -335,17 +156,276 @@ def _tolerance_aware(
 
 
 @contextmanager
-def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], after: str) -> Iterator[None]:
-    """Turns a search that finds nothing into a sentence; ``actual`` gives its points in factor units."""
+def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
+    """Raises InputError with a sentence for a search without a feasible point; ``actual`` gives points in factor units."""
     try:
         yield
     except InfeasibleError as error:
         by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
-        broken = [(study.responses[index], sense, limit, by) for (index, sense, limit), by in by_limit if by > 0.0]
-        missed = " and ".join(f"{name} {sense} {limit:g} by {by:.4g}" for name, sense, limit, by in broken)
-        where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
-        none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
-        fix = "loosen a limit or widen the design"
-        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {fix}"]) from None
+        broken_limits = [
+            (study.responses[index], sense, limit, violation)
+            for (index, sense, limit), violation in by_limit
+            if violation > 0.0
+        ]
+        excess = " and ".join(
+            f"{name} {sense} {limit:g} by {violation:.4g}" for name, sense, limit, violation in broken_limits
+        )
+        position = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
+        raise InputError(
+            [
+                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{suffix}; the closest "
+                f"({position}) misses {excess}; loosen a limit or widen the design"
+            ]
+        ) from None
     except MethodError as error:
-        raise InputError([f"{study.path}: front{after}: {error}"]) from None
+        raise InputError([f"{study.path}: front{suffix}: {error}"]) from None
+
+
+def check_goals(study: Study) -> None:
+    """Raises InputError for a study without a front: too few goals, or no tolerances for the tolerance-aware one."""
+    if len(goals_of(study).objectives) < 2:
+        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one"])
+    if study.file.front.tolerance_aware != "none":
+        tolerances_of(study)
+
+
+def rigid_factors(study: Study) -> Mask:
+    """Factors (k,) without a tolerance: whole numbers, and those that mean nothing at the study's categories."""
+    return np.array([factor.whole or place in study.inactive for place, factor in enumerate(study.file.factor)])
+
+
+def known_tolerances(study: Study) -> dict[str, float]:
+    """Half widths of the factors that have any, in their units: their own, or that of the narrowest chain."""
+    half_widths = {}
+    for factor in compress(study.file.factor, ~rigid_factors(study)):
+        closing = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
+        widths = [width for width in closing if width is not None]
+        if factor.tolerance is not None or widths:
+            half_widths[factor.name] = min(widths) if factor.tolerance is None else factor.tolerance
+    return half_widths
+
+
+def tolerance_box(study: Study) -> ToleranceBox | None:
+    """Parts of the tolerance-aware front; None where the study asks for none. Raises as `tolerances_of`."""
+    front = study.file.front
+    if front.tolerance_aware == "none":
+        return None
+    parts = front.quantile, front.distribution, front.tolerance_samples
+    return ToleranceBox(tolerances_of(study), front.tolerance_aware, *parts)
+
+
+def tolerances_of(study: Study) -> Array:
+    """Half widths (k,) of all factors in coded units, 0 for factors without a tolerance.
+
+    Raises InputError for each half width that is missing or too wide.
+    """
+    half_widths = dict.fromkeys(compress(study.factors, rigid_factors(study)), 0.0) | known_tolerances(study)
+    faults = [
+        f"{study.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that manufacture "
+        "keeps, here or as half_width_mm of a chain that closes on this factor"
+        for name in study.factors
+        if name not in half_widths
+    ]
+    faults += [
+        f"{study.path}: factor.tolerance of {name} = {half_widths[name]:g}: leaves no room in the region, which reaches "
+        f"{limit:g} to either side of the centre; narrow it or widen the design"
+        for name, limit in zip(study.factors, region_of(study) * study.step, strict=True)
+        if half_widths.get(name, 0.0) >= limit
+    ]
+    refuse(faults)
+    return np.array([half_widths[name] for name in study.factors]) / study.step
+
+
+SCALES = np.geomspace(1.0, 100.0, 81)  # factors on the standard errors, compared by the likelihood of the misses
+MOST_RUNS = 300  # design runs whose misses count; evenly spread if there are more
+
+
+@dataclass(frozen=True, eq=False)
+class Misses:
+    """Simulated less predicted values of one response at coded points (c, k): ``misses`` (c,).
+
+    ``errors`` and ``forecast_errors`` (c,) are the standard errors of simulation and prediction.
+    """
+
+    points: Array
+    misses: Array
+    errors: Array
+    forecast_errors: Array
+
+    def with_points(self, points: Array, misses: Array, errors: Array, forecast_errors: Array) -> Self:
+        """The same with more points."""
+        more = zip(
+            (self.points, self.misses, self.errors, self.forecast_errors),
+            (points, misses, errors, forecast_errors),
+            strict=True,
+        )
+        return type(self)(*(np.concatenate(pair) for pair in more))
+
+
+class ErrorField:
+    """The error of a prediction as a Gaussian field, conditioned on its misses."""
+
+    def __init__(self, misses: Misses) -> None:
+        prior = correlation(misses.points, misses.points) * np.outer(misses.forecast_errors, misses.forecast_errors)
+        self._misses, self._noise = misses, np.diag(misses.errors**2)
+        self._scale = _scale(prior, self._noise, misses.misses)
+        self._solve = np.linalg.pinv(self._scale**2 * prior + self._noise, hermitian=True)
+
+    def __call__(self, coded: Array, forecast_errors: Array) -> tuple[Array, Array]:
+        """Mean (n,) and standard deviation (n,) of the error at coded points (n, k); ``forecast_errors`` (n,) are those stated."""
+        link = (
+            self._scale**2
+            * correlation(coded, self._misses.points)
+            * np.outer(forecast_errors, self._misses.forecast_errors)
+        )
+        projected = link @ self._solve
+        variance = (self._scale * forecast_errors) ** 2 - (projected * link).sum(axis=1)
+        return projected @ self._misses.misses, np.sqrt(variance.clip(0.0))
+
+
+class SurfaceDoubt:
+    """Errors of the surfaces of limited responses, from the misses at the design runs and at points ``simulated``."""
+
+    def __init__(self, study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
+        self._surfaces, self._probability = surfaces, study.file.confirmation.limit_probability
+        self._fields: dict[int, ErrorField] = {}
+        # The error of one more simulation counts too.
+        self._more: dict[int, float] = {}
+        for index in sorted({index for index, _, _ in goals_of(study).limited}):
+            surface = surfaces[index]
+            all_misses = _at_design(surface)
+            if simulated:
+                coded = study.coded(np.array([point.point for point in simulated]))
+                errors = standard_errors_of(simulated)[:, index]
+                misses = np.array([point.values[index] for point in simulated]) - surface.predict(coded)
+                all_misses = all_misses.with_points(coded, misses, errors, surface.prediction_standard_error(coded))
+                self._more[index] = float(errors.max())
+            self._fields[index] = ErrorField(all_misses)
+
+    def _off(self, index: int, coded: Array) -> tuple[Array, Array]:
+        """Mean (n,) and standard deviation (n,) of a response less its surface."""
+        shift, deviation = self._fields[index](coded, self._surfaces[index].prediction_standard_error(coded))
+        return shift, np.hypot(deviation, self._more.get(index, 0.0))
+
+    def at_share(self, share: float) -> Doubt:
+        """Range in which the responses lie with the study's probability, or a share of it."""
+
+        def doubt(coded: Array) -> tuple[Array, Array]:
+            shift, margin = np.zeros((2, len(coded), len(self._surfaces)))
+            for index in self._fields:
+                quantile = float(special.stdtrit(self._surfaces[index].interval_dof, self._probability))
+                shift[:, index], deviation = self._off(index, coded)
+                margin[:, index] = quantile * deviation
+            # The back-off never loosens a limit: the surface itself keeps it too.
+            return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
+
+        return doubt
+
+    def kept_with(self, index: int, sense: str, bound: float, coded: Array) -> float:
+        """Probability with which a limited response keeps a bound ("<=" or ">=") at a coded point (k,)."""
+        shift, deviation = (float(array[0]) for array in self._off(index, coded[None]))
+        room = bound - float(self._surfaces[index].predict(coded)) - shift
+        room = room if sense == "<=" else -room
+        if deviation == 0.0:
+            return float(room >= 0.0)
+        return float(special.stdtr(self._surfaces[index].interval_dof, room / deviation))
+
+
+def standard_errors_of(simulated: Sequence[Confirmed]) -> Array:
+    """Standard errors (c, m) of simulated points."""
+    return np.array([point.standard_error for point in simulated])
+
+
+def _at_design(surface: Surface) -> Misses:
+    """Misses at the surface's own runs; their errors are those of replicates, of repeated runs, or else the residuals."""
+    data = surface.data
+    rows = np.unique(np.linspace(0, len(data.values) - 1, MOST_RUNS).round().astype(int))
+    if data.standard_errors is not None:
+        errors = data.standard_errors
+    else:
+        pure = surface.pure_error["ms"] if surface.model_error is not None else None
+        variance = surface.residual_mean_square if pure is None else pure
+        errors = np.full(len(data.values), np.sqrt(variance if surface.transform is None else 0.0))
+    points, misses = data.points[rows], data.values[rows] - surface.predict(data.points[rows])
+    return Misses(points, misses, errors[rows], surface.prediction_standard_error(points))
+
+
+def _scale(prior: Array, noise: Array, misses: Array) -> float:
+    """The factor on the stated standard errors that makes the misses most likely; 1 at least."""
+    likelihood = []
+    for scale in SCALES:
+        covariance = scale**2 * prior + noise
+        sign, logarithm = np.linalg.slogdet(covariance)
+        if sign <= 0:
+            return 1.0
+        likelihood.append(-0.5 * (logarithm + misses @ np.linalg.solve(covariance, misses)))
+    return float(SCALES[int(np.argmax(likelihood))]) if likelihood else 1.0
+
+
+DRAWS = 500  # draws of the surfaces of all responses
+# From coded points (n, k) to their responses (d, n, m) on random draws of the surfaces, some draws at a time.
+Draws = Callable[[Array], Iterator[Array]]
+
+
+def draws_of(
+    study: Study, surfaces: Sequence[Surface], confirmed: Mapping[str, Confirmed] | None = None, draws: int = DRAWS
+) -> Draws:
+    """Draws of the surfaces, conditioned on the ``confirmed`` points."""
+    points = list((confirmed or {}).values())
+    simulated = None
+    if points:
+        positions, values, errors = (
+            np.array([getattr(point, name) for point in points]) for name in ("point", "values", "standard_error")
+        )
+        simulated = Simulated(study.coded(positions), values, errors)
+    return partial(drawn_responses, surfaces, draws=draws, seed=study.file.front.seed, simulated=simulated)
+
+
+def keeping(study: Study, draws: Draws, point: Array, free: Rows, least_gains: Array) -> PartCount:
+    """A count of the parts that gain at least ``least_gains`` (q,) over the baseline in every cost and keep all limits.
+
+    Parts (n, f) are values of the ``free`` factors (f,) about a ``point`` (k,).
+    """
+    goals = goals_of(study)
+
+    def counts_of(parts: Array) -> Array:
+        points = np.tile(point, (len(parts) + 1, 1))
+        points[:-1, free] = parts
+        points[-1] = study.baseline
+        counts = []
+        for values in draws(study.coded(points)):
+            costs, part_values = goals.costs(values), values[:, :-1]
+            sound = (costs[:, :-1] <= costs[:, -1:] - least_gains).all(axis=2)
+            counts.append((sound & (goals.violations(part_values, part_values) <= 0.0).all(axis=2)).sum(axis=1))
+        return np.concatenate(counts)
+
+    return counts_of
+
+
+def survival(study: Study, draws: Draws, coded: Array, box: ToleranceBox) -> Interval:
+    """Interval of the share of the parts made at a ``coded`` point (k,) that dominate the nominal baseline."""
+    goals = goals_of(study)
+    parts = coded + box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
+    counts = []
+    for values in draws(np.vstack([parts, study.coded(study.baseline)])):
+        costs = goals.costs(values)
+        counts.append(dominates(costs[:, :-1], costs[:, -1:]).sum(axis=1))
+    return interval_of_share(np.concatenate(counts), len(parts))
+
+
+def open_errors(surfaces: Sequence[Surface], searched: bool = False) -> str:
+    """The errors that the interval of a share of parts holds, and those that it leaves out, in a sentence."""
+    if searched:
+        return (
+            "The interval holds the errors of the search and the count of the parts; numerical errors and the scene's "
+            "inputs count as exact."
+        )
+    if all(surface.model_error for surface in surfaces):
+        return (
+            "The interval holds the errors of the surfaces and the count of the parts; numerical errors and the scene's "
+            "inputs count as exact."
+        )
+    return (
+        "The interval holds the errors of the surfaces and the count of the parts; the form of the surfaces, numerical "
+        "errors and the scene's inputs count as exact."
+    )

@@ -1,7 +1,6 @@
-"""Input sets of a scene with unknown inputs: which inputs vary, the scenes at values of them, their runs; and columns of tables that are keys
-of a scene.
+"""Input sets of a scene with unknown inputs: which inputs vary, the scenes at their values, and the runs of these.
 
-
+Columns of tables that are named by keys of a scene hold values of these keys.
 """
 
 import copy
@@ -20,7 +19,7 @@ from pydantic.fields import FieldInfo
 from scipy.stats import t as student
 
 from doe import clearance
-from doe.clearance import Simulations
+from doe.clearance import Simulations, work_of
 from doe.running.store import Failure, sentence
 from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, read_sheet
 from doe.study_file.table import is_number as is_numeral
@@ -47,24 +46,24 @@ from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
 
-# Of a whole number, as in TOML.
+# Bits of the largest whole number, as in TOML.
 LARGEST_BITS = 63
 
 
 def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
-    """Values (n,) of the scene's key that a column is named by, and a sentence for each cell that has none.
+    """Values (n,) of the scene's key that names a column, and a sentence for each cell without one.
 
-    One of the ``choices`` that the key's law states stays as it is stated; else the key's type in a scene decides what is
-    number, boolean or text.
+    A cell that is one of the law's ``choices`` has that value. Otherwise the key's type in a scene decides between number,
+    boolean and text.
     """
-    adapter, known = _adapter(column.name), dict[str, Any]()
+    adapter, values = _adapter(column.name), dict[str, Any]()
     faults = []
     for row, text in enumerate(column.texts):
-        if text not in known:
-            known[text] = next(_accepted(text, adapter, choices), None)
-        if known[text] is None:
-            faults.append(column.fault(row, _words(column.name, text)))
-    return [known[text] for text in column.texts], faults
+        if text not in values:
+            values[text] = next(_accepted(text, adapter, choices), None)
+        if values[text] is None:
+            faults.append(column.fault(row, _fault(column.name, text)))
+    return [values[text] for text in column.texts], faults
 
 
 def unknown_keys(keys: Iterable[str]) -> list[str]:
@@ -72,31 +71,31 @@ def unknown_keys(keys: Iterable[str]) -> list[str]:
     sentences = list[str]()
     for key in keys:
         table, _, name = key.rpartition(".")
-        known = _fields(key)
-        if name not in known:
-            # To look for the nearest name takes longer than all else; nobody reads beyond the first sentences.
-            near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1) if len(sentences) < MOST_FAULTS else []
+        names = _fields(key)
+        if name not in names:
+            # The search for the nearest name is slow, and only the first sentences are shown.
+            near = difflib.get_close_matches(name[:LONGEST_NAME], names, n=1) if len(sentences) < MOST_FAULTS else []
             fix = f"did you mean {table}.{near[0]}?" if near else "rename or remove it"
             sentences.append(f"column {one_line(key, LONGEST_NAME)}: unknown key; {fix}")
     return sentences
 
 
 def _readings(text: str) -> list[Any]:
-    """What a text may mean, the narrowest type first."""
+    """Values that a text may denote, the narrowest type first."""
     readings: list[Any] = [text.lower() == "true"] if text.lower() in ("true", "false") else []
     if is_numeral(text) and math.isfinite(float(text)):
-        whole = WHOLE.fullmatch(text) and int(text).bit_length() <= LARGEST_BITS
-        readings += [int(text), float(text)] if whole else [float(text)]
+        is_whole = WHOLE.fullmatch(text) and int(text).bit_length() <= LARGEST_BITS
+        readings += [int(text), float(text)] if is_whole else [float(text)]
     return [*readings, text]
 
 
 def _accepted(text: str, adapter: TypeAdapter[Any], choices: Sequence[Any]) -> Iterator[Any]:
-    """Values that a text may stand for, the likeliest first."""
+    """Values of the key that a text may denote, the likeliest first."""
     readings = _readings(text)
-    stated = [choice for choice in choices if any(_alike(choice, reading) for reading in readings)]
-    if len(stated) == 1:
-        yield stated[0]
-    for reading in stated or readings:
+    matches = [choice for choice in choices if any(_alike(choice, reading) for reading in readings)]
+    if len(matches) == 1:
+        yield matches[0]
+    for reading in matches or readings:
         try:
             yield adapter.validate_python(reading, strict=True)
         except ValidationError:
@@ -111,7 +110,8 @@ def _alike(choice: Any, reading: Any) -> bool:
     return (len(kinds) == 1 or kinds == {int, float}) and bool(choice == reading)
 
 
-def _words(key: str, text: str) -> str:
+def _fault(key: str, text: str) -> str:
+    """The fault of a text that is no value of its key, with the fix."""
     if not text:
         return "is empty; fill it in or remove the row"
     if len(text) > LONGEST_NUMBER:
@@ -120,14 +120,14 @@ def _words(key: str, text: str) -> str:
 
 
 def _adapter(key: str) -> TypeAdapter[Any]:
-    """What accepts the values of a dotted key of a scene."""
+    """Validator of the values of a dotted key of a scene."""
     field = _fields(key)[key.rpartition(".")[2]]
     limited: Any = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
     return TypeAdapter(limited)
 
 
 def _fields(key: str) -> dict[str, FieldInfo]:
-    """Fields of the table that a dotted key is in; none where no scene has that table."""
+    """Fields of the table of a dotted key; none if no scene has that table."""
     models: list[type[BaseModel]] = [Scene]
     for part in key.split(".")[:-1]:
         fields = [model.model_fields[part] for model in models if part in model.model_fields]
@@ -139,26 +139,29 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     """Tables that an annotation allows."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for each in get_args(annotation) for model in _models(each)]
+    return [model for argument in get_args(annotation) for model in _models(argument)]
 
 
 # Share of input sets that may be impossible or fail.
 HOLES = 0.05
 SCREENING_SEEDS = 500_000
 NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
-# Quantiles of a law at which its scenes must be possible: no plan of as many input sets as we run goes farther out.
+# Quantiles of a law at which its scenes must be possible: no plan of input sets goes farther out.
 ENDS = np.array([1e-3, 1.0 - 1e-3])
 NOTHING: Mapping[str, str] = MappingProxyType({})
-# Input sets that are tried before anything runs.
-TRIED = 16
+# Input sets that are checked before anything runs.
+CHECKS = 16
 # Seeds of further replicates of the same input sets.
 ROUND_SEEDS = 10_000
 
 
 @dataclass(frozen=True)
 class Sets:
-    """Input sets that were run: their ``places`` in what was asked for, their quantiles (n, d), values of the inputs, outputs (n, m), variances of these (n, m) and
-    the degrees of freedom behind them (n, m); what became of the others."""
+    """Input sets with results, and the failures of the others.
+
+    ``places`` (n,) in the plan, quantiles (n, d) and values of the inputs. Outputs, their variances and the degrees of
+    freedom of these are (n, m). ``impossible``: why a scene could not be built.
+    """
 
     places: Whole
     quantiles: Array
@@ -171,14 +174,14 @@ class Sets:
 
     @property
     def signals(self) -> Array:
-        """Outputs (n, m) as main effects are looked for in them: logarithms of those that are positive throughout."""
+        """Outputs (n, m) on the scale of the main effects: logarithms of those that are positive throughout."""
         positive = (self.outputs > 0.0).all(axis=0)
         return np.where(positive, np.log(np.where(positive, self.outputs, 1.0)), self.outputs)
 
     def joined(self, other: "Sets") -> "Sets":
-        """The sets that both have, with the replicates of both, which are as many in each."""
+        """The common sets with the replicates of both, equally many of each."""
         places = np.intersect1d(self.places, other.places)
-        ours, theirs = (np.flatnonzero(np.isin(each.places, places)) for each in (self, other))
+        ours, theirs = (np.flatnonzero(np.isin(sets.places, places)) for sets in (self, other))
         return Sets(
             places,
             self.quantiles[ours],
@@ -193,8 +196,11 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with its unknown inputs: ``every`` input, ``outputs`` that are looked at, by key what stands in the
-    rows of a posterior ``sample``, what is to be doubted of that, in a sentence, ``remarks`` on keys that do not vary, and the file that declares all this as ``home``."""
+    """A scene file with its unknown inputs, ``every`` one, and the ``outputs`` that are studied.
+
+    ``sample``: columns of a posterior sample by key, with the ``doubt`` about it in a sentence. ``remarks``: sentences on
+    keys that do not vary. ``home``: the file that declares the unknown inputs.
+    """
 
     source: str
     data: dict[str, Any]
@@ -212,49 +218,51 @@ class Case:
         inputs: Sequence[Input],
         values: Sequence[Mapping[str, Any]],
         seed: int,
-        more: Sequence[str] = (),
-        own: Sequence[Sequence[str]] = (),
+        overrides: Sequence[str] = (),
+        set_overrides: Sequence[Sequence[str]] = (),
     ) -> list[Scene | str]:
-        """A scene an input set, or why there is none; ``more`` overrides come last, then the set's ``own``.
+        """A scene for each input set, or the sentence why there is none.
 
-        Numbers that multiply another key's value multiply what the overrides left there.
+        ``overrides`` apply to all sets, then ``set_overrides`` to each. Numbers that multiply another key's value
+        multiply its value after these.
         """
-        by_key = {each.key: each.law for each in self.every}
-        keys = {each.key for each in inputs}
-        # What multiplies an input that varies goes with it, in the ratio that the scene has.
-        tied = {
+        by_key = laws_of(self.every)
+        keys = {unknown_input.key for unknown_input in inputs}
+        # A fixed input that multiplies a varying one keeps its ratio to that.
+        tied_values = {
             key: own_value / value_of(self.ran, law.times)
             for key, law in by_key.items()
             if key not in keys and law.times in keys and is_number(own_value := value_of(self.ran, key))
         }
-        shared = self.tables(more)
+        shared = self.tables(overrides)
         scenes: list[Scene | str] = []
         for number, row in enumerate(values):
             try:
                 tables = copy.deepcopy(shared)
-                for override in own[number] if own else ():
+                for override in set_overrides[number] if set_overrides else ():
                     set_key(tables, override)
                 put(tables, "numerics.seed", seed + number)
-                scenes.append(Scene.from_dict(with_values(tables, self.source, by_key, {**row, **tied}), self.source))
+                varied = with_values(tables, self.source, by_key, {**row, **tied_values})
+                scenes.append(Scene.from_dict(varied, self.source))
             except InputError as error:
                 scenes.append(str(error.faults[0]))
         return scenes
 
-    def tables(self, more: Sequence[str] = ()) -> dict[str, Any]:
-        """Tables of the scene as input sets run it, with ``more`` overrides. Raises InputError."""
+    def tables(self, overrides: Sequence[str] = ()) -> dict[str, Any]:
+        """Tables of the scene of input sets, with these ``overrides``. Raises InputError."""
         tables = copy.deepcopy(self.data)
-        for override in (*self.uncertain.set, *more):
+        for override in (*self.uncertain.set, *overrides):
             set_key(tables, override, f"{self.home}: uncertain.set")
         return tables
 
     @cached_property
     def ran(self) -> Scene:
-        """The scene as input sets run it, before any input has another value. Raises InputError."""
+        """The scene of input sets with all inputs at the scene's values. Raises InputError."""
         return rollers_only(Scene.from_dict(self.tables(), f"{self.home}: uncertain.set"))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader must know of the inputs."""
+        """Sentences on the inputs: the doubt about the sample, and the remarks."""
         return (self.doubt, *self.remarks) if self.doubt else self.remarks
 
     @property
@@ -262,17 +270,22 @@ class Case:
         """Replicates of a run."""
         return self.ran.numerics.replicates
 
-    def unit(self, each: Input) -> float:
-        """What the numbers of an input's law multiply."""
-        return 1.0 if each.law.times is None else float(value_of(self.ran, each.law.times))
+    def unit(self, unknown_input: Input) -> float:
+        """Factor on the numbers of an input's law: the value of the key that it multiplies, or 1."""
+        return 1.0 if unknown_input.law.times is None else float(value_of(self.ran, unknown_input.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
-        """How the inputs depend on each other. Raises InputError where correlations contradict each other."""
-        keys = [each.key for each in inputs]
+        """The joint distribution of the inputs. Raises InputError if correlations contradict each other."""
+        keys = [unknown_input.key for unknown_input in inputs]
         pairs = [pair for pair in self.uncertain.correlation if set(keys).issuperset(pair.keys)]
         columns = tuple(place for place, key in enumerate(keys) if key in self.sample)
         rows = np.column_stack([unknown.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
         return Joint(len(keys), unknown.copula(keys, pairs, self.home), rows, columns)
+
+
+def laws_of(inputs: Sequence[Input]) -> dict[str, Law | Sampled]:
+    """Laws of inputs by key."""
+    return {unknown_input.key: unknown_input.law for unknown_input in inputs}
 
 
 def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
@@ -284,56 +297,56 @@ def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
-    """A scene file with its unknown inputs. Raises InputError, also where all is known."""
+    """A scene file with its unknown inputs. Raises InputError, also if no input is unknown."""
     case = case_of(str(path), tables_of(path, overrides), outputs)
     check_overrides(overrides, case.every)
     return case
 
 
 def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
-    """Raises InputError for overrides of a scene that no run has: of inputs, unless their laws multiply them, and of keys
-    ``fixed`` as something else."""
+    """Raises InputError for overrides that no run has: of inputs, unless their laws multiply them, and of ``fixed`` keys."""
     claims = {
-        each.key: (
-            f"the {each.law.law} law of this unknown input replaces it; take one of them out, or multiply the value "
+        unknown_input.key: (
+            f"the {unknown_input.law.law} law of this unknown input replaces it; take one of them out, or multiply the value "
             "by times"
         )
-        for each in inputs
-        if each.law.times != each.key
+        for unknown_input in inputs
+        if unknown_input.law.times != unknown_input.key
     }
     claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})
-    refuse(f"--set {each}: {reason}" for each in overrides if (reason := claimed.on(key_path(each))))
+    refuse(f"--set {override}: {reason}" for override in overrides if (reason := claimed.on(key_path(override))))
 
 
-def overriding(case: Case, overrides: Sequence[str], runs: str = "") -> list[str]:
-    """Which runs each --set of a numerics key changes: input sets have the keys of uncertain.set, so that only other ``runs``
-    follow the override, none where there are no others."""
+def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list[str]:
+    """Notes on the runs that each --set of a numerics key changes.
+
+    Input sets have the keys of uncertain.set, so that only other ``runs``, if any, have the override.
+    """
     notes = run_notes(case, overrides, "--set ", runs)
-    clashing = {key_path(each) for each in _clashing(case, overrides)}
-    rest = [each for each in overrides if (path := key_path(each))[:1] == ("numerics",) and path not in clashing]
-    return [*notes, *([f"--set {', '.join(rest)} changes every run"] if rest else [])]
+    clashing = {key_path(override) for override in _clashing(case, overrides)}
+    numerics = [override for override in overrides if key_path(override)[:1] == ("numerics",)]
+    others = [override for override in numerics if key_path(override) not in clashing]
+    return [*notes, f"--set {', '.join(others)} changes every run"] if others else notes
 
 
-def run_notes(case: Case, overrides: Sequence[str], by: str, runs: str = "") -> list[str]:
-    """That input sets have values of uncertain.set where overrides ``by`` an option or a key have others, if so."""
-    given = {key_path(each): each for each in case.uncertain.set}
+def run_notes(case: Case, overrides: Sequence[str], source: str, runs: str = "") -> list[str]:
+    """A note on overrides by a ``source``, an option or a key, that uncertain.set replaces in the input sets, if any."""
+    declared = {key_path(override): override for override in case.uncertain.set}
     clashing = _clashing(case, overrides)
-    what = f"changes {runs}, not the input sets" if runs else "changes no run"
-    return (
-        [
-            f"{by}{', '.join(clashing)} {what}: uncertain.set gives {'these' if runs else 'all of them'} "
-            f"{', '.join(given[key_path(each)] for each in clashing)}"
-        ]
-        if clashing
-        else []
-    )
+    if not clashing:
+        return []
+    values = ", ".join(declared[key_path(override)] for override in clashing)
+    if runs:
+        return [f"{source}{', '.join(clashing)} changes {runs}, not the input sets: uncertain.set gives these {values}"]
+    return [f"{source}{', '.join(clashing)} changes no run: uncertain.set gives all of them {values}"]
 
 
 def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
     """Overrides of numerics for which uncertain.set has another value."""
-    given = {path: each for each in case.uncertain.set if (path := key_path(each))[:1] == ("numerics",)}
-    return [each for each in overrides if given.get(key_path(each), each) != each]
+    paths = {key_path(override): override for override in case.uncertain.set}
+    values = {path: override for path, override in paths.items() if path[:1] == ("numerics",)}
+    return [override for override in overrides if values.get(key_path(override), override) != override]
 
 
 def case_of(
@@ -346,8 +359,8 @@ def case_of(
 ) -> Case:
     """Tables of a scene with its unknown inputs.
 
-    ``declared`` counts instead of the scene's own, with paths from the folder of the file that it is ``stated_in``; keys
-    ``fixed`` vary otherwise, each as what it says. Raises InputError, also where all is known.
+    ``declared`` replaces the scene's own declarations; its paths start from the folder of the file that it is
+    ``stated_in``. ``fixed``: by key what else sets it, such as a factor. Raises InputError, also if no input is unknown.
     """
     scene = rollers_only(Scene.from_dict(data, source))
     uncertain = declared or scene.uncertain or Uncertain()
@@ -355,46 +368,43 @@ def case_of(
     sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample, uncertain.laws)
     ordered = ((key, [column[place] for place in np.argsort(unknown.ranks(column))]) for key, column in sample.items())
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
-    # A run depends on no declaration; to check them all again at every input set would take long.
+    # Runs do not depend on declarations, and checking these again at every input set would be slow.
     plain = {table: keys for table, keys in data.items() if table != "uncertain"}
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
-    every = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
-    if not every:
-        raise InputError(
-            [
-                f'{home}: uncertain: nothing is unknown; name keys as "table.key" = {{law = ...}} or leave out '
-                "defaults = 'none'"
-            ]
-        )
-    keys = {each.key for each in every}
-    by_set = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, columns) if each.key not in keys]
-    idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
+    inputs = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
+    if not inputs:
+        fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
+        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
+    keys = {unknown_input.key for unknown_input in inputs}
+    inputs_without_set = inputs_of(case.ran, plain, uncertain, fixed, columns)
+    by_set = [unknown_input.key for unknown_input in inputs_without_set if unknown_input.key not in keys]
+    idle_keys = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
     doubt = "" if uncertain.sample is None else _doubt(home.parent / uncertain.sample)
-    case = replace(case, every=every, doubt=doubt, remarks=tuple(_remarks(by_set, idle)))
-    case.joint(every)
+    case = replace(case, every=inputs, doubt=doubt, remarks=tuple(_remarks(by_set, idle_keys)))
+    case.joint(inputs)
     refuse(impossible(case))
     return case
 
 
 def _set_faults(uncertain: Uncertain, fixed: Mapping[str, str], sample: Iterable[str]) -> list[str]:
-    """What ``set`` replaces in vain, because each run or each row of the sample has a value of its own."""
+    """Faults of overrides in ``set`` without effect: each run or each row of the sample has its own value."""
     claims = {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claims |= dict.fromkeys(sample, "is a column of the sample; keep one of them")
     paths = {tuple(key.split(".")): reason for key, reason in claims.items()}
     return assignment_faults("uncertain.set", uncertain.set, paths)
 
 
-def _remarks(by_set: Sequence[str], idle: Sequence[str]) -> Iterator[str]:
-    """Which keys would vary if ``set`` gave them no value, and which are called estimates but mean nothing in the scene."""
+def _remarks(by_set: Sequence[str], idle_keys: Sequence[str]) -> Iterator[str]:
+    """Remarks on keys that do not vary: those that ``set`` fixes, and estimates without effect in the scene."""
     if by_set:
         yield f"known by uncertain.set, so without their documented range: {', '.join(by_set)}"
-    if idle:
-        yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle)}"
+    if idle_keys:
+        yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle_keys)}"
 
 
 def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]:
-    """Columns of a posterior sample by key; of a choice, what its ``declared`` law or else the key in a scene has there.
+    """Columns of a posterior sample by key, with the values of ``declared`` laws or else of the keys in a scene.
 
     Raises InputError for cells that are no values of their key, and for fewer than two rows.
     """
@@ -413,49 +423,52 @@ def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]
 
 
 def _doubt(sample: Path) -> str:
-    """What the record next to a posterior sample says of its calibration, unless that succeeded; empty without a record."""
+    """The verdict on the calibration that made a posterior sample, unless that succeeded; empty without a record."""
     try:
         record = read_json(sample.with_suffix(".json"))
-        verdict, same = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())
+        verdict, unchanged = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())
         reason = next(iter(record["reasons"]), "")
     except (OSError, ValueError, KeyError, TypeError):
         return ""
     doubt = one_line(f"{sample.name} is of a rig that ended {verdict}: {reason}")
-    return doubt if same and verdict != "calibrated" else ""
+    return doubt if unchanged and verdict != "calibrated" else ""
 
 
 def impossible(case: Case) -> Iterator[str]:
-    """What is wrong with the scene at an end of each declared law and at each choice, one by one, and at rows of a sample with
-    an end of a column; where nothing is, with input sets of all of them."""
+    """Faults of the scene at the ends of each declared law, at each choice, and at the extreme rows of a sample.
+
+    If there are none, input sets of all inputs are checked too.
+    """
     faults = [*_impossible_rows(case), *_impossible_values(case)]
     yield from faults
     if faults:
         return
-    sets = case.joint(case.every).sets(TRIED, case.uncertain.seed)
-    scenes = case.scenes(case.every, unknown.table_of({each.key: each.law for each in case.every}, sets), 0)
-    why = [each for each in scenes if isinstance(each, str)]
-    if 2 * len(why) > TRIED:
-        yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, why[0])}; change their laws"
+    sets = case.joint(case.every).sets(CHECKS, case.uncertain.seed)
+    scenes = case.scenes(case.every, unknown.table_of(laws_of(case.every), sets), 0)
+    sentences = [scene for scene in scenes if isinstance(scene, str)]
+    if 2 * len(sentences) > CHECKS:
+        yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, sentences[0])}; change their laws"
 
 
 def _impossible_rows(case: Case) -> Iterator[str]:
-    sampled = [each for each in case.every if each.key in case.sample]
-    ends = {row for each in sampled for row in np.argsort(unknown.ranks(case.sample[each.key]))[[0, -1]].tolist()}
+    sampled = [unknown_input for unknown_input in case.every if unknown_input.key in case.sample]
+    columns = {unknown_input.key: case.sample[unknown_input.key] for unknown_input in sampled}
+    ends = {row for column in columns.values() for row in np.argsort(unknown.ranks(column))[[0, -1]].tolist()}
     for row in sorted(ends):
-        (scene,) = case.scenes(sampled, [{each.key: case.sample[each.key][row] for each in sampled}], 0)
+        (scene,) = case.scenes(sampled, [{key: column[row] for key, column in columns.items()}], 0)
         if isinstance(scene, str):
             yield f"{case.home}: uncertain.sample, row {row + 2}: {_bare(case, scene)}; take the row out"
 
 
 def _impossible_values(case: Case) -> Iterator[str]:
-    for each in case.every:
-        if each.key in case.sample or each.reason != "declared":
+    for unknown_input in case.every:
+        if unknown_input.key in case.sample or unknown_input.reason != "declared":
             continue
-        choices = each.law.values if each.law.law == "choices" else None
-        for value in choices or dict.fromkeys(unknown.values_of(each.law, ENDS)):
-            (scene,) = case.scenes([each], [{each.key: value}], 0)
+        choices = unknown_input.law.values if unknown_input.law.law == "choices" else None
+        for value in choices or dict.fromkeys(unknown.values_of(unknown_input.law, ENDS)):
+            (scene,) = case.scenes([unknown_input], [{unknown_input.key: value}], 0)
             if isinstance(scene, str):
-                yield f'{case.home}: uncertain."{each.key}" at {shown(value)}: {_bare(case, scene)}; change its law'
+                yield f'{case.home}: uncertain."{unknown_input.key}" at {shown(value)}: {_bare(case, scene)}; change its law'
                 break
 
 
@@ -464,22 +477,26 @@ def _bare(case: Case, fault: str) -> str:
     return fault.removeprefix(f"{case.source}: ")
 
 
-def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
-    """The inputs that a calibration looks for, of too many those that matter; and the largest share of each of the others.
+def screen_inputs(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
+    """The target inputs of a calibration, and by key of the others the largest share of an output's variance.
 
-    What a sample or the scene declares stays. Raises RunError, InputError, KeyboardInterrupt.
+    Of too many inputs the most effective ones remain, and those that a sample or the scene declares. Raises RunError,
+    InputError, KeyboardInterrupt.
     """
-    every, tried = case.every, [each for each in case.every if each.key not in case.sample]
-    if len(every) <= case.uncertain.inputs or not tried:
-        return every, {}
-    quantiles = unknown.screening_design(len(tried))
+    inputs = case.every
+    candidates = [unknown_input for unknown_input in inputs if unknown_input.key not in case.sample]
+    if len(inputs) <= case.uncertain.inputs or not candidates:
+        return inputs, {}
+    quantiles = unknown.screening_design(len(candidates))
     with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
-    sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
+    sets = run(case, candidates, with_middle, simulations, SCREENING_SEEDS, title="screening")
     share = unknown.effect_shares(sets.quantiles[:, :-1], sets.signals)
-    declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
-    stay = unknown.retained(share, declared, case.uncertain.inputs - len(every) + len(tried))
-    left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
-    return [each for each in every if each.key not in left], left
+    declared = [place for place, unknown_input in enumerate(candidates) if unknown_input.key in case.uncertain.laws]
+    places = unknown.retained(share, declared, case.uncertain.inputs - len(inputs) + len(candidates))
+    shares_of_fixed = {
+        candidates[place].key: float(share[place].max()) for place in range(len(candidates)) if place not in places
+    }
+    return [unknown_input for unknown_input in inputs if unknown_input.key not in shares_of_fixed], shares_of_fixed
 
 
 def run(
@@ -488,79 +505,96 @@ def run(
     quantiles: Array,
     simulations: Simulations,
     seeds: int = 0,
-    more: Sequence[str] = (),
+    overrides: Sequence[str] = (),
     title: str = "input sets",
-    own: Sequence[Sequence[str]] = (),
+    set_overrides: Sequence[Sequence[str]] = (),
 ) -> Sets:
-    """Run input sets, with overrides ``more`` for all and its ``own`` for each. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
-    values = unknown.table_of({each.key: each.law for each in inputs}, quantiles)
-    scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more, own)
-    lost = [scene for scene in scenes if isinstance(scene, str)]
-    check_holes(len(lost), len(scenes), (), lost)
-    ran = outcomes(scenes, [f"{title} {place + 1}" for place in range(len(scenes))], simulations, title)
-    good = [(place, result) for place, result in enumerate(ran) if not isinstance(result, Failure | str)]
-    failures = tuple(result for result in ran if isinstance(result, Failure))
-    impossible = tuple(result for result in ran if isinstance(result, str))
-    check_holes(len(ran) - len(good), len(ran), failures, impossible)
-    outputs, variances, freedom = scattered(case.outputs, [result for _, result in good])
-    places = np.array([place for place, _ in good], dtype=np.int64)
+    """Run input sets, with ``overrides`` for all and ``set_overrides`` for each.
+
+    Raises RunError if too many are impossible or fail, InputError, KeyboardInterrupt.
+    """
+    values = unknown.table_of(laws_of(inputs), quantiles)
+    seed = case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds
+    scenes = case.scenes(inputs, values, seed, overrides, set_overrides)
+    faults = [scene for scene in scenes if isinstance(scene, str)]
+    check_holes(len(faults), len(scenes), (), faults)
+    results = outcomes(scenes, [f"{title} {place + 1}" for place in range(len(scenes))], simulations, title)
+    successes = [(place, result) for place, result in enumerate(results) if not isinstance(result, Failure | str)]
+    failures = tuple(result for result in results if isinstance(result, Failure))
+    impossible = tuple(result for result in results if isinstance(result, str))
+    check_holes(len(results) - len(successes), len(results), failures, impossible)
+    outputs, variances, freedom = outputs_with_scatter(case.outputs, [result for _, result in successes])
+    places = np.array([place for place, _ in successes], dtype=np.int64)
     inputs_there = [values[place] for place in places]
     return Sets(places, quantiles[places], inputs_there, outputs, variances, freedom, failures, impossible)
 
 
-def replicated(case: Case, quantiles: Array, simulations: Simulations, effort: int) -> Sets:
-    """Input sets (n, d + 1) of every input with ``effort`` times the replicates of one run, a power of two, those of half as
-    many among them. Raises as ``run``."""
+def replicated_sets(case: Case, quantiles: Array, simulations: Simulations, effort: int) -> Sets:
+    """Input sets at quantiles (n, d + 1) of every input with ``effort`` times the replicates, a power of two.
+
+    The runs with half as many replicates are among them. Raises as ``run``.
+    """
     sets = run(case, case.every, quantiles, simulations)
-    for again in range(effort.bit_length() - 1):
-        more = [f"numerics.replicates={case.replicates << again}"]
-        sets = sets.joined(run(case, case.every, quantiles, simulations, (again + 1) * ROUND_SEEDS, more))
+    for doubling in range(effort.bit_length() - 1):
+        overrides = [f"numerics.replicates={case.replicates << doubling}"]
+        sets = sets.joined(run(case, case.every, quantiles, simulations, (doubling + 1) * ROUND_SEEDS, overrides))
     return sets
 
 
-def strongest(case: Case, quantiles: Array, signals: Array) -> tuple[list[int], dict[str, float]]:
-    """Places of the inputs that emulators of signals (n, m) at quantiles (n, d + 1) of every input cover: what a sample or the
-    scene declares, and of the rest what matters most, as many as the scene allows. By key of the others, which vary all the
-    same, the largest share of a signal's variance that their main effect makes."""
-    always = declared(case)
-    places = unknown.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
-    return places, outside(case, places, quantiles, signals)
+def strongest_inputs(case: Case, quantiles: Array, signals: Array) -> tuple[list[int], dict[str, float]]:
+    """Places of the inputs of emulators of signals (n, m) at quantiles (n, d + 1) of every input.
+
+    They are the inputs that a sample or the scene declares and the most effective others, as many as the scene allows. By
+    key of the rest, which vary too: the largest share of a signal's variance by its main effect.
+    """
+    required = declared(case)
+    places = unknown.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, required)
+    return places, shares_outside(case, places, quantiles, signals)
 
 
 def declared(case: Case) -> list[int]:
     """Places of the inputs that a sample or the scene declares."""
     keys = {*case.uncertain.laws, *case.sample}
-    return [place for place, each in enumerate(case.every) if each.key in keys]
+    return [place for place, unknown_input in enumerate(case.every) if unknown_input.key in keys]
 
 
-def outside(case: Case, places: Collection[int], quantiles: Array, signals: Array) -> dict[str, float]:
-    """By key of the inputs at no ``places``: the largest share of a signal's variance that their main effect makes."""
+def shares_outside(case: Case, places: Collection[int], quantiles: Array, signals: Array) -> dict[str, float]:
+    """By key of the inputs outside ``places``: the largest share of a signal's variance by the main effect."""
     share = unknown.main_effects(quantiles[:, :-1], signals).max(axis=1)
-    return {each.key: float(share[place]) for place, each in enumerate(case.every) if place not in places}
+    return {
+        unknown_input.key: float(share[place]) for place, unknown_input in enumerate(case.every) if place not in places
+    }
 
 
 def outcomes(
     scenes: Sequence[Scene | str], labels: Sequence[str], simulations: Simulations, title: str
 ) -> list[SimulationResult | Failure | str]:
-    """Of each scene its result or failure, of what is no scene why. Raises KeyboardInterrupt."""
+    """Results or failures of scenes; a sentence in place of a scene is handed through. Raises KeyboardInterrupt."""
     possible = [(scene, label) for scene, label in zip(scenes, labels, strict=True) if isinstance(scene, Scene)]
-    asked, named = [scene for scene, _ in possible], [label for _, label in possible]
-    ran = iter(simulations.run(asked, named, simulations.progress(title)))
-    return [next(ran) if isinstance(scene, Scene) else scene for scene in scenes]
+    possible_scenes, possible_labels = [scene for scene, _ in possible], [label for _, label in possible]
+    results = iter(simulations.run(possible_scenes, possible_labels, simulations.progress(title)))
+    return [next(results) if isinstance(scene, Scene) else scene for scene in scenes]
 
 
-def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: Sequence[str], where: str = "") -> None:
-    """Raises RunError where too many input sets are lost."""
-    if lost > HOLES * sets:
-        why = sentence(failures) if failures else impossible[0]
+def check_holes(
+    count: int, sets: int, failures: Sequence[Failure], impossible: Sequence[str], condition: str = ""
+) -> None:
+    """Raises RunError if too many input sets have no result."""
+    if count > HOLES * sets:
+        cause = sentence(failures) if failures else impossible[0]
         raise RunError(
-            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the "
+            f"{count} of {sets} input sets gave no result{condition}, more than {100.0 * HOLES:g} %: {cause}; narrow the "
             "laws of the inputs"
         )
 
 
-def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-    """Outputs (n, m) of results, their variances by what replicates scatter, and the degrees of freedom behind these."""
+def outputs_with_scatter(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+    """Outputs (n, m) of results, their variances by the scatter of replicates, and the degrees of freedom of these."""
     outputs, errors, samples = clearance.figures(names, results)
     freedom = np.maximum(samples - 1, 1)
     return outputs, (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2, freedom
+
+
+def work_of_set(case: Case) -> float:
+    """Shaft turns that the run of an input set takes at least."""
+    return work_of(Scene.from_dict(case.data, case.source, case.uncertain.set))

@@ -1,9 +1,7 @@
-"""Measurements on a rig: a CSV table, a row an operating condition; raw signals as what the simulation states, with errors by batch means.
+"""Measurements on a rig: a CSV table with a row for each operating condition, and raw signals with errors by batch means.
 
-
-
-A mean over time needs no filter on either side. Pulses are taken a whole cage turn at a time, which takes out how unevenly
-their marks are spaced. Whirl needs a velocity: an orbit is filtered as the simulated one is (``filtered_whirl``).
+A mean over time needs no filter. Pulses are counted by whole cage turns, so that uneven spacing of their marks cancels.
+Whirl needs a velocity: an orbit is filtered like the simulated one (``filtered_whirl``).
 """
 
 import math
@@ -20,28 +18,28 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.words import counted
 
-# What a signal holds: its columns, of which some may have another unit.
+# Columns of each kind of signal; some may have one of two units.
 KINDS = {
     "cage_pulses": ("t_s",),
     "cage_speed": ("t_s", "cage_speed_rpm"),
     "orbit": ("t_s", "x_um or x_m", "y_um or y_m"),
 }
-# Any unit in use; finer steps of time are round-off, and their inverse overflows.
+# Values in any unit in use; finer steps of time are round-off, and their inverse overflows.
 SAMPLED, FINEST = Limits(1e12), 1e-12
-# A turn that takes longer than so many usual ones has lost a pulse.
+# A turn that takes longer than this many median turns has lost a pulse.
 LOST = 1.5
-# A mean by fewer turns or samples has no error worth stating.
+# Turns or samples that the error of a mean needs.
 FEWEST_SAMPLES = 20
-# Batches of an orbit: as many as this, of so many periods of the cutoff at least; periods of a record of noise.
+# Batches of an orbit at most, periods of the cutoff in each at least, and periods of a record of noise at least.
 MOST_PARTS, PERIODS, STILL_PERIODS = 400, 10, 20
 # Intervals of an even signal are alike within this share.
 EVEN = 0.1
-# Noise may have this share of the mean square of a speed: its part in the mean is known to first order.
+# Largest share of noise in the mean square of a speed: its effect on the mean is known to first order.
 LOUDEST = 0.25
 
 
 class Mean(NamedTuple):
-    """A mean over a signal, its standard deviation, and what is to be said of gaps or noise, if anything."""
+    """A mean over a signal, its standard deviation, and a note on gaps or noise, if any."""
 
     value: float
     sd: float
@@ -52,7 +50,7 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
     """Mean cage speed [rpm]. Raises InputError."""
     from rbdyn.dynamics.statistics.batch_means import estimate
 
-    time, *rest = _columns(path, KINDS[kind])
+    time, *speeds = _columns(path, KINDS[kind])
     if not (np.diff(time) >= FINEST).all():
         row = int(np.argmin(np.diff(time) >= FINEST)) + 2
         raise InputError(
@@ -60,14 +58,15 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
         )
     note = None
     if kind == "cage_pulses":
-        took = np.diff(time[::pulses_per_turn])
-        whole = took <= LOST * np.median(took) if took.size else np.zeros(0, bool)
-        lost = f"{(~whole).sum()} of {counted(took.size, 'turn')} lack pulses and are left out"
-        note = None if whole.all() else f"{path}: {lost}"
-        moments = np.column_stack([np.full(whole.sum(), 60.0), took[whole]])
+        turn_times = np.diff(time[::pulses_per_turn])
+        complete = turn_times <= LOST * np.median(turn_times) if turn_times.size else np.zeros(0, bool)
+        if not complete.all():
+            turns = counted(turn_times.size, "turn")
+            note = f"{path}: {(~complete).sum()} of {turns} lack pulses and are left out"
+        moments = np.column_stack([np.full(complete.sum(), 60.0), turn_times[complete]])
     else:
         # Each sample counts for the time to the next one.
-        moments = np.column_stack([rest[0][:-1] * np.diff(time), np.diff(time)])
+        moments = np.column_stack([speeds[0][:-1] * np.diff(time), np.diff(time)])
     if len(moments) < FEWEST_SAMPLES:
         turns = counted(len(moments), "turn")
         raise InputError([f"{path}: {turns} or samples are too few for an error; measure at least {FEWEST_SAMPLES}"])
@@ -77,22 +76,23 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
     return Mean(mean.value, mean.half_width / 1.96, note)
 
 
-def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | None) -> Mean:
+def whirl(path: Path, cutoff: float, notches: Sequence[float], rest_record: Path | None) -> Mean:
     """Whirl deviation ratio below ``cutoff`` without ``notches`` [Hz].
 
-    ``still``: a record of the rig at rest. Noise of variance s^2 in each component adds 2 s^2 to the mean square of the
+    ``rest_record``: a record of the rig at rest. Noise of variance s^2 in each component adds 2 s^2 to the mean square of the
     speed v and, to first order, s^2/(2 v) to v. Raises InputError.
     """
     from rbdyn.dynamics.statistics.batch_means import estimate
-    from rbdyn.dynamics.statistics.filtered_whirl import NOTCH_PERIODS, sums_until
-    from rbdyn.dynamics.statistics.metrics import WHIRL_DEVIATION_RATIO
+    from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, WHIRL_DEVIATION_RATIO, sums_until
 
     speed, periods = _filtered(path, cutoff, notches, FEWEST_SAMPLES * PERIODS)
-    quiet = np.zeros(1) if still is None else _filtered(still, cutoff, notches, STILL_PERIODS)[0]
+    quiet = np.zeros(1) if rest_record is None else _filtered(rest_record, cutoff, notches, STILL_PERIODS)[0]
     noise = float((quiet**2).mean()) / 2.0
     if 2.0 * noise > LOUDEST * float((speed**2).mean()):
         raise InputError(
-            [f"{still}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"]
+            [
+                f"{rest_record}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"
+            ]
         )
     nearly = np.maximum(speed, np.sqrt(noise))
     mean = speed - noise / (2.0 * nearly) if noise else speed
@@ -102,16 +102,16 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | Non
     ratio = estimate([sums_until(moments, ends)], WHIRL_DEVIATION_RATIO.of_sums)
     if not ratio.value > 0.0 or not ratio.half_width:
         raise InputError([f"{path}: a speed of the cage's centre that varies no more than noise; check the signal"])
-    noisy = [f"without a still_file noise below {cutoff:g} Hz counts as whirl"] if still is None else []
-    slow = [f"{each:g} Hz" for each in notches if each * periods / cutoff < NOTCH_PERIODS]
+    noisy = [f"without a still_file noise below {cutoff:g} Hz counts as whirl"] if rest_record is None else []
+    slow = [f"{frequency:g} Hz" for frequency in notches if frequency * periods / cutoff < NOTCH_PERIODS]
     short = [f"runout at {' and '.join(slow)} counts as whirl, of which it has fewer than {NOTCH_PERIODS:g} periods"]
     note = "; ".join([*noisy, *(short if slow else [])])
     return Mean(ratio.value, ratio.half_width / 1.96, f"{path}: {note}" if note else None)
 
 
-def _filtered(path: Path, cutoff: float, notches: Sequence[float], fewest: int) -> tuple[Array, float]:
-    """Filtered speed [m/s] of an orbit, and how many periods of the cutoff it has, which are ``fewest`` at least."""
-    from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed
+def _filtered(path: Path, cutoff: float, notches: Sequence[float], least_periods: int) -> tuple[Array, float]:
+    """Filtered speed [m/s] of an orbit, and its number of periods of the cutoff, ``least_periods`` at least."""
+    from rbdyn.dynamics.statistics.metrics import filtered_speed
     from rbdyn.scene.laws import SAMPLES_A_PERIOD
 
     time, *place = _columns(path, KINDS["orbit"])
@@ -127,9 +127,9 @@ def _filtered(path: Path, cutoff: float, notches: Sequence[float], fewest: int) 
             ]
         )
     periods = len(time) * cutoff / rate
-    if periods < fewest:
+    if periods < least_periods:
         raise InputError(
-            [f"{path}: shorter than {fewest} periods of cutoff_hz = {cutoff:g}; measure longer or raise it"]
+            [f"{path}: shorter than {least_periods} periods of cutoff_hz = {cutoff:g}; measure longer or raise it"]
         )
     return filtered_speed(np.stack(place), rate, cutoff, notches), periods
 
@@ -138,49 +138,52 @@ def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
     """Numbers in SI of the columns, each of which may have one of several units. Raises InputError."""
     sheet, numbers, faults = read_sheet(path), list[Array](), list[str]()
     for name in names:
-        units = [one for one in name.split(" or ") if one in sheet]
+        units = [unit for unit in name.split(" or ") if unit in sheet]
         if len(units) == 1:
             values, slips = sheet.column(units[0]).numbers(SAMPLED)
             numbers.append(values * (1e-6 if units[0].endswith("_um") else 1.0))
             faults += slips
         else:
-            fix = "are both there; keep one" if units else "is missing; add it"
-            faults.append(f"{path}: column {' and '.join(units) or name} {fix}")
+            repetition = f"{path}: columns {' and '.join(units)} are both there; keep one"
+            faults.append(repetition if units else f"{path}: column {name} is missing; add it")
     refuse(faults)
     return numbers
 
 
-# What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
+# Outputs of a simulation that can be measured; the others are not positive throughout.
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 SD, TURNS, HOLD = "_sd", "turns", "hold"
 FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
 ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviation_ratio"
-# Keys of what turns once a shaft turn, and of the filter that the simulated whirl gets.
+# Keys of the speeds whose runout is filtered out, and of the filter of the simulated whirl.
 SHAFTS = "operation.inner_speed_rpm", "operation.outer_speed_rpm"
 FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
-# Any unit in use; pulses of the finest encoders.
+# Measured values in any unit in use; pulses per turn of the finest encoders.
 MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
-# Training rows; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
+# Fewest training rows; most rows, whose joint covariance is quickly solved; most conditions, each with its own seeds.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row: its number in the file, values of scene keys, measured values by output with their standard deviations (None
-    where the scatter of ``turns`` shaft turns is to be taken), and whether it is ``held`` out to try what was learned."""
+    """A row: its number in the file, values of scene keys, and measured values by output.
+
+    ``sds``: standard deviations by output; None stands for the scatter of ``turns`` shaft turns. ``hold``: whether the row
+    is left out of the calibration to test it.
+    """
 
     number: int
     keys: dict[str, Any]
     values: dict[str, float]
     sds: dict[str, float | None]
     turns: float | None
-    held: bool
+    hold: bool
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig's table: its rows, the scene keys that are its columns, the outputs that were measured, what signals lack."""
+    """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on its signals."""
 
     path: Path
     rows: list[Row]
@@ -190,14 +193,14 @@ class Rig:
 
     @property
     def conditions(self) -> list[dict[str, Any]]:
-        """Different conditions, in their order."""
-        return [dict(each) for each in dict.fromkeys(tuple(row.keys.items()) for row in self.rows)]
+        """The distinct conditions, in the order of their first rows."""
+        return [dict(condition) for condition in dict.fromkeys(tuple(row.keys.items()) for row in self.rows)]
 
 
 def read_rig(path: Path) -> Rig:
     """Read a rig's table with the signals that it names. Raises InputError with all faults of the table, or of the signals."""
     sheet = read_sheet(path)
-    keys, outputs = _named(sheet)
+    keys, outputs = _keys_and_outputs(sheet)
     if len(sheet.rows) > MOST_ROWS:
         raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
     cells, faults = _cells(sheet, keys)
@@ -241,7 +244,7 @@ class _Cells:
         return None if math.isnan(value) else value
 
     def states(self, name: str, place: int) -> bool:
-        """Whether there is anything in a row."""
+        """Whether a row has a value."""
         return self.text(name, place).lower() not in (UNKNOWN if name in self.numbers else ("",))
 
     def fault(self, name: str, place: int, words: str) -> str:
@@ -251,17 +254,17 @@ class _Cells:
         return f"{self.path}: {name} in row {place + 1}: {words}"
 
 
-def _named(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Scene keys and outputs that are columns, or come from signals. Raises InputError for any other column."""
+def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Scene keys and outputs among the columns, or of signals. Raises InputError for any other column."""
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]
     keys = tuple(name for name in names if "." in name)
     kinds = sheet.column(KIND).texts if KIND in sheet else ()
     signals = [WHIRL if kind == ORBIT else SPEED for kind in kinds if kind in KINDS]
     outputs = tuple(dict.fromkeys([*(name for name in names if name in OUTPUTS), *signals]))
-    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
+    columns = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
-    faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in known]
+    faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in columns]
     if not outputs:
         faults.append(f"{sheet.path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:
@@ -286,7 +289,7 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
 
 
 def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
-    """The columns of the table, and a sentence for each cell that is no value of its column."""
+    """The columns of the table, and a sentence for each cell without a value of its column."""
     columns = {name: sheet.column(name) for name in sheet.places}
     numbers, values, faults = dict[str, Array](), dict[str, list[Any]](), list[str]()
     for name, column in columns.items():
@@ -301,7 +304,7 @@ def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
 
 
 def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
-    """What is missing in a row, is there twice, or serves nothing."""
+    """Sentences on cells of a row that are missing, twice there, or without use."""
     kind = cells.text(KIND, place) if cells.states(FILE, place) else ""
     signal = WHIRL if kind == ORBIT else SPEED if kind in KINDS else None
     if cells.states(FILE, place) and signal is None:
@@ -312,7 +315,9 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
     used |= {KIND: cells.states(FILE, place)} | {name + SD: name in measured for name in outputs}
     for name, serves in used.items():
         if cells.states(name, place) and not serves:
-            yield cells.fault(name, place, "belongs to nothing in this row; leave it out, or add what it belongs to")
+            yield cells.fault(
+                name, place, "has no use in this row; leave it out, or add the measurement that it belongs to"
+            )
     for name in measured:
         if not (cells.states(name + SD, place) or cells.states(TURNS, place)):
             yield cells.fault(
@@ -339,19 +344,19 @@ def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | 
         if kind == ORBIT:
             assert cutoff is not None
             notches = _runout(keys, values.get(SPEED))
-            still = cells.path.parent / cells.text(STILL, place) if cells.states(STILL, place) else None
-            mean = whirl(signal, cutoff, notches, still)
+            rest_record = cells.path.parent / cells.text(STILL, place) if cells.states(STILL, place) else None
+            mean = whirl(signal, cutoff, notches, rest_record)
         else:
             mean = cage_speed(signal, kind, int(cells.number(PULSES, place) or 1))
         name = WHIRL if kind == ORBIT else SPEED
         values[name], sds[name], note = mean
     if cutoff is not None:
-        # The simulated whirl is filtered alike.
+        # The simulated whirl has the same filter.
         keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
     return Row(place + 1, keys, values, sds, turns, cells.text(HOLD, place).lower() in YES), note
 
 
 def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
-    """Frequencies [Hz] of the row's shaft and cage, as far as it shows them."""
+    """Frequencies [Hz] of the row's shafts and cage, as far as the row states them."""
     speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
     return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)

@@ -1,8 +1,7 @@
-"""Whether the pick beats the baseline while inputs are unknown, and which input decides it; gains of designs at the same input sets, and
-the front of these gains.
+"""The robust judgement: whether the pick beats the baseline over the unknown inputs, and which input decides it.
 
-Both designs are simulated at the same input sets. Sets of which a gain is in doubt get more replicates, those nearest to
-nothing first, until the share of further runs that the study allows is spent.
+Both designs are simulated at the same input sets. Sets with a doubtful gain get more replicates, the smallest gains first,
+until the further runs that the study allows are spent. The robust front holds points by their gains over the inputs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,16 +15,27 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.emulator import pooled_variances
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
+from doe.running.runner import Stage
 from doe.running.store import Failure
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
-from doe.unknown.decision import Better, better, in_doubt, odds, shrunk
+from doe.unknown.decision import Better, Decides, InputWorth, Interval, Verdict, better, decides, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
 from doe.unknown.propagation import Emulated, Runs, Share, emulated
-from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
-from doe.workflow.goals import goals_of, region_of, rounded_within
-from doe.workflow.input_sets import ROUND_SEEDS, Case, Sets, case_of, declared, run, run_notes, strongest
+from doe.workflow.input_sets import (
+    ROUND_SEEDS,
+    Case,
+    Sets,
+    case_of,
+    declared,
+    run,
+    run_notes,
+    strongest_inputs,
+    work_of_set,
+)
+from doe.workflow.runs import region_of, rounded_within
+from doe.workflow.surfaces import goals_of
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import set_key
 from rbdyn.scene.unknown import Input, is_number
@@ -33,8 +43,11 @@ from rbdyn.scene.unknown import Input, is_number
 
 @dataclass(frozen=True)
 class Pairs:
-    """p designs at the same input sets: ``places`` of these in what was asked for, their quantiles (n, d), outputs, variances
-    and degrees of freedom (p, n, m); ``effort`` (n,): how many times the replicates of the first runs."""
+    """p designs at the same n input sets.
+
+    ``places`` (n,) of the sets in the plan, their quantiles (n, d), outputs, variances and degrees of freedom (p, n, m).
+    ``effort`` (n,): replicates over those of the first runs.
+    """
 
     places: Whole
     quantiles: Array
@@ -43,13 +56,13 @@ class Pairs:
     freedom: Whole
     effort: Whole
 
-    def at(self, rows: Whole) -> "Pairs":
-        """The same at some rows, each as often as it is named."""
+    def rows(self, rows: Whole) -> "Pairs":
+        """The same at these rows; a row may come more than once."""
         outputs, variances, freedom = self.outputs[:, rows], self.variances[:, rows], self.freedom[:, rows]
         return Pairs(self.places[rows], self.quantiles[rows], outputs, variances, freedom, self.effort[rows])
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
-        """The same, at some rows joined with as many replicates more."""
+        """The same with as many replicates more at these rows."""
         outputs, variances, freedom = self.outputs.copy(), self.variances.copy(), self.freedom.copy()
         outputs[:, rows] = 0.5 * (outputs[:, rows] + other.outputs)
         variances[:, rows] = 0.25 * (variances[:, rows] + other.variances)
@@ -59,19 +72,23 @@ class Pairs:
         return replace(self, outputs=outputs, variances=variances, freedom=freedom, effort=effort)
 
     def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array]:
-        """Relative gains (n, q) of a design over the first, and their variances, smoothed over the inputs: of a row's own few
-        replicates they are guesses, whose mean a few large ones make."""
-        both = [0, design]
-        gains, variances = relative_gains(goals, self.outputs[both], self.variances[both])
-        freedom = self.freedom[both][:, :, goals.objectives].sum(axis=0)
-        once = self.effort[:, None] * variances
-        smooth = [pooled_variances(self.quantiles, *each) for each in zip(once.T, freedom.T, strict=True)]
+        """Relative gains (n, q) of a design over the first, and their variances.
+
+        The variances are smoothed over the inputs, because those of a row's few replicates scatter widely.
+        """
+        designs = [0, design]
+        gains, variances = relative_gains(goals, self.outputs[designs], self.variances[designs])
+        freedom = self.freedom[designs][:, :, goals.objectives].sum(axis=0)
+        single_variances = self.effort[:, None] * variances
+        smooth = [
+            pooled_variances(self.quantiles, *column) for column in zip(single_variances.T, freedom.T, strict=True)
+        ]
         return gains, np.column_stack(smooth) / self.effort[:, None]
 
     def values(self, response: int, design: int = 1) -> tuple[Array, Array]:
-        """Values (n,) of a response of a design, and their variances, smoothed over the inputs as those of gains are."""
-        once = self.effort * self.variances[design][:, response]
-        smooth = pooled_variances(self.quantiles, once, self.freedom[design][:, response])
+        """Values (n,) of a response of a design, and their variances, smoothed over the inputs like those of gains."""
+        single_variances = self.effort * self.variances[design][:, response]
+        smooth = pooled_variances(self.quantiles, single_variances, self.freedom[design][:, response])
         return self.outputs[design][:, response], smooth / self.effort
 
 
@@ -79,46 +96,48 @@ def relative_gains(goals: Goals, outputs: Array, variances: Array) -> tuple[Arra
     """Relative gains (n, q) of the second design over the first of outputs (2, n, m), and their variances."""
     index = goals.objectives
     scale = np.abs(outputs[0][:, index])
-    before, after = (goals.costs(each) for each in outputs)
-    gains = (before - after) / scale
-    noise, other = (each[:, index] for each in variances)
-    # The first is in the denominator too.
-    return gains, (other + (1.0 - gains) ** 2 * noise) / scale**2
+    base_costs, costs = (goals.costs(design) for design in outputs)
+    gains = (base_costs - costs) / scale
+    base_variances, design_variances = (design[:, index] for design in variances)
+    # The first design is in the denominator too.
+    return gains, (design_variances + (1.0 - gains) ** 2 * base_variances) / scale**2
 
 
-def simulated(
+def simulate_designs(
     case: Case,
     inputs: Sequence[Input],
     quantiles: Array,
     designs: Mapping[str, Sequence[str]],
     simulations: Simulations,
     seeds: int = 0,
-    more: Sequence[str] = (),
+    overrides: Sequence[str] = (),
 ) -> tuple[Pairs, tuple[Failure, ...]]:
-    """Designs, each as overrides of the scene, at input sets; one at which any failed is left out."""
-    given, title = (case, inputs, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
-    every = [run(*given, [*design, *more], title.format(name)) for name, design in designs.items()]
-    places = reduce(np.intersect1d, (sets.places for sets in every))
-    kept = [np.flatnonzero(np.isin(sets.places, places)) for sets in every]
+    """Simulate designs, each as overrides of the scene, at input sets; sets at which any design failed are left out."""
+    shared, title = (case, inputs, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
+    sets_of_design = [run(*shared, [*design, *overrides], title.format(name)) for name, design in designs.items()]
+    places = reduce(np.intersect1d, (sets.places for sets in sets_of_design))
+    rows_of_design = [np.flatnonzero(np.isin(sets.places, places)) for sets in sets_of_design]
     outputs, variances, freedom = (
-        np.array([array[rows] for array, rows in zip(arrays, kept, strict=True)])
-        for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in every), strict=True)
+        np.array([array[rows] for array, rows in zip(arrays, rows_of_design, strict=True)])
+        for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in sets_of_design), strict=True)
     )
-    lost = tuple(failure for sets in every for failure in sets.failures)
+    failures = tuple(failure for sets in sets_of_design for failure in sets.failures)
     effort = np.ones(len(places), dtype=np.int64)
-    return Pairs(places, quantiles[places], outputs, variances, freedom, effort), lost
+    return Pairs(places, quantiles[places], outputs, variances, freedom, effort), failures
 
 
 JOINT_SEEDS = 200_000
-# Input sets over which the search averages, those at which points are simulated, and how many points.
+# Input sets over which the search averages, input sets at which points are simulated, and number of these points.
 SEARCHED, CONFIRMED, POINTS = 128, 128, 3
 POPULATION, GENERATIONS = 60, 40
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """A design simulated over the unknown inputs: its point (k,), why this one, how likely it gains, and the mean or the
-    quantile (q,) of its gains."""
+class RobustPoint:
+    """A design simulated over the unknown inputs: its point (k,) and the reason for its choice.
+
+    ``better``: how likely it gains; ``gains`` (q,): mean or quantile of its gains over the inputs.
+    """
 
     point: Array
     reason: str
@@ -128,12 +147,14 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class RobustFront:
-    """Points (f, k) and what emulators predict of their gains (f, q); ``confirmed`` by name, the plain pick first; ``q2`` of
-    the emulators; ``note`` where there is no front."""
+    """Points (f, k) and their predicted gains (f, q); ``confirmed`` points by name, the plain pick first.
+
+    ``q2``: predictivity of the emulator of each gain. ``note``: why there is no front; empty if there is one.
+    """
 
     points: Array
     gains: Array
-    confirmed: Mapping[str, Held]
+    confirmed: Mapping[str, RobustPoint]
     q2: list[float]
     note: str = ""
 
@@ -141,22 +162,22 @@ class RobustFront:
 def find_robust_front(
     study: Study, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
 ) -> tuple[RobustFront, int, tuple[Failure, ...]]:
-    """The front, the runs that it took, and those that failed; ``pairs``: the baseline and the pick at the study's input sets.
+    """The front, its number of runs, and its failures; ``pairs``: the baseline and the pick at the study's input sets.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
     settings, goals, reach = study.file.robust, goals_of(study), region_of(study)
     low, high = study.actual(-reach), study.actual(reach)
     sets, places, rows = _runs(study, case, pairs, (low, high), simulations)
-    predicted = _emulators(case, goals, sets, places, pairs.at(rows), (low, high))
+    emulators = _emulators(case, goals, sets, places, pairs.rows(rows), (low, high))
     share = settings.quantile if settings.front == "quantile" else None
-    spent, q2 = settings.points, [each.q2 for each in predicted.gain]
+    spent, q2 = settings.points, [emulator.q2 for emulator in emulators.gain]
     try:
-        found = front(
-            lambda wanted: predicted.objectives(wanted, share),
+        robust_front = front(
+            lambda points: emulators.objectives(points, share),
             low,
             high,
-            goals=predicted.goals,
+            goals=emulators.goals,
             population=POPULATION,
             generations=GENERATIONS,
             seed=study.file.front.seed,
@@ -165,25 +186,31 @@ def find_robust_front(
     except InfeasibleError:
         note = "no point keeps the limits over the unknown inputs"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
-    chosen = {"pick": (pick, "the pick"), **_choices(study, found, predicted)}
-    designs = {"baseline": clearance.assignments(study.at(()), study.baseline)}
-    designs |= {name: clearance.assignments(study, point) for name, (point, _) in chosen.items()}
+    candidates = {"pick": (pick, "the pick"), **_choices(study, robust_front, emulators)}
+    designs = {"baseline": clearance.assignments(study.with_levels(()), study.baseline)}
+    designs |= {name: clearance.assignments(study, point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
-    again, lost = simulated(case, case.every, quantiles, designs, simulations)
+    fresh_pairs, new_failures = simulate_designs(case, case.every, quantiles, designs, simulations)
     confirmed = {}
-    for number, (name, (point, reason)) in enumerate(chosen.items(), 1):
-        gains, variances = again.gains(goals, number)
-        held = _over_inputs(shrunk(gains, variances), share)
-        confirmed[name] = Held(point, reason, better(gains, variances, case.uncertain.seed), held)
-    # The baseline and the pick were there before, but for the sets that the study's own do not hold.
-    spent += CONFIRMED * (len(chosen) - 1) + 2 * int((rows >= settings.points).sum())
-    return RobustFront(found.points, found.values[:, : len(q2)], confirmed, q2), spent, (*sets.failures, *lost)
+    for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
+        gains, variances = fresh_pairs.gains(goals, number)
+        gains_over_inputs = _over_inputs(shrunk(gains, variances), share)
+        confirmed[name] = RobustPoint(point, reason, better(gains, variances, case.uncertain.seed), gains_over_inputs)
+    # The baseline and the pick ran before at the sets that are the study's own.
+    spent += CONFIRMED * (len(candidates) - 1) + 2 * int((rows >= settings.points).sum())
+    return (
+        RobustFront(robust_front.points, robust_front.values[:, : len(q2)], confirmed, q2),
+        spent,
+        (*sets.failures, *new_failures),
+    )
 
 
 def fresh_rows(points: int) -> Whole:
-    """Places of the input sets at which points are simulated: of the study's own the first half, of which emulators see the
-    second, then such as come after them."""
+    """Places of the input sets at which points are simulated: the first half of the study's own, then further ones.
+
+    The emulators see the second half.
+    """
     first = min(points // 2, CONFIRMED)
     return np.array([*range(first), *range(points, points + CONFIRMED - first)])
 
@@ -191,116 +218,124 @@ def fresh_rows(points: int) -> Whole:
 def _runs(
     study: Study, case: Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
 ) -> tuple[Sets, Array, Whole]:
-    """Designs spread over the ``box`` at the second half of the study's input sets, as many as there are sets; places (n, k) of
-    these designs between 0 and 1, and the row of the pairs at the same input set."""
+    """Runs of designs spread over the ``box`` at the second half of the study's input sets, as many as there are sets.
+
+    Also the places (n, k) of these designs, from 0 to 1, and the rows (n,) of the pairs at the same input sets.
+    """
     points, (low, high) = study.file.robust.points, box
     half = np.flatnonzero(pairs.places >= points // 2)
     even = nested(len(study.factors), points, case.uncertain.seed + 2)
     rows = np.resize(half, points)
-    own = [clearance.assignments(study, point) for point in low + (high - low) * even]
+    overrides = [clearance.assignments(study, point) for point in low + (high - low) * even]
     title = "runs of the robust front"
-    sets = run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, own)
+    sets = run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, overrides)
     return sets, even[sets.places], rows[sets.places]
 
 
 def _emulators(
     case: Case, goals: Goals, sets: Sets, places: Array, base: Pairs, box: tuple[Array, Array]
-) -> "_Predicted":
+) -> "_GainEmulators":
     """Emulators of the gains over the baseline ``base`` at the same input sets, and of limited responses."""
     factors = places.shape[1]
-    always = [*range(factors), *(factors + place for place in declared(case))]
-    cover = factors + case.uncertain.inputs, always
-    at = np.hstack([places, sets.quantiles])
+    required = [*range(factors), *(factors + place for place in declared(case))]
+    cover = factors + case.uncertain.inputs, required
+    positions = np.hstack([places, sets.quantiles])
     gains, variances = relative_gains(
         goals, np.stack([base.outputs[0], sets.outputs]), np.stack([base.variances[0], sets.variances])
     )
     freedom = (base.freedom[0] + sets.freedom)[:, goals.objectives]
     columns = zip(gains.T, variances.T, freedom.T, strict=True)
-    gain = [emulated(Runs(at, *each), *cover, logarithms=False) for each in columns]
-    limited = [
-        emulated(Runs(at, sets.outputs[:, index], sets.variances[:, index], sets.freedom[:, index]), *cover)
+    gain = [emulated(Runs(positions, *column), *cover, logarithms=False) for column in columns]
+    limit_emulators = [
+        emulated(Runs(positions, sets.outputs[:, index], sets.variances[:, index], sets.freedom[:, index]), *cover)
         for index, _, _ in goals.limited
     ]
     seed = case.uncertain.seed + 3
     random = np.random.default_rng(seed)
-    # One row for all gains: what inputs outside the emulators do to them goes together.
-    rows = random.integers(0, len(at), SEARCHED)
-    rest = np.column_stack([each.residuals for each in gain])[rows]
-    return _Predicted(gain, limited, goals, box, case.joint(case.every).sets(SEARCHED, seed), rest)
+    # One row for all gains, because inputs outside the emulators change them together.
+    rows = random.integers(0, len(positions), SEARCHED)
+    residuals = np.column_stack([emulator.residuals for emulator in gain])[rows]
+    return _GainEmulators(gain, limit_emulators, goals, box, case.joint(case.every).sets(SEARCHED, seed), residuals)
 
 
 @dataclass(frozen=True, eq=False)
-class _Predicted:
-    """What emulators predict at ``sets`` (s, d + 1) of inputs: gains over the baseline, each set with the residual ``rest``
-    (s, q) of a run, and limited responses."""
+class _GainEmulators:
+    """Emulators of gains over the baseline and of limited responses, at ``sets`` (s, d + 1) of inputs.
+
+    ``rest`` (s, q): a residual of a run for each set, which is added to the gains. ``box``: ends (k,) of the region.
+    """
 
     gain: Sequence[Emulated]
     limited: Sequence[Emulated]
-    wanted: Goals
+    study_goals: Goals
     box: tuple[Array, Array]
     sets: Array
     rest: Array
 
     @property
     def goals(self) -> Goals:
-        """Goals of ``objectives``: gains to be large, limited responses within their limits."""
-        kinds = ["max"] * len(self.wanted.objectives) + ["none"] * len(self.wanted.limited)
+        """Goals of ``objectives``: large gains, and limited responses within their limits."""
+        kinds = ["max"] * len(self.study_goals.objectives) + ["none"] * len(self.study_goals.limited)
         ends: dict[str, list[float | None]] = {side: [None] * len(kinds) for side in ("lower", "upper", "weight")}
-        ends["weight"][: len(self.wanted.objectives)] = self.wanted.cost_weight.tolist()
-        for place, (_, sense, limit) in enumerate(self.wanted.limited, len(self.wanted.objectives)):
+        ends["weight"][: len(self.study_goals.objectives)] = self.study_goals.cost_weight.tolist()
+        for place, (_, sense, limit) in enumerate(self.study_goals.limited, len(self.study_goals.objectives)):
             ends["lower" if sense == ">=" else "upper"][place] = limit
         return Goals.of(kinds, **ends)  # type: ignore[arg-type]
 
     def gains(self, points: Array) -> Array:
         """Relative gains (n, s, q) at points (n, k)."""
-        return self._at_all(self.gain, points) + self.rest
+        return self._outputs(self.gain, points) + self.rest
 
     def objectives(self, points: Array, share: float | None) -> Array:
-        """Mean or quantile of the gains at points (n, k), then of each limited response the mean or the quantile towards its
-        limit."""
+        """Mean or quantile of the gains at points (n, k), then of each limited response, that towards its limit."""
         columns = [_over_inputs(self.gains(points), share, axis=1)]
-        for fitted, (_, sense, _) in zip(self.limited, self.wanted.limited, strict=True):
+        for fitted, (_, sense, _) in zip(self.limited, self.study_goals.limited, strict=True):
             towards = share if share is None or sense == ">=" else 1.0 - share
-            columns.append(_over_inputs(self._at_all([fitted], points), towards, axis=1))
+            columns.append(_over_inputs(self._outputs([fitted], points), towards, axis=1))
         return np.hstack(columns)
 
-    def _at_all(self, fitted: Sequence[Emulated], points: Array) -> Array:
+    def _outputs(self, fitted: Sequence[Emulated], points: Array) -> Array:
         """Outputs (n, s, e) of emulators at points (n, k) and all sets."""
         low, high = self.box
         coded = np.repeat((points - low) / (high - low), len(self.sets), axis=0)
-        at_all = np.hstack([coded, np.tile(self.sets, (len(points), 1))])
-        return np.stack([each(at_all).reshape(len(points), -1) for each in fitted], axis=-1)
+        positions = np.hstack([coded, np.tile(self.sets, (len(points), 1))])
+        return np.stack([emulator(positions).reshape(len(points), -1) for emulator in fitted], axis=-1)
 
 
 def _over_inputs(values: Array, share: float | None, axis: int = 0) -> Array:
-    """Mean, or quantile."""
+    """Mean over the input sets, or the quantile at ``share``."""
     return values.mean(axis=axis) if share is None else np.quantile(values, share, axis=axis)
 
 
-def _choices(study: Study, found: ParetoFront, predicted: _Predicted) -> dict[str, tuple[Array, str]]:
-    """Points of the front that are worth a simulation, by name, and why."""
-    together = (predicted.gains(found.points) > 0.0).all(axis=2).mean(axis=1)
-    rows: dict[str, int] = {"surest": int(together.argmax())}
-    rows.update({str(rule): row for rule, row in found.picks.items()})
-    reasons = {"surest": "the likeliest of the robust front to gain in all"}
-    chosen: dict[str, tuple[Array, str]] = {}
+def _choices(study: Study, pareto: ParetoFront, emulators: _GainEmulators) -> dict[str, tuple[Array, str]]:
+    """Points of the front that are worth a simulation, by name, with the reason for each."""
+    gains = emulators.gains(pareto.points)
+    all_gain = (gains > 0.0).all(axis=2).mean(axis=1)
+    # Of equally likely points, the one whose smallest gain is largest: an emulator may err in the sign of a gain near 0.
+    smallest = np.quantile(gains, 0.05, axis=1).min(axis=1)
+    rows: dict[str, int] = {"surest": int(np.lexsort((smallest, all_gain))[-1])}
+    rows.update({str(rule): row for rule, row in pareto.picks.items()})
+    reasons = {"surest": "the point of the robust front that is likeliest to gain in all responses"}
+    candidates: dict[str, tuple[Array, str]] = {}
     for name, row in rows.items():
-        point = rounded_within(study, found.points[row])
-        if len(chosen) < POINTS and not any(np.array_equal(point, other) for other, _ in chosen.values()):
-            chosen[f"robust {name}"] = point, reasons.get(name, f"the robust front's by {name}")
-    return chosen
+        point = rounded_within(study, pareto.points[row])
+        if len(candidates) < POINTS and not any(np.array_equal(point, other) for other, _ in candidates.values()):
+            candidates[f"robust {name}"] = point, reasons.get(name, f"the pick of the robust front by {name}")
+    return candidates
 
 
-# Rounds of further replicates: each as many again as there are, so that a set gets 2, 4, 8 and 16.
+# Rounds of further replicates; each doubles them, so that a set has 2, 4, 8 and 16.
 ROUNDS = 3
 FRESH = 8192
 
 
 @dataclass(frozen=True)
 class Decider:
-    """An unknown input that decides: the value where the better design changes, None where none does, what measuring it is
-    worth in chances of the right choice, whether the pick is better above that value, and 95 % intervals, None of a flip that
-    is not sure to exist."""
+    """A deciding input: ``flip`` is the value at which the better design changes, None without one.
+
+    ``worth``: gain in the probability of the right choice by measuring the input. ``above``: whether the pick is better
+    above the flip. Intervals are of 95 %; that of a flip which may not exist is None.
+    """
 
     key: str
     flip: Any
@@ -312,8 +347,11 @@ class Decider:
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether the first of the deciding inputs decides: the verdict, keys of the inputs that may, the best first, about how many
-    pairs it takes to decide between them, and the 95 % interval of what the best pair is worth, None without a pair."""
+    """Whether the first of the deciding inputs is surely the first: the verdict, and the ``rivals`` by key, the best first.
+
+    ``needed``: about how many pairs of runs decide between them. ``pair_interval``: 95 % interval of the worth of the best
+    pair of inputs, None without a pair.
+    """
 
     verdict: Verdict
     rivals: list[str]
@@ -323,12 +361,18 @@ class Decision:
 
 @dataclass(frozen=True)
 class Robust:
-    """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
-    that are worth most together, how well inputs predict each gain, by how much the chance of all gains changes with ranges
-    half as wide, the front of points that hold over the inputs, None where the study wants none, the inputs, which all vary in
-    every set, ``screened``: those that no emulator of a gain covers, with the largest share that the main effect of each makes of
-    a gain, the cost in runs, the ``decision`` which of the deciding inputs is first, notes: what is to be doubted of a posterior
-    sample, which keys do not vary, and the ``odds`` that the pick keeps all limits of a response, by its name."""
+    """The robust judgement of the pick over all unknown ``inputs``.
+
+    ``responses`` are those with a goal, and ``better`` is how likely each gain and all gains are. ``decides``: deciding
+    inputs by worth; ``decision``: which of them is the first; ``pair``: the two that are worth most together.
+    ``explained``: how well inputs predict each gain. ``halved``: change in the probability of all gains if the ranges of
+    the inputs were half as wide. ``front``: the robust front, None if the study asks for none.
+
+    ``screened``: by key of the inputs outside the emulators, the largest share of a gain's variance by the main effect.
+    ``pairs``, ``runs``, ``doubtful``: input sets, runs spent, and sets whose gain is in doubt. ``notes``: doubts about a
+    posterior sample, and keys that do not vary. ``odds``: by limited response, the probability that the pick keeps its
+    limits.
+    """
 
     responses: list[str]
     better: Better
@@ -349,71 +393,100 @@ class Robust:
 
 
 def robust_advice(study: Study) -> list[str]:
-    """Where the scene names estimates, what a judgement over them would answer and cost; else nothing."""
+    """Advice to judge the pick over the unknown inputs, if the scene names estimates; else none."""
     if "uncertain" not in clearance.read_scene(study):
         return []
     runs = round(2 * study.file.robust.points * (1.0 + study.file.robust.settle))
     return [
-        "the scene names values that are estimates: --robust counts in how many of 100 cases the pick is better in spite of "
-        f"them, by {runs} short simulations and more for a front; doe uncertainty shows what they do to each figure"
+        f"some values of the scene are estimates: --robust computes the probability that the pick is better, by {runs} short "
+        "simulations and more for a front; doe uncertainty shows their effect on each figure"
     ]
 
 
 def check_robust(study: Study) -> None:
-    """Raises InputError where the unknown inputs of the study's scene are declared wrongly."""
+    """Raises InputError if the unknown inputs of the study's scene are declared wrongly."""
     case_of_study(study)
 
 
 @one_thread
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
-    """Judge the pick (k,) next to the baseline. Raises InputError, RunError, KeyboardInterrupt."""
+    """Judge the pick (k,) against the baseline. Raises InputError, RunError, KeyboardInterrupt."""
     case, goals = case_of_study(study), goals_of(study)
     joint, seed = case.joint(case.every), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
     designs = {
-        "baseline": clearance.assignments(study.at(()), study.baseline),
+        "baseline": clearance.assignments(study.with_levels(()), study.baseline),
         "pick": clearance.assignments(study, pick),
     }
-    pairs, failures = simulated(case, case.every, quantiles, designs, simulations)
-    spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
-    replicates = case.replicates
-    rows = in_doubt(*pairs.gains(goals))
-    for again in range(ROUNDS):
-        # As many replicates again as there are; a run of twice the replicates counts as two.
-        many = 2**again
-        rows = rows[: max(allowed - spent, 0) // (2 * many)]
-        if rows.size == 0:
-            break
-        more = [f"numerics.replicates={replicates * many}"]
-        seeds = (again + 1) * ROUND_SEEDS
-        new, lost = simulated(case, case.every, pairs.quantiles[rows], designs, simulations, seeds, more)
-        rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
-        pairs = pairs.joined(rows, new)
-        still = in_doubt(*pairs.gains(goals))
-        rows = still[np.isin(still, rows)]
+    pairs, spent, failures = _pairs_in_rounds(study, case, quantiles, designs, simulations)
     gains, variances = pairs.gains(goals)
-    # Of inputs outside these the gains know as scatter.
-    places, rest = strongest(case, pairs.quantiles, gains)
+    # For the emulators, the effects of the other inputs are scatter.
+    places, outside_shares = strongest_inputs(case, pairs.quantiles, gains)
     inputs, columns = [case.every[place] for place in places], [*places, -1]
-    fresh = joint.sets(FRESH, seed + 1)[:, columns]
-    knowable = [place for place, each in enumerate(inputs) if each.law.kind == "unknown"]
-    found = decides(
-        pairs.quantiles[:, columns], gains, variances, fresh, seed, _read(case, inputs, fresh, seed), knowable
+    fresh_sets = joint.sets(FRESH, seed + 1)[:, columns]
+    knowable = [place for place, unknown_input in enumerate(inputs) if unknown_input.law.kind == "unknown"]
+    analysis = decides(
+        pairs.quantiles[:, columns],
+        gains,
+        variances,
+        fresh_sets,
+        seed,
+        _input_readings(case, inputs, fresh_sets, seed),
+        knowable,
     )
     front = None
     if study.file.robust.front != "none":
-        front, more_runs, lost = find_robust_front(study, case, pairs, pick, simulations)
-        spent, failures = spent + more_runs, (*failures, *lost)
-    deciders, pair, decision = _of_keys(case, inputs, found)
-    judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
-    cost = len(gains), spent, int(in_doubt(gains, variances).size)
-    wanted = [study.responses[index] for index in goals.objectives]
-    notes = *case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")
-    return Robust(wanted, *judged, case.every, rest, *cost, failures, decision, notes, limit_odds(study, pairs, seed))
+        front, more_runs, new_failures = find_robust_front(study, case, pairs, pick, simulations)
+        spent, failures = spent + more_runs, (*failures, *new_failures)
+    deciders, pair, decision = _decision_by_keys(case, inputs, analysis)
+    return Robust(
+        responses=[study.responses[index] for index in goals.objectives],
+        better=better(gains, variances, seed),
+        decides=deciders,
+        pair=pair,
+        explained=analysis.explained,
+        halved=analysis.halved,
+        front=front,
+        inputs=case.every,
+        screened=outside_shares,
+        pairs=len(gains),
+        runs=spent,
+        doubtful=int(in_doubt(gains, variances).size),
+        failures=failures,
+        decision=decision,
+        notes=(*case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")),
+        odds=limit_odds(study, pairs, seed),
+    )
+
+
+def _pairs_in_rounds(
+    study: Study, case: Case, quantiles: Array, designs: Mapping[str, Sequence[str]], simulations: Simulations
+) -> tuple[Pairs, int, tuple[Failure, ...]]:
+    """Both designs at the input sets, with further replicates where a gain is in doubt; runs spent; and failures."""
+    goals, replicates = goals_of(study), case.replicates
+    pairs, failures = simulate_designs(case, case.every, quantiles, designs, simulations)
+    spent, budget = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
+    rows = in_doubt(*pairs.gains(goals))
+    for round_number in range(ROUNDS):
+        # The replicates double, and a run of twice the replicates counts as two.
+        multiple = 2**round_number
+        rows = rows[: max(budget - spent, 0) // (2 * multiple)]
+        if rows.size == 0:
+            break
+        overrides = [f"numerics.replicates={replicates * multiple}"]
+        seeds = (round_number + 1) * ROUND_SEEDS
+        new_pairs, new_failures = simulate_designs(
+            case, case.every, pairs.quantiles[rows], designs, simulations, seeds, overrides
+        )
+        rows, spent, failures = rows[new_pairs.places], spent + 2 * multiple * len(rows), (*failures, *new_failures)
+        pairs = pairs.joined(rows, new_pairs)
+        doubtful = in_doubt(*pairs.gains(goals))
+        rows = doubtful[np.isin(doubtful, rows)]
+    return pairs, spent, failures
 
 
 def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
-    """How likely the pick, the second of the pairs, keeps all limits of each limited response over the unknown inputs."""
+    """By limited response, the probability that the pick, the second design, keeps its limits over the unknown inputs."""
     goals = goals_of(study)
     return {
         study.responses[index]: odds(*pairs.values(index), float(goals.lower[index]), float(goals.upper[index]), seed)
@@ -422,49 +495,75 @@ def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
 
 
 def case_of_study(study: Study) -> Case:
-    """The study's scene with its unknown inputs; factors are known."""
-    path = study.beside(study.scene.file)
+    """The study's scene with its unknown inputs; factors are none of them."""
+    path = study.path_of(study.scene.file)
     data = clearance.read_scene(study)
     for override in study.scene.set:
         set_key(data, override, f"{study.path}: scene.set")
-    keys = *(factor.key for factor in study.file.factor), *(each.key for each in study.file.category)
+    keys = *(factor.key for factor in study.file.factor), *(category.key for category in study.file.category)
     fixed = dict.fromkeys(keys, "a factor of the study")
     return case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
 
 
-def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:
-    """Quantiles (k, d + 1) of what is read of input sets: those of the inputs, of measured ones with the measurement's error."""
-    random, read = np.random.default_rng(seed), fresh.copy()
-    for place, each in enumerate(inputs):
-        if each.law.measurable is not None:
-            values = abs(case.unit(each)) * np.array(unknown.values_of(each.law, fresh[:, place]), float)
-            read[:, place] = unknown.ranks(values + each.law.measurable * random.standard_normal(len(values)))
-    return read
+def _input_readings(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:
+    """Quantiles (k, d + 1) of measurements of input sets: measurable inputs have the error of their measurement."""
+    random, readings = np.random.default_rng(seed), fresh.copy()
+    for place, unknown_input in enumerate(inputs):
+        if unknown_input.law.measurable is not None:
+            values = abs(case.unit(unknown_input)) * np.array(
+                unknown.values_of(unknown_input.law, fresh[:, place]), float
+            )
+            readings[:, place] = unknown.ranks(
+                values + unknown_input.law.measurable * random.standard_normal(len(values))
+            )
+    return readings
 
 
-def _of_keys(
-    case: Case, inputs: Sequence[Input], found: Decides
+def _decision_by_keys(
+    case: Case, inputs: Sequence[Input], analysis: Decides
 ) -> tuple[list[Decider], tuple[str, str, float] | None, Decision]:
-    """What decides, by keys and values of the inputs."""
+    """Deciding inputs, the best pair and the decision, by keys and values of the inputs."""
 
-    def decider(one: Deciding) -> Decider:
-        at, value = inputs[one.place], lambda quantile: _value(case, inputs[one.place], quantile)
-        low, high = (None, None) if one.flip_interval is None else map(value, one.flip_interval)
-        # Choices have no order, hence no interval.
+    def decider(deciding: InputWorth) -> Decider:
+        deciding_input, value = inputs[deciding.place], lambda quantile: _value(case, inputs[deciding.place], quantile)
+        low, high = (None, None) if deciding.flip_interval is None else map(value, deciding.flip_interval)
+        # Choices have no order, and so no interval.
         interval = (low, high) if is_number(low) else None
-        return Decider(at.key, value(one.flip), one.worth, one.above, interval, one.worth_interval)
+        return Decider(
+            deciding_input.key, value(deciding.flip), deciding.worth, deciding.above, interval, deciding.worth_interval
+        )
 
-    keys, both = [each.key for each in inputs], found.pair
+    keys, best_pair = [unknown_input.key for unknown_input in inputs], analysis.pair
     decision = Decision(
-        found.verdict, [keys[place] for place in found.rivals], found.needed, None if both is None else both.interval
+        analysis.verdict,
+        [keys[place] for place in analysis.rivals],
+        analysis.needed,
+        None if best_pair is None else best_pair.interval,
     )
-    pair = None if both is None else (keys[both.places[0]], keys[both.places[1]], both.worth)
-    return [decider(one) for one in found.inputs], pair, decision
+    pair = None if best_pair is None else (keys[best_pair.places[0]], keys[best_pair.places[1]], best_pair.worth)
+    return [decider(deciding) for deciding in analysis.inputs], pair, decision
 
 
-def _value(case: Case, one: Input, quantile: float | None) -> Any:
-    """Value of an input at a quantile, in its own unit."""
+def _value(case: Case, unknown_input: Input, quantile: float | None) -> Any:
+    """Value of an input at a quantile, in the unit of its key; None without a quantile."""
     if quantile is None:
         return None
-    (value,) = unknown.values_of(one.law, np.array([quantile]))
-    return value if one.law.times is None else value * case.unit(one)
+    (value,) = unknown.values_of(unknown_input.law, np.array([quantile]))
+    return value if unknown_input.law.times is None else value * case.unit(unknown_input)
+
+
+# Typical wall time [s] of the emulators of a robust judgement.
+ROBUST_S = 10.0
+
+
+def robust_stage(study: Study) -> Stage:
+    """The stage of a robust judgement: input sets of both designs, further replicates, the front and its simulations."""
+    settings, case = study.file.robust, case_of_study(study)
+    fewest, runs = 2 * settings.points, round(2 * settings.points * (1.0 + settings.settle))
+    if settings.front != "none":
+        new_sets = int((fresh_rows(settings.points) >= settings.points).sum())
+        fewest += settings.points
+        runs += settings.points + POINTS * CONFIRMED + 2 * new_sets
+    titles = "input sets", "runs of the robust front"
+    stage = Stage.of("robust", runs, work_of_set(case), *titles, fewest=fewest)
+    return replace(stage, besides_s=ROBUST_S)

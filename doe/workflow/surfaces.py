@@ -1,5 +1,6 @@
-"""A response surface for each response of a study with its rival, surfaces drawn at random within its errors, predictions at any point, and
-a published table of the same design.
+"""Response surfaces of a study: fits with their rivals, predictions at any point, and random draws within their errors.
+
+Gains are predicted with errors, and a published table of the same design is compared with the runs.
 """
 
 import math
@@ -16,37 +17,45 @@ from scipy.stats import spearmanr
 
 from doe.designs.model import second_order
 from doe.pareto.front import contrast_error, draw_coefficients
+from doe.pareto.goals import BLANK, Goals
 from doe.pareto.manufacture import Quadratic, identity
 from doe.response_surface import Surface, fit, model_matrix
-from doe.response_surface.box_cox import backward, forward, slope
-from doe.response_surface.model_error import correlation, draw_fields
+from doe.response_surface.adequacy import correlation, draw_fields
+from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file import Study
 from doe.study_file.study import Fitted
 from doe.threads import one_thread
-from doe.workflow.goals import goals_of
 from doe.workflow.runs import Runs, design_of, read_runs
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import error_alone, improvement
 
-# Runs of which a Gaussian process takes some 10 s; of 1000 it took 3 s, of 3000 45 s and 0.9 GB.
+
+def goals_of(study: Study) -> Goals:
+    """Goals and limits of the study's responses."""
+    responses = study.file.response
+    settings = {key: [getattr(response, key) for response in responses] for key in BLANK}
+    return Goals.of([response.goal for response in responses], **settings)
+
+
+# Runs with which a Gaussian process takes some 10 s; with 1000 it took 3 s, with 3000 45 s and 0.9 GB.
 MOST_RIVALLED = 1500
 
 
 @one_thread
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
-    """A surface a response. Raises InputError when the runs do not suffice."""
+    """A surface for each response. Raises InputError if the runs are too few."""
     surfaces, faults = [], []
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
     units: dict[str, Any] = {"centre": study.centre, "step": study.step, "block": runs.block}
     units["without"] = study.inactive
     columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
-    for response, values, error, behind in columns:
-        asked = response.model_dump(include={"name", *Fitted.model_fields}) | units
+    for response, values, error, samples in columns:
+        settings = response.model_dump(include={"name", *Fitted.model_fields}) | units
         try:
-            surfaces.append(fit(runs.coded, values, standard_errors=error, replicates=behind, **asked))
+            surfaces.append(fit(runs.coded, values, standard_errors=error, replicates=samples, **settings))
         except MethodError as error_of_fit:
             faults.append(f"{study.path}: {error_of_fit}")
     refuse(faults)
@@ -55,14 +64,14 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
 
 @one_thread
 def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
-    """The surfaces, each compared with a Gaussian process by leaving out every point in turn.
+    """The surfaces, each compared with a Gaussian process by leaving out each point in turn.
 
-    It takes of the order of a second a response. ``rival`` stays None where too few points can be left out, or there are
-    too many runs (`unrivalled` says so).
+    This takes about a second per response. ``rival`` stays None if too few points can be left out, or if there are too
+    many runs (see `unrivalled`).
     """
     from doe.response_surface.comparison import compare
 
-    found = list(surfaces)
+    results = list(surfaces)
     for place, surface in enumerate(surfaces):
         if len(surface.data.values) > MOST_RIVALLED:
             continue
@@ -71,24 +80,24 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
         with suppress(MethodError):
             runs = data.points, data.values, surface.refit
             rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
-            found[place] = replace(surface, rival=rival)
-    return found
+            results[place] = replace(surface, rival=rival)
+    return results
 
 
 def unrivalled(surfaces: Sequence[Surface]) -> list[str]:
-    """A note where surfaces have too many runs to be compared with a Gaussian process; else none."""
+    """A note on surfaces with too many runs for a comparison with a Gaussian process; else none."""
     runs = max(len(surface.data.values) for surface in surfaces)
     return (
-        [f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} takes too long"]
+        [f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"]
         if runs > MOST_RIVALLED
         else []
     )
 
 
 def independent_values(runs: Runs) -> Whole:
-    """How many are behind each half width, shape (n, m), from ``runs.replicates``: (n,), (n, m) or None; 0: unknown."""
-    given = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
-    per_response = given if given.ndim == 2 else given[:, None]
+    """Number of independent values (n, m) of each half width, from ``runs.replicates``; 0: unknown."""
+    samples = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
+    per_response = samples if samples.ndim == 2 else samples[:, None]
     return np.array(np.broadcast_to(per_response, runs.values.shape), np.int64)
 
 
@@ -96,27 +105,26 @@ def standard_errors(half_widths: Array, number: Whole) -> Array:
     """Standard errors of means from the half widths (n, m) of their 95 % intervals.
 
     The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
-    values behind each mean; of unknown numbers (0) it is the normal one.
+    values of each mean; for unknown numbers (0) it is the normal one.
     """
     student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
     return half_widths / np.where(number > 1, student, special.ndtri(0.975))
 
 
 class Effect(Record):
-    """Linear effect of a factor per coded unit, ours and theirs, and whether either is significant at 5 %."""
+    """Linear effect of a factor per coded unit, ours and theirs, and whether theirs is significant at 5 %."""
 
     ours: float
     theirs: float
     same_sign: bool = derived(lambda self: self.ours * self.theirs > 0.0)
-    ours_significant: bool = outside_json()
     theirs_significant: bool = outside_json()
 
 
-class Beside(Record):
-    """One response next to a published table of the same design.
+class PublishedComparison(Record):
+    """One response compared with a published table of the same design.
 
-    Ranges are least, mean, largest value; ``effects`` go by factor. ``rank_correlation`` is Spearman's over the runs,
-    ``verdict`` a sentence: level, signs of the effects that the published table shows, ranks.
+    Ranges are the least, mean and largest value; ``effects`` are by factor. ``rank_correlation`` is Spearman's over the
+    runs. ``verdict`` is a sentence on level, signs of the significant published effects, and ranks.
     """
 
     response: str = outside_json()
@@ -128,35 +136,37 @@ class Beside(Record):
     why: str
 
     def _sentence(self) -> str:
-        shown = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
-        opposite = [factor for factor, effect in shown.items() if not effect.same_sign]
-        signs = f"sign differs for {', '.join(opposite)}" if opposite else "all with our sign"
-        return (
-            f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs; of their "
-            f"{len(shown)} significant linear effects, {signs}; rank correlation {self.rank_correlation:+.2f}."
-        )
+        significant = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
+        opposite = [factor for factor, effect in significant.items() if not effect.same_sign]
+        level = f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs"
+        ranks = f"rank correlation {self.rank_correlation:+.2f}"
+        if opposite:
+            signs = f"of their {len(significant)} significant linear effects, sign differs for {', '.join(opposite)}"
+        else:
+            signs = f"of their {len(significant)} significant linear effects, all with our sign"
+        return f"{level}; {signs}; {ranks}."
 
 
 def reference_runs(study: Study) -> Runs | None:
-    """The published table in the order of our design. Raises InputError when it is of another design."""
+    """The published table in the order of our design. Raises InputError for a table of another design."""
     if study.file.reference is None:
         return None
-    path = study.beside(study.file.reference.file)
+    path = study.path_of(study.file.reference.file)
     table = read_runs(study, path)
-    left = list(range(len(table.coded)))
+    rows = list(range(len(table.coded)))
     order = []
     for point in design_of(study).coded:
-        distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
+        distance = [float(np.abs(table.coded[row] - point).max()) for row in rows]
         if not distance or min(distance) > 0.02:
             raise InputError(
                 [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
             )
-        order.append(left.pop(int(np.argmin(distance))))
+        order.append(rows.pop(int(np.argmin(distance))))
     return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])
 
 
-def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
-    """Every response of both, with the linear effects on the surfaces through either."""
+def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
+    """Each response of both tables, with the linear effects on the surfaces through each table."""
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
@@ -164,7 +174,7 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
     for index, (name, pair) in enumerate(zip(study.responses, surfaces, strict=True)):
         our_values, their_values = ours.values[:, index], theirs.values[:, index]
         rows.append(
-            Beside(
+            PublishedComparison(
                 response=name,
                 our_range=(our_values.min(), our_values.mean(), our_values.max()),
                 their_range=(their_values.min(), their_values.mean(), their_values.max()),
@@ -177,9 +187,9 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
 
 
 def _effect(ours: Surface, theirs: Surface, letter: str) -> Effect:
-    values = [each.by_term.get(letter, 0.0) for each in (ours, theirs)]
-    p = [{row["source"]: row["p"] for row in each.anova}.get(letter) for each in (ours, theirs)]
-    return Effect(values[0], values[1], *(each is not None and each < 0.05 for each in p))
+    values = [surface.by_term.get(letter, 0.0) for surface in (ours, theirs)]
+    p_value = {row["source"]: row["p"] for row in theirs.anova}.get(letter)
+    return Effect(values[0], values[1], p_value is not None and p_value < 0.05)
 
 
 def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
@@ -194,32 +204,32 @@ def half_widths(surfaces: Sequence[Surface], coded: Array) -> Array:
 
 
 def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
-    """Coefficients (draws, p) of each surface, drawn from their multivariate t independently by response."""
+    """Coefficients (draws, p) of each surface, drawn from their multivariate t, independently by response."""
     random = np.random.default_rng(seed)
-    known = [(surface.coefficients, surface.covariance, surface.residual_dof) for surface in surfaces]
-    return [draw_coefficients(*each, draws, random) for each in known]
+    posteriors = [(surface.coefficients, surface.covariance, surface.residual_dof) for surface in surfaces]
+    return [draw_coefficients(*posterior, draws, random) for posterior in posteriors]
 
 
-def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array, seed: int = 1) -> Array:
-    """Responses (d, n, m) on drawn coefficients, and with what the models may miss, at coded points (n, k)."""
+def predict_draws(surfaces: Sequence[Surface], draws_by_surface: Sequence[Array], coded: Array, seed: int = 1) -> Array:
+    """Responses (d, n, m) at coded points (n, k) on drawn coefficients, with draws of the model errors."""
     random = np.random.default_rng(seed)
     columns = [
         surface.draws(coded, coefficients, draw_fields(surface.model_error, coded, len(coefficients), random))
-        for surface, coefficients in zip(surfaces, drawn, strict=True)
+        for surface, coefficients in zip(surfaces, draws_by_surface, strict=True)
     ]
     return np.stack(columns, axis=-1)
 
 
-def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
-    """Responses (n, m) at coded points (n, k), each on the drawn coefficients (n, p) of its own row."""
+def predict_paired(surfaces: Sequence[Surface], draws_by_surface: Sequence[Array], coded: Array) -> Array:
+    """Responses (n, m) at coded points (n, k), each row on its own drawn coefficients (n, p)."""
     columns = []
-    for surface, coefficients in zip(surfaces, drawn, strict=True):
+    for surface, coefficients in zip(surfaces, draws_by_surface, strict=True):
         columns.append(link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1)))
     return np.column_stack(columns)
 
 
 def jacobian(surface: Surface, coded: Array) -> Array:
-    """Derivatives (p,) of the prediction at a coded point (k,) by the coefficients."""
+    """Derivatives (p,) of the prediction at a coded point (k,) with respect to the coefficients."""
     row = model_matrix(coded, surface.terms)
     if surface.transform is None:
         return row
@@ -227,7 +237,7 @@ def jacobian(surface: Surface, coded: Array) -> Array:
 
 
 def link_of(surface: Surface) -> Callable[[Array], Array]:
-    """From the scale of the fit to the units of the response."""
+    """Function from the scale of the fit to the units of the response."""
     return identity if surface.transform is None else partial(backward, exponent=surface.transform)
 
 
@@ -238,13 +248,13 @@ def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
 
 
 CHUNK = 50  # draws at a time: a few megabytes of 4096 parts
-LEFT_OUT = 1e-8  # variance of a field of variance 1 that its root may leave out
+LEFT_OUT = 1e-8  # variance that the root of a field of variance 1 may leave out
 MOST_COLUMNS = 300  # of the root of a field
 
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What was simulated at coded points (c, k): responses (c, m) and their standard errors (c, m)."""
+    """Simulated responses (c, m) at coded points (c, k), with their standard errors (c, m)."""
 
     points: Array
     values: Array
@@ -257,43 +267,47 @@ def drawn_responses(
     """Responses (d, n, m) at coded points (n, k) on drawn surfaces, some draws at a time."""
     random = np.random.default_rng(seed)
     places = coded if simulated is None else np.vstack([coded, simulated.points])
-    known = [None] * len(surfaces) if simulated is None else _on_scale_of_fit(surfaces, simulated)
-    # Where no surface misses anything there is no field.
+    values_by_surface = [None] * len(surfaces) if simulated is None else _on_scale_of_fit(surfaces, simulated)
+    # Surfaces without a model error have no field.
     root = field_root(places) if any(surface.model_error for surface in surfaces) else np.zeros((len(places), 1))
-    each = [_Posterior.of(surface, places, root, one) for surface, one in zip(surfaces, known, strict=True)]
+    posteriors = [
+        _Posterior.of(surface, places, root, values)
+        for surface, values in zip(surfaces, values_by_surface, strict=True)
+    ]
     links = [link_of(surface) for surface in surfaces]
-    together = _root(residual_correlation(surfaces))
-    runs, most = (
+    correlation_root = _root(residual_correlation(surfaces))
+    runs, most_freedom = (
         len(surfaces[0].data.values),
         max(max(surface.residual_dof, surface.interval_dof) for surface in surfaces),
     )
     for first in range(0, draws, CHUNK):
         count = min(CHUNK, draws - first)
-        squares = np.cumsum((random.standard_normal((count, most, len(surfaces))) @ together.T) ** 2, axis=1)
+        squares = np.cumsum(
+            (random.standard_normal((count, most_freedom, len(surfaces))) @ correlation_root.T) ** 2, axis=1
+        )
         errors, fields, noise = (
-            random.standard_normal((count, size, len(surfaces))) @ together.T
+            random.standard_normal((count, size, len(surfaces))) @ correlation_root.T
             for size in (runs, root.shape[1], max(len(places) - len(coded), 1))
         )
         columns = [
-            link(one.draws(squares[..., j], errors[..., j], fields[..., j], noise[..., j])[:, : len(coded)])
-            for j, (one, link) in enumerate(zip(each, links, strict=True))
+            link(posterior.draws(squares[..., j], errors[..., j], fields[..., j], noise[..., j])[:, : len(coded)])
+            for j, (posterior, link) in enumerate(zip(posteriors, links, strict=True))
         ]
         yield np.stack(columns, axis=-1)
 
 
 def residual_correlation(surfaces: Sequence[Surface]) -> Array:
-    """Correlation (m, m) of the residuals of all responses over the runs; none with residuals that are all 0."""
+    """Correlation (m, m) of the residuals of all responses over the runs; 0 with residuals that are all 0."""
     residuals = np.array([[run["residual"] for run in surface.diagnostics["runs"]] for surface in surfaces], float)
     size = np.sqrt((residuals**2).sum(axis=1))
     unit = np.divide(residuals, size[:, None], out=np.zeros_like(residuals), where=size[:, None] > 0.0)
-    found = unit @ unit.T
-    np.fill_diagonal(found, 1.0)
-    return np.asarray(found)
+    matrix = unit @ unit.T
+    np.fill_diagonal(matrix, 1.0)
+    return np.asarray(matrix)
 
 
 def coefficient_root(surface: Surface) -> Array:
-    """How the coefficients follow independent errors of variance 1 of the runs, (p, n): times its transpose it is their
-    covariance."""
+    """Root (p, n) of the covariance of the coefficients: their response to independent errors of variance 1 of the runs."""
     data = surface.data
     matrix = np.hstack([model_matrix(data.points, surface.terms), data.block_columns])
     weights = np.ones(len(data.values))
@@ -305,70 +319,82 @@ def coefficient_root(surface: Surface) -> Array:
 
 
 def field_root(coded: Array) -> Array:
-    """Root (n, r) of the correlation of a field at coded points (n, k), by a Cholesky factor with pivots that ends where next to
-    nothing is left (Harbrecht, Peters and Schneider, Applied Numerical Mathematics 62, 2012)."""
-    left, columns = np.ones(len(coded)), np.zeros((len(coded), min(len(coded), MOST_COLUMNS)))
+    """Root (n, r) of the correlation of a field at coded points (n, k).
+
+    It is a pivoted Cholesky factor, cut off at `LEFT_OUT` (Harbrecht, Peters and Schneider, Applied Numerical Mathematics
+    62, 2012).
+    """
+    variance, columns = np.ones(len(coded)), np.zeros((len(coded), min(len(coded), MOST_COLUMNS)))
     for place in range(columns.shape[1]):
-        pivot = int(left.argmax())
-        if left[pivot] <= LEFT_OUT:
+        pivot = int(variance.argmax())
+        if variance[pivot] <= LEFT_OUT:
             return columns[:, :place]
-        rest = correlation(coded, coded[pivot][None])[:, 0] - columns[:, :place] @ columns[pivot, :place]
-        columns[:, place] = rest / np.sqrt(left[pivot])
-        left = (left - columns[:, place] ** 2).clip(0.0)
+        column = correlation(coded, coded[pivot][None])[:, 0] - columns[:, :place] @ columns[pivot, :place]
+        columns[:, place] = column / np.sqrt(variance[pivot])
+        variance = (variance - columns[:, place] ** 2).clip(0.0)
     return columns
 
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """A response at n points on the scale of its fit: ``mean`` (n,), the ``matrix`` (n, p) of the model, the ``roots`` of its
-    coefficients (p, runs) and of its field (n, r), the degrees of freedom of both, and what was ``known`` of the last points:
-    their values and standard errors (c,)."""
+    """A response at n points on the scale of its fit: its ``mean`` (n,) and the ``matrix`` (n, p) of the model.
+
+    ``roots`` of the covariances of its coefficients (p, runs) and of its field (n, r), with the degrees of ``freedom`` of
+    both. ``simulated``: values and standard errors (c,) at the last c points.
+    """
 
     mean: Array
     matrix: Array
     roots: tuple[Array, Array]
     freedom: tuple[int, int]
-    known: tuple[Array, Array] | None
+    simulated: tuple[Array, Array] | None
 
     @classmethod
-    def of(cls, surface: Surface, places: Array, root: Array, known: tuple[Array, Array] | None) -> "_Posterior":
+    def of(cls, surface: Surface, places: Array, root: Array, simulated: tuple[Array, Array] | None) -> "_Posterior":
         matrix, error = model_matrix(places, surface.terms), surface.model_error
         roots = coefficient_root(surface), root * (0.0 if error is None else np.sqrt(error.variance))
         freedom = surface.residual_dof, surface.interval_dof
-        return cls(matrix @ surface.coefficients, matrix, roots, freedom, known)
+        return cls(matrix @ surface.coefficients, matrix, roots, freedom, simulated)
 
     def draws(self, squares: Array, errors: Array, fields: Array, noise: Array) -> Array:
-        """Values (d, n) from squares of normal numbers, summed, (d, f), and normal numbers for the runs (d, runs), the field
-        (d, r) and the values known (d, c)."""
-        wide = [np.sqrt(behind / squares[:, behind - 1])[:, None] for behind in self.freedom]
-        moved = wide[0] * (errors @ self.roots[0].T)
-        found = self.mean + moved @ self.matrix.T + wide[1] * (fields @ self.roots[1].T)
-        if self.known is None:
-            return np.asarray(found)
-        values, error = self.known
-        last = slice(len(self.mean) - len(values), None)
+        """Draws (d, n) of the values, from standard normal numbers.
+
+        ``squares`` (d, f): cumulative sums of their squares; ``errors`` (d, runs), ``fields`` (d, r) and ``noise`` (d, c):
+        numbers for the runs, the field and the simulated values.
+        """
+        widths = [np.sqrt(dof / squares[:, dof - 1])[:, None] for dof in self.freedom]
+        changes = widths[0] * (errors @ self.roots[0].T)
+        draws = self.mean + changes @ self.matrix.T + widths[1] * (fields @ self.roots[1].T)
+        if self.simulated is None:
+            return np.asarray(draws)
+        values, error = self.simulated
+        simulated_rows = slice(len(self.mean) - len(values), None)
         across = self.matrix @ self.roots[0]
-        links = [across @ across[last].T, self.roots[1] @ self.roots[1][last].T]
-        inside = sum(each[:, :, None] ** 2 * link[last] for each, link in zip(wide, links, strict=True))
-        # What is known exactly, and twice, would leave nothing to invert.
-        inside = inside + np.diag(error**2 + 1e-12 * sum(np.trace(link[last]) for link in links))
-        missed = values - found[:, last] - error * noise
-        weights = np.linalg.solve(inside, missed[..., None])[..., 0]
-        return np.asarray(found + sum(each**2 * (weights @ link.T) for each, link in zip(wide, links, strict=True)))
+        links = [across @ across[simulated_rows].T, self.roots[1] @ self.roots[1][simulated_rows].T]
+        covariance = sum(
+            width[:, :, None] ** 2 * link[simulated_rows] for width, link in zip(widths, links, strict=True)
+        )
+        # Two exact values at one point would make the covariance singular.
+        covariance = covariance + np.diag(error**2 + 1e-12 * sum(np.trace(link[simulated_rows]) for link in links))
+        misses = values - draws[:, simulated_rows] - error * noise
+        weights = np.linalg.solve(covariance, misses[..., None])[..., 0]
+        return np.asarray(draws + sum(width**2 * (weights @ link.T) for width, link in zip(widths, links, strict=True)))
 
 
 def _on_scale_of_fit(surfaces: Sequence[Surface], simulated: Simulated) -> list[tuple[Array, Array] | None]:
-    """Values and standard errors (c,) of each response on the scale of its fit; None where a value is not positive and must
-    be."""
-    found: list[tuple[Array, Array] | None] = []
+    """Values and standard errors (c,) of each response on the scale of its fit.
+
+    None for a response whose transform needs positive values and which has another one.
+    """
+    pairs: list[tuple[Array, Array] | None] = []
     for surface, values, errors in zip(surfaces, simulated.values.T, simulated.errors.T, strict=True):
         if surface.transform is None:
-            found.append((values, errors))
+            pairs.append((values, errors))
         elif (values > 0.0).all():
-            found.append((forward(values, surface.transform), errors * slope(values, surface.transform)))
+            pairs.append((forward(values, surface.transform), errors * slope(values, surface.transform)))
         else:
-            found.append(None)
-    return found
+            pairs.append(None)
+    return pairs
 
 
 def _root(matrix: Array) -> Array:
@@ -377,7 +403,7 @@ def _root(matrix: Array) -> Array:
 
 
 def gain_verdict(percent: float, error: float) -> str:
-    """Whether a gain is more than its error."""
+    """Whether a gain exceeds its error, in words."""
     if abs(percent) <= error:
         return "within error"
     return "better" if percent > 0.0 else "worse"
@@ -386,9 +412,11 @@ def gain_verdict(percent: float, error: float) -> str:
 class PredictedGain(Record):
     """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
 
-    ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc, and
-    what the model misses at either point, with the degrees of freedom of `Surface.interval_dof`). ``scatter`` is by how much two single runs at one point differ (pure error of
-    the replicates), and ``within_scatter`` whether the gain is no more; both None where no run is repeated.
+    ``error`` is that of the difference of the two predictions, in which common errors cancel: the contrast c'Vc and the
+    model error at both points, with the degrees of freedom of `Surface.interval_dof`.
+
+    ``scatter``: by how much two single runs at one point differ, by the pure error of replicates. ``within_scatter``:
+    whether the gain is no larger. Both are None if no run is repeated.
     """
 
     response: str = outside_json()
@@ -406,17 +434,19 @@ class PredictedGain(Record):
     @property
     def sentence(self) -> str:
         """The gain in words."""
-        changed = improvement(self.percent, self.error, self.goal)
-        said = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, {changed}"
-        judged = {
-            "within error": "which is inside its own noise",
+        gain = improvement(self.percent, self.error, self.goal)
+        change = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, {gain}"
+        verdict = {
+            "within error": "which is within its error",
             "better": "which is more than its error",
             "worse": "a loss that is more than its error",
         }[self.verdict]
         if self.scatter is None:
-            return f"{said}, {judged}."
-        place = "inside" if self.within_scatter else "outside"
-        return f"{said}, {judged} and {place} the scatter of single runs ({error_alone(self.scatter)} %)."
+            return f"{change}, {verdict}."
+        scatter = f"{error_alone(self.scatter)} %"
+        if self.within_scatter:
+            return f"{change}, {verdict} and inside the scatter of single runs ({scatter})."
+        return f"{change}, {verdict} and outside the scatter of single runs ({scatter})."
 
 
 def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
@@ -431,11 +461,13 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
         rows = [slopes[end, column] * jacobian(surface, coded[end]) for end in (0, 1)]
         scale = 100.0 / abs(float(values[0, index])) if values[0, index] else math.nan
         shared = contrast_error(rows[0] - rows[1], surface.covariance)
-        error = float(stats.t.ppf(0.975, surface.interval_dof)) * math.hypot(shared, _missed(surface, coded, rows))
+        error = float(stats.t.ppf(0.975, surface.interval_dof)) * math.hypot(
+            shared, _model_error_of_difference(surface, coded, rows)
+        )
         pure, scatter = surface.pure_error, None
         if pure["ms"] is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
-            # With weights the mean squares have no unit; the variance of a run has.
+            # Mean squares of a weighted fit have no unit; the variance of a run has.
             variance = pure["ms"] / surface.residual_mean_square * surface.observation_variance
             single = math.sqrt(variance * sum(float(row[constant]) ** 2 for row in rows))
             scatter = float(stats.t.ppf(0.975, pure["df"])) * single
@@ -453,10 +485,10 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
     return gains
 
 
-def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
-    """Standard deviation of the difference of what the model misses at two coded points (2, k).
+def _model_error_of_difference(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
+    """Standard deviation of the difference of the model errors at two coded points (2, k).
 
-    ``rows`` are the derivatives of either cost by the coefficients; that by the constant is that by the field.
+    ``rows``: derivatives of each cost with respect to the coefficients; that of the constant holds for the field too.
     """
     if surface.model_error is None:
         return 0.0
@@ -466,16 +498,20 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
     return math.sqrt(max(variance, 0.0))
 
 
-# What a verdict amounts to.
-AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not significant"}
+# Words of the verdicts in a statement.
+VERDICT_WORDS = {
+    "better": "better beyond its error",
+    "worse": "worse beyond its error",
+    "within error": "not significant",
+}
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:
-    """What the gains amount to, in a sentence."""
+    """The verdicts on the gains, in a sentence; a second one names those that single runs would hide."""
     parts = []
-    for verdict, words in AMOUNT.items():
+    for verdict, words in VERDICT_WORDS.items():
         names = [gain.response for gain in gains if gain.verdict == verdict]
         parts += [f"{words}: {', '.join(names)}"] if names else []
     hidden = [gain.response for gain in gains if gain.within_scatter]
-    tail = f" One run each would not show: {', '.join(hidden)}." if hidden else ""
+    tail = f" Single runs would not show the change of {', '.join(hidden)}." if hidden else ""
     return f"On the surfaces, {'; '.join(parts)}.{tail}"

@@ -1,10 +1,11 @@
-"""Unknown inputs of a scene and what they do to its outputs: ``doe uncertainty``."""
+"""Ranges of a scene's outputs over its unknown inputs, and the share of each input: ``doe uncertainty``."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.clearance import Simulations
+from doe.clearance import Simulations, work_of
+from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown.propagation import (
@@ -20,7 +21,17 @@ from doe.unknown.propagation import (
     sobol,
     spread_of,
 )
-from doe.workflow.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
+from doe.workflow.input_sets import (
+    NORMAL,
+    Case,
+    Sets,
+    declared,
+    override_notes,
+    read_case,
+    replicated_sets,
+    shares_outside,
+    work_of_set,
+)
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.words import are, counted
@@ -28,22 +39,24 @@ from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
 OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
-# Fresh input sets of the emulator, and input sets that are run at most.
+# Fresh input sets of the emulator, and most input sets that run.
 FRESH, MOST = 8192, 512
-# An end of the range is known whose standard error is below this share of its width, unless another is asked for.
+# Default of the standard error of a range's end, as a share of the range's width.
 TARGET = 0.1
-# Share of noise in the variance of an output's single runs beyond which all get more replicates, and how many times as many.
+# Share of noise in an output's variance beyond which all runs get more replicates, and the largest factor on these.
 NOISY, MOST_EFFORT = 0.1, 4
-# Share of the variance that an emulator must explain before nothing is said of the rest.
+# Share of the variance that an emulator explains; a smaller one has a note.
 WHOLE = 0.9
 
 
 @dataclass(frozen=True)
 class OutputRange:
-    """One output: at the scene's own inputs with its errors, its range over all unknown inputs, and which input makes it: by
-    Sobol' ``indices``, where inputs depend on each other by ``shapley`` effects, where emulators are not trusted by none; both
-    in the order of ``keys``, the inputs of its emulator, as shares of the variance over all inputs, of which these together
-    make ``explained``. ``floor``: what an input seems to make that does nothing."""
+    """One output: its ``nominal`` value at the scene's own inputs, and its ``spread`` over all unknown inputs.
+
+    The inputs of its emulator, ``keys``, explain the share ``explained`` of its variance. The share of each is a Sobol'
+    index (``indices``), or a ``shapley`` effect if inputs depend on each other; both are None without a valid emulator.
+    ``floor``: apparent share of an input without effect.
+    """
 
     nominal: Quantity
     spread: Spread
@@ -55,14 +68,16 @@ class OutputRange:
 
     @property
     def shares(self) -> list[Share] | None:
-        """What each input makes: its total index, or its Shapley effect."""
+        """Share of each input: its total index, or its Shapley effect."""
         return self.shapley if self.indices is None else self.indices.total
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Everything a report needs. ``inputs``: all vary in every set; ``screened``: those of no emulator, with the largest share
-    of an output's variance that the main effect of each makes."""
+    """Everything a report needs. ``inputs``: all unknown inputs, which vary in every set.
+
+    ``screened``: by key of the inputs outside all emulators, the largest share of an output's variance by the main effect.
+    """
 
     path: Path
     inputs: list[Input]
@@ -77,11 +92,11 @@ class Uncertainty:
 def find_uncertainty(
     path: Path, overrides: Sequence[str], simulations: Simulations, points: int | None = None, target: float = TARGET
 ) -> Uncertainty:
-    """Range of every output of a scene over its unknown inputs, and which of them makes it.
+    """Range of each output of a scene over its unknown inputs, and the share of each input.
 
-    ``points``: input sets to start from, a power of two, as the scene says where left out; they are doubled, up to 512,
-    until the ends of every range are known to ``target`` of its width. Where noise is more than a tenth of an output's variance
-    all sets get more replicates. Raises InputError, RunError, KeyboardInterrupt.
+    ``points``: input sets to begin with, a power of two; by default those of the scene. They double, up to 512, until the
+    standard errors of the ends of every range are below ``target`` of its width. If noise is more than a tenth of an
+    output's variance, all sets get more replicates. Raises InputError, RunError, KeyboardInterrupt.
     """
     case = read_case(path, OUTPUTS, overrides)
     count = case.uncertain.points if points is None else points
@@ -89,33 +104,37 @@ def find_uncertainty(
     if isinstance(nominal, Failure):
         raise RunError(f"{path}: as the scene says: {nominal.cause}")
     seed, joint, effort = case.uncertain.seed, case.joint(case.every), 1
-    fresh = joint.sets(FRESH, seed + 1)
+    fresh_sets = joint.sets(FRESH, seed + 1)
     while True:
-        sets = replicated(case, joint.sets(count, seed), simulations, effort)
+        sets = replicated_sets(case, joint.sets(count, seed), simulations, effort)
         fitted = [_emulated(case, sets, nominal, place) for place in range(len(OUTPUTS))]
-        spreads = [spread_of(runs, each, fresh, seed) for runs, each in fitted]
-        if effort < MOST_EFFORT and any(each.variance["simulation"] > NOISY for each in spreads):
+        spreads = [spread_of(runs, emulator, fresh_sets, seed) for runs, emulator in fitted]
+        if effort < MOST_EFFORT and any(spread.variance["simulation"] > NOISY for spread in spreads):
             effort *= 2
-        elif count < MOST and any(each.known > target for each in spreads):
+        elif count < MOST and any(spread.relative_error > target for spread in spreads):
             count *= 2
         else:
             break
     outputs = {
-        name: _output(case, _quantity(nominal, name), spread, each, fresh)
-        for name, spread, (_, each) in zip(OUTPUTS, spreads, fitted, strict=True)
+        name: _output(case, _quantity(nominal, name), spread, emulator, fresh_sets)
+        for name, spread, (_, emulator) in zip(OUTPUTS, spreads, fitted, strict=True)
     }
-    covers = {place for _, each in fitted for place in each.columns.tolist()}
-    rest = outside(case, covers, sets.quantiles, sets.signals)
+    covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
+    outside_shares = shares_outside(case, covered_places, sets.quantiles, sets.signals)
     notes = _notes(
-        [*case.notes, *overriding(case, overrides, "the run at the scene's own inputs")], sets, outputs, count, target
+        [*case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
+        sets,
+        outputs,
+        count,
+        target,
     )
-    return Uncertainty(path, case.every, rest, outputs, sets, seed, notes)
+    return Uncertainty(path, case.every, outside_shares, outputs, sets, seed, notes)
 
 
 def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
     numerical = _quantity(nominal, OUTPUTS[place]).numerical_error or 0.0
-    ran = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
-    runs = Runs(sets.quantiles, *ran, (numerical / NORMAL) ** 2)
+    samples = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
+    runs = Runs(sets.quantiles, *samples, (numerical / NORMAL) ** 2)
     return runs, emulated(runs, case.uncertain.inputs, declared(case))
 
 
@@ -123,28 +142,28 @@ def _quantity(nominal: SimulationResult, name: str) -> Quantity:
     return Quantity.from_dict(nominal.as_dict()[name])
 
 
-def _output(case: Case, nominal: Quantity, spread: Spread, fitted: Emulated, fresh: Array) -> OutputRange:
+def _output(case: Case, nominal: Quantity, spread: Spread, fitted: Emulated, fresh_sets: Array) -> OutputRange:
     inputs = [case.every[place] for place in fitted.columns[:-1]]
-    made = explained(fitted, fitted(fresh), residual_variance(fitted.emulator))
-    known, seed = (nominal, spread, [each.key for each in inputs], made), case.uncertain.seed
+    share = explained(fitted, fitted(fresh_sets), residual_variance(fitted.emulator))
+    figures, seed = (nominal, spread, [unknown_input.key for unknown_input in inputs], share), case.uncertain.seed
     if not spread.by_emulator:
-        return OutputRange(*known)
+        return OutputRange(*figures)
     joint = case.joint(inputs)
     if not joint.independent:
         *effects, floor = shapley(fitted, joint, seed)
-        return OutputRange(*known, shapley=effects, floor=floor)
-    found = sobol(fitted, joint.inputs + 1, seed)
-    return OutputRange(*known, Indices(found.first[:-1], found.total[:-1]), floor=found.total[-1])
+        return OutputRange(*figures, shapley=effects, floor=floor)
+    indices = sobol(fitted, joint.inputs + 1, seed)
+    return OutputRange(*figures, Indices(indices.first[:-1], indices.total[:-1]), floor=indices.total[-1])
 
 
 def _notes(
-    before: Collection[str], sets: Sets, outputs: Mapping[str, OutputRange], count: int, target: float
+    case_notes: Collection[str], sets: Sets, outputs: Mapping[str, OutputRange], count: int, target: float
 ) -> tuple[str, ...]:
-    notes = [*before]
-    lost = len(sets.failures) + len(sets.impossible)
-    if lost:
-        why = (*map(str, sets.failures), *sets.impossible)[0]
-        notes.append(f"{counted(lost, 'input set')} gave no result and {are(lost)} left out: {why}")
+    notes = [*case_notes]
+    lost_sets = len(sets.failures) + len(sets.impossible)
+    if lost_sets:
+        cause = (*map(str, sets.failures), *sets.impossible)[0]
+        notes.append(f"{counted(lost_sets, 'input set')} gave no result and {are(lost_sets)} left out: {cause}")
     for name, output in outputs.items():
         spread = output.spread
         if spread.hidden:
@@ -155,16 +174,30 @@ def _notes(
         elif not spread.by_emulator:
             notes.append(
                 f"{name}: its emulator predicts too little (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to "
-                "say which input makes it"
+                "give the shares of inputs"
             )
         elif output.explained < WHOLE:
             notes.append(
-                f"{name}: the inputs named make {100.0 * output.explained:.0f} % of its variance; other inputs "
-                "and what the emulator misses make the rest"
+                f"{name}: the inputs named explain {100.0 * output.explained:.0f} % of its variance; the rest is other "
+                "inputs and the error of the emulator"
             )
-        if spread.known > target and not spread.hidden:
+        if spread.relative_error > target and not spread.hidden:
             notes.append(
-                f"{name}: after {count} input sets an end of its range is known to {100.0 * spread.known:.0f} % of "
-                "its width only"
+                f"{name}: after {count} input sets the standard error of an end of its range is "
+                f"{100.0 * spread.relative_error:.0f} % of its width"
             )
     return tuple(notes)
+
+
+def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None) -> list[Stage]:
+    """Stages of ``doe uncertainty`` with ``points`` input sets, by default those of the scene. Raises InputError.
+
+    The sets and their replicates may double later.
+    """
+    case = read_case(path, OUTPUTS, overrides)
+    count = case.uncertain.points if points is None else points
+    return [
+        Stage.of("as the scene says", 1, work_of(case.scene)),
+        Stage.of("input sets", count, work_of_set(case), most=MOST_EFFORT * max(count, MOST)),
+        Stage(ANSWER, besides_s=ANSWER_S),
+    ]

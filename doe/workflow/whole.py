@@ -1,4 +1,8 @@
-"""The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table to compare with. Clearances in operation, the chains solved at the pick, and what is wrong with a study before anything runs."""
+"""The whole study: from the design over runs, surfaces, front and pick to tolerances and dimension chains.
+
+Its faults are found before anything runs. Its result also holds the clearances in operation and the comparison with a
+published table.
+"""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,13 +19,12 @@ from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
-from doe.running.keeper import AgendaKeeper
-from doe.running.runner import ANSWER, Progress, Stage
+from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
 from doe.running.store import Failure, Store
 from doe.study_file import Study
 from doe.study_file.sections import chain_table
 from doe.threads import one_thread
-from doe.workflow.adaptive import Adaptive, Compared, advice, check_adaptive, compared, find_adaptive
+from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
     Confirmed,
     Gain,
@@ -34,32 +37,40 @@ from doe.workflow.confirmation import (
     verdict_of,
     whirl_sentence,
 )
-from doe.workflow.front import find_front, with_survival
-from doe.workflow.goals import check_goals, region_of
-from doe.workflow.pick import Chosen, Edge, SearchedPick, choose, draws_about, edge_of, neighbourhood, widest_of
+from doe.workflow.front import check_goals, find_front, with_survival
+from doe.workflow.pick import (
+    Edge,
+    SearchedPick,
+    Selection,
+    choose,
+    draws_about,
+    edge_of,
+    neighbourhood,
+    widest_tolerances_of,
+)
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
-from doe.workflow.runs import STORE, Runs, check_given, check_runs, design_of, ordered_runs, run_design
+from doe.workflow.runs import STORE, Runs, check_augment, check_runs, design_of, ordered_runs, region_of, run_design
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
-from doe.workflow.surfaces import Beside, beside, fit_surfaces, reference_runs, with_rivals
+from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.records import Record
 from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
-from rbdyn.scene.notes import catalogued
+from rbdyn.scene.notes import catalogue_entry
 
 RADIAL = "bearing.radial_clearance_mm"
-# Which clearance of a scene a key holds as drawn.
+# Clearance of a scene by the key of its value on the drawing.
 CLEARANCES = {RADIAL: "radial", "cage.guide_clearance_mm": "guide", "cage.pocket_clearance_mm": "pocket"}
 
 
 class OperatingClearances(Record):
     """Factors that are clearances, at the baseline and at the pick.
 
-    ``operating``: by name of the factor the clearance in operation [mm] by name of the point; empty without [mounting], which
-    alone makes it differ. ``class_sentence``: into which class of ISO 5753-1 the pick's radial clearance falls; empty where
-    that is no factor or the bore is unknown.
+    ``operating``: by factor, the clearance in operation [mm] by name of the point; empty without [mounting], because
+    nothing else changes it. ``class_sentence``: the class of the pick's radial clearance by ISO 5753-1; empty if that is
+    no factor or the bore is unknown.
     """
 
     operating: dict[str, dict[str, float]]
@@ -67,7 +78,7 @@ class OperatingClearances(Record):
 
 
 def operating_clearances(study: Study, points: Mapping[str, Scene]) -> OperatingClearances:
-    """Of scenes by name of their point, "pick" among them."""
+    """Clearances in operation of scenes by name of their point, "pick" among them."""
     operating = {
         factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
         for factor in study.file.factor
@@ -76,37 +87,37 @@ def operating_clearances(study: Study, points: Mapping[str, Scene]) -> Operating
     radial = any(factor.key == RADIAL for factor in study.file.factor)
     pick = points["pick"]
     bore, drawn_um = bore_of(pick), 1e3 * pick.bearing.radial_clearance_mm
-    named = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
-    return OperatingClearances(operating, named)
+    class_words = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
+    return OperatingClearances(operating, class_words)
 
 
 def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
-    """The scenes of both points (k,)."""
+    """Scenes of the baseline and of the pick (k,), by name."""
     return {
-        "baseline": clearance.confirmation_scene(study.at(()), baseline),
+        "baseline": clearance.confirmation_scene(study.with_levels(()), baseline),
         "pick": clearance.confirmation_scene(study, pick),
     }
 
 
 def bore_of(scene: Scene) -> float | None:
-    """Bore of the bearing [mm]; None where the scene does not state it."""
+    """Bore of the bearing [mm]; None if the scene does not state it."""
     if scene.mounting is not None:
         return scene.mounting.bore_mm
-    listed = catalogued(scene.bearing)
+    listed = catalogue_entry(scene.bearing)
     return None if listed is None else listed[1].bore
 
 
 def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
-    """Which classes of ISO 5753-1 hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
-    where = f"ISO 5753-1 at a bore of {bore:g} mm: the pick's radial clearance of {drawn_um:.3g} um"
+    """The classes of ISO 5753-1 that hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
     try:
         classes = classes_at(bore, drawn_um, kind)
     except MethodError:
         return ""
+    clearance_words = f"ISO 5753-1 at a bore of {bore:g} mm: the pick's radial clearance of {drawn_um:.3g} um"
     if not classes:
-        return f"{where} falls in no class."
-    first, *others = (f"{each.name} ({each.lower:g} to {each.upper:g} um)" for each in classes)
-    return f"{where} falls in {first}{f', also in {others[0]}' if others else ''}."
+        return f"{clearance_words} falls in no class."
+    first, *others = (f"{iso_class.name} ({iso_class.lower:g} to {iso_class.upper:g} um)" for iso_class in classes)
+    return f"{clearance_words} falls in {first}{f', also in {others[0]}' if others else ''}."
 
 
 def _changes(scene: Scene, key: str) -> bool:
@@ -120,9 +131,9 @@ def _operating_mm(scene: Scene, key: str) -> float:
 
 
 def check_chains(study: Study) -> None:
-    """Raises InputError for a chain that has no solution at the centre, or whose half width nothing gives.
+    """Raises InputError for a chain without a solution at the centre, or without a half width.
 
-    One whose half width is still to be found is tried with the widest that the region allows.
+    If the study computes the half width later, the widest in the region stands for it.
     """
     computed_later = study.file.tolerances is not None
     half_widths = region_of(study) * study.step if computed_later else np.full(study.step.size, np.nan)
@@ -133,18 +144,19 @@ def check_chains(study: Study) -> None:
 def solve_chains(
     study: Study, pick: Array, tolerances: WidestTolerances | None
 ) -> tuple[dict[str, ChainResult], list[str]]:
-    """Every chain by name at the picked point (k,), and why any has no parts."""
+    """Every chain by name at the picked point (k,), and notes on chains without a solution."""
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
     solved, notes = {}, []
     for number, chain in enumerate(study.file.chain):
         if (place := study.factors.index(chain.factor)) in study.inactive:
             notes.append(f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories")
             continue
-        widest, given = half_widths[place], chain.half_width_mm
-        if given is not None and given > widest:
-            why = f"wider than the {widest:.3g} within which the gains are kept as [tolerances] asks"
-            where = f"{study.path}: chain {chain.name}: half_width_mm = {given:g}"
-            notes.append(f"{where}: {why}; narrow it, or keep less")
+        limit, half_width = half_widths[place], chain.half_width_mm
+        if half_width is not None and half_width > limit:
+            notes.append(
+                f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
+                "the gains are kept as [tolerances] asks; narrow it, or lower keep"
+            )
         try:
             parts = _chain(study, number, pick, half_widths)
             solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
@@ -166,7 +178,10 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
 
 
 def check_study(study: Study, adaptive: bool = False) -> Runs | None:
-    """The published runs, if any; ``adaptive``: also of that search. Raises InputError with all faults of keys, responses, scenes, design and chains."""
+    """The published runs, if any; ``adaptive``: whether the study also searches adaptively.
+
+    Raises InputError with all faults of keys, responses, scenes, design and chains.
+    """
     check_all(
         (
             lambda: check_runs(study, ordered_runs(study).design),
@@ -182,10 +197,11 @@ def check_study(study: Study, adaptive: bool = False) -> Runs | None:
 class StudyResult:
     """Everything a report needs.
 
-    ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
-    gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
-    None where the study asks for none, ``adaptive``, what it is ``compared`` with and its ``searched_pick`` unless it was run, ``robust``
-    where nothing is declared as unknown and it was not wanted.
+    ``inputs``: digest of the study, its files and the code. ``confirmed`` and ``gains`` are by name of the point,
+    "baseline" (without gains) and "pick" first. ``tries``: points simulated as the pick until one kept its limits.
+
+    ``tolerances`` is None if the study asks for none. ``adaptive``, ``searched_pick`` and ``front_comparison`` are None
+    without the adaptive search, ``robust`` without the robust judgement.
     """
 
     study: Study
@@ -196,35 +212,39 @@ class StudyResult:
     front: ParetoFront
     adaptive: Adaptive | None
     searched_pick: SearchedPick | None
-    compared: Compared | None
+    front_comparison: FrontComparison | None
     robust: Robust | None
     edge: Edge
-    tried: int
+    tries: int
     confirmed: Mapping[str, Confirmed]
     gains: Mapping[str, list[Gain]]
     tolerances: WidestTolerances | None
     chains: Mapping[str, ChainResult]
-    beside: list[Beside]
+    published_comparisons: list[PublishedComparison]
     reference_values: Array | None
     failures: tuple[Failure, ...]
     notes: tuple[str, ...]
     cost: Mapping[str, float]
 
     def __repr__(self) -> str:
-        told = [
+        changes = [
             f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
             for gain in self.gains["pick"]
         ]
-        return f"<StudyResult: {', '.join([*told, *([self.limits_sentence] if self.limits_sentence else [])])}>"
+        return f"<StudyResult: {', '.join([*changes, *([self.limits_sentence] if self.limits_sentence else [])])}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: factors and simulated responses of baseline and pick, and what the pick gains."""
+        """The table of a notebook: factors and simulated responses of baseline and pick, and the gains of the pick."""
         places = zip(self.study.factors, self.baseline.point.tolist(), self.pick.point.tolist(), strict=True)
-        rows = [(label(name), shown(before), shown(after), "") for name, before, after in places]
-        both = [each for point in (self.baseline, self.pick) for each in (point.values.tolist(), point.error.tolist())]
-        gained = {each.response: improvement(each.percent, each.error, each.goal) for each in self.gains["pick"]}
-        for name, value, error, new, new_error in zip(self.study.responses, *both, strict=True):
-            rows.append((label(name), with_error(value, error), with_error(new, new_error), gained.get(name, "")))
+        rows = [(label(name), shown(base), shown(picked), "") for name, base, picked in places]
+        columns = [
+            column for point in (self.baseline, self.pick) for column in (point.values.tolist(), point.error.tolist())
+        ]
+        gained = {gain.response: improvement(gain.percent, gain.error, gain.goal) for gain in self.gains["pick"]}
+        for name, value, error, pick_value, pick_error in zip(self.study.responses, *columns, strict=True):
+            rows.append(
+                (label(name), with_error(value, error), with_error(pick_value, pick_error), gained.get(name, ""))
+            )
         return html_table("study: values ± 95 %, simulated", ("", "baseline", "pick", "change"), rows)
 
     @property
@@ -250,20 +270,20 @@ class StudyResult:
 
     @property
     def verdict(self) -> Verdict:
-        """What became of the limits at the pick; a study that did not keep them has failed."""
+        """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
         return verdict_of(self.limits)
 
     @property
     def whirl_sentence(self) -> str:
-        """That the whirl which the study improves is a jitter; empty where it is none, or not asked for."""
+        """A warning that the whirl with a goal is that of a trembling cage; else empty."""
         return whirl_sentence(self.study, self.confirmed)
 
     @property
     def limits_sentence(self) -> str:
-        """The same in words, and how likely they are kept over the unknown inputs; empty without limits."""
-        judged = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
+        """The verdicts in words, with the probability of keeping the limits over the unknown inputs; empty without limits."""
+        verdict_words = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tries)
         odds = None if self.robust is None else self.robust.odds
-        return f"{judged} {odds_sentence(self.study, odds)}".strip()
+        return f"{verdict_words} {odds_sentence(self.study, odds)}".strip()
 
 
 @one_thread
@@ -278,15 +298,15 @@ def run_study(
     robust: bool = False,
     agenda: AgendaKeeper | None = None,
 ) -> StudyResult:
-    """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
+    """Run the whole study; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster.
 
-    ``retry``: run those again that failed before. ``adaptive``: also search the front of the simulator
-    itself. ``robust``: judge the pick over the unknown inputs, which is also done where something is declared so. ``agenda``:
-    where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
+    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``:
+    judge the pick over the unknown inputs; also done if any are declared. ``agenda``: counts all runs. Raises InputError,
+    RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
-    check_given(study, folder)
+    check_augment(study, folder)
     if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
@@ -294,45 +314,45 @@ def run_study(
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
     turns = runs.turns
-    surfaces, found = _surfaces_and_front(study, runs, clock)
+    surfaces, surface_front = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
         searched = find_adaptive(study, runs, simulations) if adaptive else None
         if searched is not None:
-            study, runs, surfaces, found = _with_its_categories(searched, runs, surfaces, found)
+            study, runs, surfaces, surface_front = _with_its_categories(searched, runs, surfaces, surface_front)
             clock.lap("adaptive_s")
-        chosen = choose(study, surfaces, found, searched, simulations)
-        confirmed, pick = chosen.confirmed, chosen.confirmed["pick"].point
-        edge = _edge(study, surfaces, chosen, searched, simulations)
+        selection = choose(study, surfaces, surface_front, searched, simulations)
+        confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
+        edge = _edge(study, surfaces, selection, searched, simulations)
         clock.lap("confirmation_s")
-        judged = judge(study, pick, simulations) if robust else None
+        robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
-    lost = [failure for each in (searched, judged) if each for failure in each.failures]
+    step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,
         inputs=inputs,
         design=design_of(study),
         runs=runs,
         surfaces=surfaces,
-        front=with_survival(study, surfaces, chosen.front, confirmed),
+        front=with_survival(study, surfaces, selection.front, confirmed),
         adaptive=searched,
-        searched_pick=chosen.searched,
-        compared=None if searched is None else compared(study, searched, found.points),
-        robust=judged,
+        searched_pick=selection.searched,
+        front_comparison=None if searched is None else compare_fronts(study, searched, surface_front.points),
+        robust=robustness,
         edge=edge,
-        tried=chosen.tried,
+        tries=selection.tries,
         confirmed=confirmed,
         gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
-        beside=[] if reference is None else beside(study, runs, reference),
+        published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=(*runs.failures, *lost, *chosen.failures),
-        notes=(*runs.notes, *notes, *_offers(study, surfaces, searched, judged)),
+        failures=(*runs.failures, *step_failures, *selection.failures),
+        notes=(*runs.notes, *notes, *_advice(study, surfaces, searched, robustness)),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
 
@@ -345,26 +365,26 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _offers(study: Study, surfaces: list[Surface], searched: Adaptive | None, judged: Robust | None) -> list[str]:
-    """What further searches would bring that were not made."""
-    return [*([] if searched else advice(study, surfaces)), *([] if judged else robust_advice(study))]
+def _advice(study: Study, surfaces: list[Surface], searched: Adaptive | None, robustness: Robust | None) -> list[str]:
+    """Advice on an adaptive search and a robust judgement, where these were not made."""
+    return [*([] if searched else advice(study, surfaces)), *([] if robustness else robust_advice(study))]
 
 
 def _with_its_categories(
-    searched: Adaptive, runs: Runs, surfaces: list[Surface], found: ParetoFront
+    searched: Adaptive, runs: Runs, surfaces: list[Surface], surface_front: ParetoFront
 ) -> tuple[Study, Runs, list[Surface], ParetoFront]:
-    """Study, runs, surfaces and their front with the categories of a search's pick."""
+    """Study, runs, surfaces and front with the categories of the search's pick."""
     if searched.runs is not runs:
         surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
-        found = find_front(searched.study, surfaces)
-    return searched.study, searched.runs, surfaces, found
+        surface_front = find_front(searched.study, surfaces)
+    return searched.study, searched.runs, surfaces, surface_front
 
 
 def _edge(
-    study: Study, surfaces: list[Surface], chosen: Chosen, searched: Adaptive | None, simulations: Simulations
+    study: Study, surfaces: list[Surface], selection: Selection, searched: Adaptive | None, simulations: Simulations
 ) -> Edge:
-    """Where the pick lies at the edge of what was searched; the simulator shows what is beyond where it was searched."""
-    pick, front = chosen.confirmed["pick"], chosen.front.points
+    """The edge of the region at the pick; after an adaptive search, the change beyond it is simulated."""
+    pick, front = selection.confirmed["pick"], selection.front.points
     if searched is None:
         return edge_of(study, surfaces, pick, front, None, None)
     return edge_of(study, surfaces, pick, front, searched.front.points, simulations, searched.edges)
@@ -373,22 +393,22 @@ def _edge(
 def _tolerances(
     study: Study, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
 ) -> WidestTolerances | None:
-    pick, wished = confirmed["pick"], study.file.tolerances
-    if wished is None:
+    pick, settings = confirmed["pick"], study.file.tolerances
+    if settings is None:
         return None
     if searched is None:
-        return widest_of(study, surfaces, pick.point, wished, confirmed)
-    here = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
-    drawn = draws_about(study, searched, here, pick, confirmed["baseline"])
-    return widest_of(study, surfaces, pick.point, wished, confirmed, here, drawn)
+        return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed)
+    neighbours = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
+    draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
+    return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
-    return {name: gains(study, confirmed["baseline"], each) for name, each in confirmed.items() if name != "baseline"}
+    return {name: gains(study, confirmed["baseline"], point) for name, point in confirmed.items() if name != "baseline"}
 
 
 class _Clock:
-    """Wall time of each stage [s]; stages without runs are entered in the agenda."""
+    """Wall time of each stage [s]; it also enters stages without runs in the agenda."""
 
     def __init__(self, agenda: AgendaKeeper | None) -> None:
         self._agenda = agenda
@@ -396,21 +416,21 @@ class _Clock:
         self._laps: dict[str, float] = {}
 
     def plan(self, stages: Sequence[Stage]) -> None:
-        """The stages to come."""
+        """Plan the stages to come in the agenda."""
         if self._agenda is not None:
             self._agenda.plan(stages)
 
-    def lap(self, name: str, following: str = "") -> None:
-        """The stage ``name`` ends here, and the ``following`` one of the agenda begins."""
+    def lap(self, name: str, next_stage: str = "") -> None:
+        """The stage ``name`` ends here, and the ``next_stage`` of the agenda begins."""
         now = time.perf_counter()
         self._laps[name], self._last = now - self._last, now
-        self.enter(following)
+        self.enter(next_stage)
 
-    def enter(self, stage: str) -> None:
-        """The ``stage`` of the agenda begins, if it is among those planned."""
-        if self._agenda is not None and stage in [each.name for each in self._agenda.agenda.stages]:
-            self._agenda.enter(stage)
+    def enter(self, name: str) -> None:
+        """Enter the stage of that name in the agenda, if it is planned."""
+        if self._agenda is not None and name in [stage.name for stage in self._agenda.agenda.stages]:
+            self._agenda.enter(name)
 
     def total(self) -> dict[str, float]:
-        """All stages and the whole."""
+        """Wall times [s] of all stages by name, and of the whole."""
         return {**self._laps, "total_s": time.perf_counter() - self._started}

@@ -25,12 +25,13 @@ from rbdyn.accuracy.ball_solvers import WHOLE, Problem, Solver, Success, causes,
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.blocks import Table
 from rbdyn.properties.materials import MATERIALS, Material
-from rbdyn.quasistatic.rivals.finite_search import loaded
-from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
+from rbdyn.quasistatic.finite_search import loaded
+from rbdyn.quasistatic.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import row_model
 from rbdyn.quasistatic.row.ring import component_lengths
-from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, BallScene, Prescribed
+from rbdyn.scene.ball import BallBearing, BallModel, BallScene
+from rbdyn.scene.operation import BallOperation, Prescribed
 
 CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")
 LOADS = ("radial", "axial", "combined", "moment", "preload_force", "preload_displacement")
@@ -80,7 +81,7 @@ def posed(case: Case, ball: Material | None = None, rings: Material | None = Non
     operation = BallOperation.model_construct(**{**case.operation, "prescribed": prescribed})
     drawing, model = BallBearing.model_construct(**case.bearing), BallModel.model_construct(**case.model)
     built = row_model(drawing, model, ball, rings, rings, *operation.speeds)
-    load, given = np.array([*operation.load, *operation.moment]), np.array(operation.given, float)
+    load, given = np.array([*operation.load, *operation.moment]), np.array(operation.displacements, float)
     return Problem(built.row, built.control, load, given)
 
 
@@ -251,7 +252,7 @@ def _elsewhere(runs: Sequence[Run], ours: Sequence[Run]) -> int:
     """Equilibria that differ from ours on the same scene."""
     count = 0
     for r, own in zip(runs, ours, strict=False):
-        if r.solution.found and own.solution.found:
+        if r.solution.is_equilibrium and own.solution.is_equilibrium:
             gap = np.abs(r.solution.outer_load - own.solution.outer_load).max()
             count += bool(gap > SAME * own.solution.outer_load.max())
     return count
@@ -261,8 +262,8 @@ def _refused_by_rule_a(runs: Sequence[Run], problems: Sequence[Problem]) -> int:
     """Equilibria in which some deflection is not above 0."""
     count = 0
     for r, problem in zip(runs, problems, strict=False):
-        if r.solution.found:
-            system = system_of(problem.row, problem.load, problem.given)
+        if r.solution.is_equilibrium:
+            system = system_of(problem.row, problem.load, problem.fixed)
             q = r.solution.displacement * component_lengths(problem.row.lever)
             count += not loaded(system, unknowns(system, q, r.solution.balls))
     return count
@@ -283,7 +284,7 @@ def _share_table(title: str, kinds: Sequence[str], runs: dict[str, list[Run]], k
     """Share that each solver solves of the scenes of each kind."""
 
     def share(series: list[Run], kind: str) -> str:
-        solved = [r.solution.found for r in series if kind_of(r.case) == kind]
+        solved = [r.solution.is_equilibrium for r in series if kind_of(r.case) == kind]
         return f"{100.0 * np.mean(solved):.1f} %" if solved else ""
 
     return Table(title, ("", *runs), [[kind, *(share(series, kind) for series in runs.values())] for kind in kinds])
@@ -307,8 +308,7 @@ def _flat(of: Run) -> dict[str, Any]:
 
 def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     """Share of the scenes that each solver has solved within a time [us]."""
-    from rbdyn.plots.error_against_time import METHOD_COLOURS, Named
-    from rbdyn.plots.style import label_ends, plain, plt, save
+    from rbdyn.plots.style import METHOD_COLOURS, Named, label_ends, plain, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     axis.set(xscale="log", xlabel="time of a call [us]", ylim=(0.0, 103.0))
@@ -316,7 +316,7 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     plain(axis)
     ends: list[Named] = []
     for (name, series), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
-        solved = np.sort([run.solve_us for run in series if run.solution.found])
+        solved = np.sort([run.solve_us for run in series if run.solution.is_equilibrium])
         if solved.size:
             share = 100.0 * np.arange(1, solved.size + 1) / len(series)
             axis.step(solved, share, where="post", color=colour, linewidth=2.0 if colour == "black" else 1.2)

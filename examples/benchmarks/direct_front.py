@@ -21,20 +21,19 @@ from direct_search import SurrogateLoss, compare_with_surrogate, direct_front, r
 
 from doe.clearance import Simulations, read_scene, scene_at
 from doe.pareto import ParetoFront
+from doe.pareto.front import SimulatedFront
 from doe.pareto.search import spread
-from doe.pareto.simulated import SimulatedFront
-from doe.report.steps.confirmation import point_record
+from doe.report.sections.answer import point_record
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store, grouped
 from doe.study_file import Study
 from doe.workflow.adaptive import Evaluator
 from doe.workflow.front import find_front
-from doe.workflow.goals import goals_of, region_of
-from doe.workflow.runs import STORE, run_design
-from doe.workflow.surfaces import fit_surfaces, standard_errors
+from doe.workflow.runs import STORE, region_of, run_design
+from doe.workflow.surfaces import fit_surfaces, goals_of, standard_errors
 from rbdyn.base.arrays import Array
+from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError
-from rbdyn.base.terminal import progress_bar
 from rbdyn.base.words import counted, with_error
 from rbdyn.result import read_json, write_json
 from rbdyn.scene import Scene

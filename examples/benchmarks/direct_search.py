@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from doe.pareto.front import DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import check_search, dominance, error_aware_dominance, non_dominated, order, ranks, spread
-from doe.pareto.simulated import DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import signed_with_error

@@ -12,7 +12,7 @@ from dataclasses import replace
 from studies import EXAMPLES, main
 
 from rbdyn.accuracy.report import Report, Reporter, records, reported
-from rbdyn.accuracy.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery
+from rbdyn.accuracy.variants import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery
 from rbdyn.base.blocks import Table
 from rbdyn.scene import Scene
 

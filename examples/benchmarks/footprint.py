@@ -29,8 +29,8 @@ class Footprint:
 
 def footprint(scene: "Scene", bearing: "RollerBearing") -> Footprint:
     """Sizes for a scene whose bearing has been run. Raises KeyError where nothing was compiled for its laws."""
-    from rbdyn.dynamics.integrators.method import explicit_method, method_of
     from rbdyn.dynamics.parameters.state import layout_of
+    from rbdyn.dynamics.run import explicit_method, method_of
 
     pair = method_of(explicit_method(scene.numerics.method, scene.numerics.rtol), scene, bearing)
     return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))
@@ -105,8 +105,8 @@ def study(
     scene: "Scene", progress: "Reporter" = None, options: "Mapping[str, Sequence[str]] | None" = None
 ) -> "Report":
     """A row an option that the scene allows, the plain scene first. Raises RunError, KeyboardInterrupt."""
-    from rbdyn.accuracy.options import OPTIONS, lawful
     from rbdyn.accuracy.report import Progress, reported
+    from rbdyn.accuracy.variants import OPTIONS, lawful
     from rbdyn.base.blocks import Table
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare

@@ -166,7 +166,7 @@ def uncertain_keys(size: int, folder: Path) -> list[str]:
 
 def python(code: str, *arguments: object) -> list[str]:
     """A piece of code of its own; ``faults`` lets a fault of the input end as a command's does."""
-    head = "import sys\nfrom pathlib import Path\nfrom rbdyn.base.terminal import guarded\n"
+    head = "import sys\nfrom pathlib import Path\nfrom rbdyn.base.command import guarded\n"
     return [sys.executable, "-c", f"{head}with guarded(False):\n    {code}", *map(str, arguments)]
 
 

@@ -95,7 +95,7 @@ def independent(
     study: Study, pick: Sequence[float], sets: int, seed: int, workers: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Outputs (n, m) of the baseline and of the pick at sets of all unknown inputs."""
-    path = study.beside(study.scene.file)
+    path = study.path_of(study.scene.file)
     scene, table = rbdyn.Scene.load(path), tomllib.loads(path.read_text(encoding="utf-8"))
     keys = [factor.key for factor in study.file.factor]
     inputs = inputs_of(scene, table, scene.uncertain or Uncertain(), dict.fromkeys(keys, "a factor"))
@@ -114,7 +114,7 @@ def independent(
 
 def answers(study: Study, pick: Sequence[float], seed: int, out: Path, workers: int) -> tuple[Robust, Uncertainty]:
     """What the tool states, with the seed of its input sets."""
-    path = study.beside(study.scene.file)
+    path = study.path_of(study.scene.file)
     declared = study.file.uncertain or rbdyn.Scene.load(path).uncertain or Uncertain()
     robust = study.file.robust.model_copy(update={"front": "none"})
     file = study.file.model_copy(update={"uncertain": declared.model_copy(update={"seed": seed}), "robust": robust})
@@ -131,7 +131,7 @@ def chances(study: Study, base: np.ndarray, pick: np.ndarray, tool: Mapping[int,
     side = [1.0 if goals[name] == "max" else -1.0 for name in names]
     columns = [OUTPUTS.index(name) for name in names]
     wins = (pick - base)[:, columns] * side > 0.0
-    stated = {seed: [*each.better.each, each.better.all] for seed, each in tool.items()}
+    stated = {seed: [*each.better.gains, each.better.all] for seed, each in tool.items()}
     for place, name in enumerate([*names, "all"]):
         won = wins.all(axis=1) if place == len(names) else wins[:, place]
         parts = [f"{name:24}", _chance(float(won.mean()), *wilson(float(won.mean()), len(won)))]

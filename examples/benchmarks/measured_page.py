@@ -124,7 +124,7 @@ def _markdown(report: Report) -> str:
 
 def main() -> int:
     """Write the page; returns the exit code."""
-    from rbdyn.base.terminal import progress_bar
+    from rbdyn.base.command import progress_bar
 
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("page", type=Path, metavar="FILE", help="the page, Markdown")

@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from studies import main
 
-from rbdyn.accuracy.integrators import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
+from rbdyn.accuracy.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.tolerances import (
+    MARGIN,
     NEGLIGIBLE,
-    SOUGHT,
     Bias,
     bias_columns,
     bias_of,
@@ -82,7 +82,7 @@ def bias_rows(
     return rows
 
 
-def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = MARGIN) -> str:
     """The cheapest setting of each method shown to be without bias, and what errors hide of the rest."""
     best: dict[str, Row] = {}
     hidden = []
@@ -106,7 +106,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     return f"Measured {limits}, a turn: {cheapest}." + (f" Other settings are {rest}." if rest else "")
 
 
-def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
+def table(rows: Sequence[Row], sought: float = MARGIN) -> Table:
     """Table for the terminal, failures in their places."""
 
     def where_found(text: Callable[[Bias], str]) -> Callable[[Row], str]:
@@ -133,7 +133,7 @@ def _row(scene: Scene, method: str, setting: str, runs: Sequence[Replicate], ref
     )
 
 
-def study(scene: Scene, progress: Reporter = None, sought: float = SOUGHT) -> Report:
+def study(scene: Scene, progress: Reporter = None, sought: float = MARGIN) -> Report:
     """Bias of every method at every setting, judged to ``sought``. Raises as ``bias_rows``."""
     rows = bias_rows(scene, progress=progress)
     sentence, written = conclusion(rows, scene, sought), records(rows)

@@ -10,8 +10,7 @@ import math
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival
-from rbdyn.quasistatic.rivals.plain_newton import unloaded
+from rbdyn.quasistatic.full_system import Stop, System, evaluate, rival, unloaded
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.row.newton import ACCEPTED

@@ -27,15 +27,22 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from rbdyn.dynamics.companions import LEAST_DAMPING, Companions, companions_of, longest_step, usual_companions
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.error_bars import FIGURES
-from rbdyn.dynamics.statistics.metrics import Replicate, quantity
+from rbdyn.dynamics.statistics.metrics import (
+    LEAST_DAMPING,
+    Companions,
+    Replicate,
+    companions_of,
+    longest_step,
+    quantity,
+    usual_companions,
+)
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -131,7 +138,7 @@ def replicates(scene: Scene, count: int, plan: Companions | None, workers: int) 
     bearing = roller_bearing(scene)
     runs: dict[int, Replicate] = {}
 
-    def ended(one: Ended[Replicate]) -> None:
+    def ended(one: Outcome[Replicate]) -> None:
         runs[one.place] = one.result()
 
     tasks = [partial(run_one, scene, bearing, index, plan, Stop()) for index in range(count)]

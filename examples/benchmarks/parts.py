@@ -18,7 +18,7 @@ from doe.pareto.manufacture import Interval, percent, random_offsets
 from doe.running.store import Failure, Store
 from doe.study_file import Study
 from doe.unknown.decision import wilson
-from doe.workflow.goals import goals_of
+from doe.workflow.surfaces import goals_of
 
 # Seeds that no run of a study has.
 SEEDS = 7_000_000

@@ -17,7 +17,7 @@ import numpy as np
 from studies import main
 
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
-from rbdyn.accuracy.tolerances import NORMAL, OUTPUTS, SOUGHT, about, percent
+from rbdyn.accuracy.tolerances import MARGIN, NORMAL, OUTPUTS, about, percent
 from rbdyn.base.arrays import Array
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import with_error
@@ -67,7 +67,7 @@ class Slope(Record):
 
 
 def study(
-    scene: Scene, progress: Reporter = None, turns: Sequence[float] = TURNS, pool: int = POOL, sought: float = SOUGHT
+    scene: Scene, progress: Reporter = None, turns: Sequence[float] = TURNS, pool: int = POOL, sought: float = MARGIN
 ) -> Report:
     """Half-widths, how they fall, and what a choice of replicates buys. Raises RunError, KeyboardInterrupt."""
     values, cpu_s = pool_of_runs(scene, turns, pool, progress)
@@ -151,7 +151,7 @@ def scatter_error(pool: int) -> float:
 
 
 def conclusion(
-    rows: Sequence[Row], slopes: dict[str, Slope], scene: Scene, pool: int = POOL, sought: float = SOUGHT
+    rows: Sequence[Row], slopes: dict[str, Slope], scene: Scene, pool: int = POOL, sought: float = MARGIN
 ) -> list[str]:
     """Whether the error falls as it should, and what the scene's choice among the rows buys, as far as the scatter of
     ``pool`` replicates is known."""
@@ -189,8 +189,21 @@ def _draw(rows: Sequence[Row], path: Any) -> None:
     """Half-width of each output against processor time, a line a length of run; dashed: one over root of time."""
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    from rbdyn.plots.error_against_time import NAMES, Named, logarithmic
-    from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, label_ends, plt, save
+    from rbdyn.plots.style import (
+        BLUE,
+        GREEN,
+        GREY,
+        NAMES,
+        ORANGE,
+        PURPLE,
+        SKY,
+        VERMILION,
+        Named,
+        label_ends,
+        logarithmic,
+        plt,
+        save,
+    )
 
     names = list(rows[0].half_width)
     lengths = list(dict.fromkeys(row.turns for row in rows))

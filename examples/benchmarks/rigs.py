@@ -120,7 +120,7 @@ def simulated_rig(folder: Path, kind: str, number: int) -> tuple[Path, Path, dic
 def simulated(folder: Path, kind: str, number: int) -> Answer:
     """Calibrate a rig of the example bearing; rigs in one folder share the runs of the first wave."""
     from doe.clearance import Simulations
-    from doe.report.steps.calibrate import record_of
+    from doe.report.sections.calibration import record_of
     from doe.running.store import Store
     from doe.workflow.calibration import find_calibration, question_of, read_question
 
@@ -159,10 +159,8 @@ def closed_form(quantiles: Array, land: float = 1.0, power: float = 0.4) -> Arra
 
 def surrogate(kind: str, number: int) -> Answer:
     """Calibrate a rig in closed form."""
-    from doe.unknown.calibration import MISSED, Batch, Unknowns, matched
-    from doe.unknown.likelihood import Measured
-    from doe.unknown.posterior import densest_intervals, learnt
-    from doe.unknown.verdict import judge, objections
+    from doe.unknown.calibration import MISSED, Batch, Unknowns, judge, matched, objections
+    from doe.unknown.posterior import Measured, densest_intervals, learnt
 
     random = np.random.default_rng([number, KINDS.index(kind)])
     truth = hidden(kind, INPUTS, random)
@@ -194,7 +192,7 @@ def surrogate(kind: str, number: int) -> Answer:
 def widths(repeats: int, cells: int, factor: float) -> float:
     """Share of ``repeats`` tables, of three correlated cells a row, whose predictions are ``factor`` times too wide, that
     are rejected."""
-    from doe.unknown.verdict import scores_of, width
+    from doe.unknown.calibration import scores_of, width
 
     random, rejected = np.random.default_rng([cells, int(100 * factor)]), 0
     root = np.linalg.cholesky(0.6 + 0.4 * np.eye(3))

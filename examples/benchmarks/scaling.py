@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from studies import main, printed
 
-from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
+from rbdyn.accuracy.variants import with_options
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record
 from rbdyn.dynamics.ensemble import Stop

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.run import Run, prepare, with_numerics
@@ -111,7 +111,7 @@ def pool_of(scene: Scene, length: int, replicates: int, workers: int | None) -> 
     def one(number: int) -> Replicate:
         return Recording(Run(scene, bearing, number, scene.numerics.rtol, stop)).to(turns)
 
-    def ended(each: Ended[Replicate]) -> None:
+    def ended(each: Outcome[Replicate]) -> None:
         runs[each.place] = each.result()
 
     run_all([partial(one, number) for number in range(replicates)], workers, stop, ended)

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from studies import main
 
-from rbdyn.accuracy.options import with_options
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.tolerances import (
+    MARGIN,
     NEGLIGIBLE,
-    SOUGHT,
     Bias,
     bias_columns,
     bias_of,
@@ -26,6 +25,7 @@ from rbdyn.accuracy.tolerances import (
     percent,
     undecided,
 )
+from rbdyn.accuracy.variants import with_options
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import shown
 from rbdyn.contact.hertz_line import line_load
@@ -51,7 +51,7 @@ class Row(Bias):
     rhs_ns: float = shown("ns a right-hand side", ".0f")
 
 
-def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT) -> Report:
+def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNTS, sought: float = MARGIN) -> Report:
     """A row a number of slices, and the fewest that keep load and statistics.
 
     Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
@@ -137,7 +137,7 @@ def overlap_at(law: Any, load: float) -> float:
     return high
 
 
-def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = MARGIN) -> str:
     """The fewest slices shown to keep load and statistics, or what hides them.
 
     The last row is the reference of the statistics and no evidence for its own.
@@ -161,7 +161,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
 
 def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
     """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
-    from rbdyn.plots.error_against_time import biases_at_work
+    from rbdyn.plots.style import biases_at_work
 
     labels = "relative error", "processor time of a right-hand side [ns]"
     biases_at_work(rows, path, sought, labels, "rhs_ns", ("load at equal approach", "load_error"), "slices")

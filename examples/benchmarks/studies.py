@@ -27,8 +27,8 @@ def main(study: "Callable[..., Report]", about: str, scene: str = "cylindrical_r
     are options of their own, with their defaults.
     """
     from rbdyn import Scene, accuracy
+    from rbdyn.base.command import progress_bar
     from rbdyn.base.faults import InputError, RunError
-    from rbdyn.base.terminal import progress_bar
 
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", nargs="?", type=Path, default=EXAMPLES / scene, help=f"scene, {scene} unless named")

@@ -22,7 +22,7 @@ from published.lundberg_palmgren import plain_capacities
 from rbdyn import BallScene
 from rbdyn.life.balls import row_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 
 HU, SENSORS = "Hu et al. 2021", "Sensors 2023, 23, 4503"
 # Largest difference in a contact angle between their search and Newton's method, double-decker bearing.
@@ -163,8 +163,8 @@ def figures_of(radial: float, tilt_mrad: float = 0.0, ring: str = HELD) -> dict[
     """Largest ball load [N], radial displacement [um], F_r over it (eq 7) [N/mm], life at 63000 rpm [h]."""
     scene = small_bearing(radial, tilt_mrad, ring)
     model = row_of(scene)
-    found: Solution = solve(model.row, model.control, load_of(scene), given_of(scene))
-    if not found.found:
+    found: Solution = solve(model.row, model.control, load_of(scene), constraint_of(scene))
+    if not found.is_equilibrium:
         raise RuntimeError(found.status)
     life = row_life(found.inner_load, found.outer_load, plain_capacities(scene.bearing), "inner")
     return {

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rbdyn import Scene, SimulationResult, simulate
-from rbdyn.base.terminal import print_table
+from rbdyn.base.command import print_table
 from rbdyn.result import Quantity
 
 EXAMPLES = Path(__file__).parent.parent

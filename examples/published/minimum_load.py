@@ -21,8 +21,7 @@ import pandas as pd
 from published.common import Check, Effort, Finding, Table, canvas, error, findings_table, save, tally
 from rbdyn import Scene, simulate
 from rbdyn.base.words import with_error
-from rbdyn.life.maker_friction import SERIES
-from rbdyn.life.rollers import minimum_loads
+from rbdyn.life.rollers import SERIES, minimum_loads
 from rbdyn.properties.catalogue import envelope, read_designation
 
 BEARINGS = ("NU 210", "NU 220", "NU 308", "NU 320", "NU 2210", "NU 1020")

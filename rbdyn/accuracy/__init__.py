@@ -1,17 +1,16 @@
-"""How far the numbers are from true ones, and what that costs in time.
+"""Errors of the numbers, and the time that accuracy costs.
 
-Studies, each a module with ``study(scene, progress) -> Report``; ``rbdyn accuracy SCENE.toml STUDY`` runs them by name:
+``rbdyn accuracy SCENE.toml STUDY`` runs a study by name:
 
-- ``tolerances``: bias of the statistics at each tolerance, and error of the motion; what an error allows to be said
-- ``methods``: ours and other ``integrators`` at equal error, all on the compiled right-hand side (``fixed_step``); of a ball
+- ``tolerances``: bias of the statistics at each tolerance, and error of the motion
+- ``methods``: ours and other integrators at equal error, all on one compiled right-hand side (``fixed_step``); for a ball
   bearing its solvers (``ball_solvers``)
-- ``coverage``: how often stated intervals hold the truth; ``options``: what each option costs; ``stability``: how extreme
-  variants (``variants.toml``) of a scene end
-- ``report``: tables, sentences, files
+- ``coverage``: how often stated intervals contain the truth
+- ``options`` and ``stability`` (``variants``): cost of each option, and how extreme variants of a scene end
 
-A reference is a much tighter run that two methods agree on; an error and a time come from separate runs, the first
-call never counts; what fails stays in the table. Studies that only developers need are scripts of ``examples/benchmarks``.
-From Python::
+Each is a function ``study(scene, progress) -> Report`` (``report``: tables, sentences, files). A reference is a much tighter
+run, or one that two methods agree on. Error and time come from separate runs, and a first call never counts. Failures stay
+in the table. Studies that only developers need are scripts of ``examples/benchmarks``. From Python::
 
     from rbdyn import Scene, accuracy
 
@@ -20,7 +19,7 @@ From Python::
     accuracy.write(report, folder)  # JSON, CSV, pictures
     rows = accuracy.statistics_bias(scene, (1e-1, 1e-2, 1e-3)).rows
 
-Names are fetched when first used: importing the package loads neither numba nor scipy.
+Names are loaded when first used: importing the package loads neither numba nor scipy.
 """
 
 from importlib import import_module
@@ -35,11 +34,17 @@ if TYPE_CHECKING:
     from rbdyn.accuracy.tolerances import statistics_bias
     from rbdyn.dynamics.ensemble import Reporter
 
-__all__ = ["STUDIES", "Report", "chosen", "show", "statistics_bias", "study", "times_faster", "write"]
+__all__ = ["STUDIES", "Report", "show", "statistics_bias", "study", "study_name", "times_faster", "write"]
 
-STUDIES = {name: f"rbdyn.accuracy.{name}" for name in ("tolerances", "methods", "coverage", "options", "stability")}
-# Of ball bearings, which are solved to rounding: no tolerance, no interval, no option of a right-hand side.
-BALL_STUDIES = {"methods": "rbdyn.accuracy.ball_solvers"}
+STUDIES = {
+    "tolerances": "rbdyn.accuracy.tolerances:study",
+    "methods": "rbdyn.accuracy.methods:study",
+    "coverage": "rbdyn.accuracy.coverage:study",
+    "options": "rbdyn.accuracy.variants:study_options",
+    "stability": "rbdyn.accuracy.variants:study_stability",
+}
+# Of ball bearings, solved to rounding, without tolerance, interval or right-hand side.
+BALL_STUDIES = {"methods": "rbdyn.accuracy.ball_solvers:study"}
 _HOMES = {
     "Report": "rbdyn.accuracy.report",
     "show": "rbdyn.accuracy.report",
@@ -49,24 +54,23 @@ _HOMES = {
 }
 
 
-def chosen(name: str | None, scene: Scene | BallScene) -> str:
-    """Name of a study, or of the first that the kind of bearing has. Raises InputError for one that it has not."""
+def study_name(name: str | None, scene: Scene | BallScene) -> str:
+    """Name of a study, by default the first of the kind of bearing. Raises InputError where the kind lacks it."""
     homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
     if name is not None and name not in homes:
-        raise InputError(
-            [f"{name}: is no study of a bearing of kind {scene.bearing.kind!r}; choose {' or '.join(homes)}"]
-        )
+        names = " or ".join(homes)
+        raise InputError([f"{name}: is no study of a bearing of kind {scene.bearing.kind!r}; choose {names}"])
     return name or next(iter(homes))
 
 
 def study(name: str | None, scene: Scene | BallScene, progress: "Reporter" = None) -> "Report":
-    """Run a study by name, the first of its kind of bearing unless named; ``progress(done, total)`` is called as it goes on.
+    """Run a study by name, by default the first of the kind of bearing; ``progress(done, total)`` is called as it goes on.
 
-    Raises InputError for a study that the kind of bearing has not, or where the scene has nothing to study, RunError,
-    KeyboardInterrupt.
+    Raises InputError where the kind of bearing lacks the study or the scene has nothing to study; RunError; KeyboardInterrupt.
     """
     homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
-    report: Report = import_module(homes[chosen(name, scene)]).study(scene, progress)
+    module, _, function = homes[study_name(name, scene)].partition(":")
+    report: Report = getattr(import_module(module), function)(scene, progress)
     return report
 
 

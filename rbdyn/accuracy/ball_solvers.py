@@ -1,8 +1,8 @@
 """Solvers of the equilibrium of one scene: residual against time, and how often each succeeds nearby.
 
-Every solver starts cold and is stopped after more and more iterations; its residual is the largest that the full equations
-leave, over the largest force of the scene. Times are the shortest of several runs of the whole call from Python, after a
-first that compiles. Then the load and the speed of the scene are perturbed at random, with a seed.
+Every solver starts cold and stops after more and more iterations. Its residual is the largest of the full equations, over
+the largest force of the scene. Times are the shortest of several runs of the whole call from Python, after a first that
+compiles. Then load and speed of the scene vary at random, with a seed.
 """
 
 import math
@@ -19,15 +19,15 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
-from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
+from rbdyn.quasistatic import finite_search, full_system
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
 from rbdyn.scene.ball import BallScene, SingleRowScene
 
-# Below, a residual is rounding.
+# A residual below this is rounding.
 ROUNDING = 1e-18
 LIMITS = (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 64, 128, 256, 512)
 REPEATS = 5
@@ -39,20 +39,20 @@ LOAD_DECADES, SPEED_DECADES = 1.0, 0.5
 Solver = Callable[..., Solution]
 # Ours first. The limit counts Newton steps, or iterations of all searches.
 LIMITED: dict[str, Solver] = {
-    "convex": limited.solve,
-    "plain Newton": plain_newton.solve,
+    "convex": full_system.convex_with_limit,
+    "plain Newton": full_system.plain_newton,
     "finite search": finite_search.solve,
 }
 WHOLE: dict[str, Solver] = {**LIMITED, "convex": equilibrium.solve}
 
 
 class Problem(NamedTuple):
-    """What a solver takes: ``solver(*problem)``."""
+    """Input of a solver: ``solver(*problem)``; ``fixed`` displacements, NaN where free."""
 
     row: Row
     control: Control
     load: Array
-    given: Array
+    fixed: Array
 
 
 class Attempt(Record):
@@ -90,10 +90,10 @@ class Success(Record):
 
 
 def share(count: int, total: int) -> tuple[float, float]:
-    """95 % interval of a share of which ``count`` of ``total`` were seen (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
-    z, seen = 1.96, count / total
-    spread = math.sqrt(seen * (1.0 - seen) / total + (0.5 * z / total) ** 2)
-    middle, scale = seen + 0.5 * z * z / total, 1.0 + z * z / total
+    """95 % interval of a share by ``count`` of ``total`` cases (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
+    z, observed = 1.96, count / total
+    spread = math.sqrt(observed * (1.0 - observed) / total + (0.5 * z / total) ** 2)
+    middle, scale = observed + 0.5 * z * z / total, 1.0 + z * z / total
     return max((middle - z * spread) / scale, 0.0), min((middle + z * spread) / scale, 1.0)
 
 
@@ -108,11 +108,11 @@ def study(
     nearby = perturbed(scene, perturbations)
     rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]
     sentence, written = conclusion(attempts, rows), records(attempts)
-    drawn = {"count": perturbations, "seed": SEED, "load_decades": LOAD_DECADES, "speed_decades": SPEED_DECADES}
+    draws = {"count": perturbations, "seed": SEED, "load_decades": LOAD_DECADES, "speed_decades": SPEED_DECADES}
     return reported(
         "solvers",
         (
-            tabled("residual against time", _until_done(attempts), columns_of(Attempt)),
+            tabled("residual against time", _until_solved(attempts), columns_of(Attempt)),
             success_table(f"{perturbations} seeded scenes nearby", rows),
         ),
         (*causes(rows), sentence),
@@ -121,21 +121,21 @@ def study(
         "rbdyn.accuracy.solvers/1",
         rows=written,
         nearby=records(rows),
-        perturbations=drawn,
+        perturbations=draws,
         conclusion=sentence,
     )
 
 
 def problem_of(scene: SingleRowScene) -> Problem:
-    """What a solver takes of a scene."""
+    """Problem of a scene."""
     row, control, *_ = row_of(scene)
-    return Problem(row, control, load_of(scene), given_of(scene))
+    return Problem(row, control, load_of(scene), constraint_of(scene))
 
 
 def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -> list[Attempt]:
     """Each solver stopped after each of ``limits`` iterations. Raises RunError where there is no equilibrium."""
     reference = equilibrium.solve(*problem)
-    if not reference.found:
+    if not reference.is_equilibrium:
         raise RunError(f"there is nothing to compare: {reference.status}")
     scale = max(float(reference.inner_load.max()), float(reference.outer_load.max()), float(np.abs(problem.load).max()))
     attempts = []
@@ -183,11 +183,11 @@ def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Probl
 
 def fared(name: str, solutions: Sequence[Solution], took_us: Sequence[float]) -> Success:
     """Summary of many solutions and their times [us]."""
-    why = Counter(solution.status for solution in solutions if not solution.found)
+    why = Counter(solution.status for solution in solutions if not solution.is_equilibrium)
     return Success(
         name,
         len(solutions),
-        sum(solution.found for solution in solutions) / len(solutions),
+        sum(solution.is_equilibrium for solution in solutions) / len(solutions),
         float(np.median(took_us)),
         float(np.percentile(took_us, 99.0)),
         float(np.max(took_us)),
@@ -203,24 +203,26 @@ def success_table(title: str, rows: Sequence[Success], first: str = "solver") ->
 
 def causes(rows: Sequence[Success]) -> list[str]:
     """A sentence for each solver that failed somewhere."""
-    told = {row.solver: "; ".join(f"{count} x {why}" for why, count in row.causes.items()) for row in rows}
-    return [f"{solver} failed: {whys}" for solver, whys in told.items() if whys]
+    reasons = {row.solver: "; ".join(f"{count} x {why}" for why, count in row.causes.items()) for row in rows}
+    return [f"{solver} failed: {whys}" for solver, whys in reasons.items() if whys]
 
 
 def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
-    """Which solver to take here: the fastest of those that are as sure as the surest, as far as so many scenes show."""
+    """Which solver to take: the fastest of those whose share solved does not differ from the best."""
     reached: dict[str, float] = {}
     for attempt in attempts:
         if attempt.status == "ok":
             reached[attempt.solver] = min(attempt.solve_us, reached.get(attempt.solver, float("inf")))
-    surest = max(rows, key=lambda row: row.solved)
-    alike = [row for row in rows if row.interval[1] >= surest.interval[0]]
+    most_reliable = max(rows, key=lambda row: row.solved)
+    alike = [row for row in rows if row.interval[1] >= most_reliable.interval[0]]
     best = min(alike, key=lambda row: row.median_us)
     rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
     times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
-    solves = f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
-    beside = f"; so many scenes do not separate it from {rivals} in sureness" if rivals else ""
-    return f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {solves}{beside}."
+    sentences = (
+        f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {best.shown_share} of "
+        f"{best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
+    )
+    return f"{sentences}; so many scenes do not separate its reliability from {rivals}." if rivals else f"{sentences}."
 
 
 def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:
@@ -233,15 +235,15 @@ def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Prog
     return fared(name, solutions, times)
 
 
-def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:
+def _until_solved(attempts: Sequence[Attempt]) -> list[Attempt]:
     """Attempts of each solver up to the first that converges."""
     needed: list[Attempt] = []
-    done: set[str] = set()
+    solved: set[str] = set()
     for attempt in attempts:
-        if attempt.solver not in done:
+        if attempt.solver not in solved:
             needed.append(attempt)
         if attempt.status == "ok":
-            done.add(attempt.solver)
+            solved.add(attempt.solver)
     return needed
 
 
@@ -249,14 +251,13 @@ def _draw(attempts: Sequence[Attempt], path: Path) -> None:
     """Residual of each solver stopped after more and more iterations, against its time."""
     from matplotlib.ticker import LogLocator
 
-    from rbdyn.plots.error_against_time import logarithmic, method_lines
-    from rbdyn.plots.style import label_ends, plt, save
+    from rbdyn.plots.style import label_ends, logarithmic, method_lines, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     logarithmic(axis, "residual over the largest force", "time of a call [us]")
     axis.xaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
     lines: dict[str, list[tuple[float, float]]] = {}
-    for a in _until_done(attempts):
+    for a in _until_solved(attempts):
         lines.setdefault(a.solver, []).append((max(a.residual, ROUNDING), a.solve_us))
     ends, _ = method_lines(axis, lines)
     axis.margins(0.12)

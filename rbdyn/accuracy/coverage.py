@@ -1,9 +1,9 @@
-"""How often the stated intervals hold the truth, which is what an error bar claims.
+"""Coverage: how often the stated intervals contain the truth, which is the claim of an error bar.
 
-The truth is one long, settled, tightly integrated run with seeds of its own. The scene is then repeated with other seeds,
-and of every figure it is counted how often value and ``Quantity.error`` hold the truth, whose own error joins as root sum
-of squares. Next to it the same of the statistical error alone, the mean half-width and the mean offset: an interval that
-always holds the truth is too wide.
+The truth is one long, settled, tightly integrated run with seeds of its own. The scene is then repeated with other seeds.
+For every figure the study counts how often value and ``Quantity.error`` contain the truth, whose own error joins as root
+sum of squares. It gives the same for the statistical error alone, the mean half-width and the mean offset. An interval that
+always contains the truth is too wide.
 """
 
 import math
@@ -19,8 +19,8 @@ from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
 REPEATS = 200
-# Of the truth: replicates and turns counted over those of the scene at least, rtol at most, seed. It discards half as
-# many turns as it counts.
+# Of the truth: least replicates, turns counted over those of the scene, largest rtol, seed. It discards half as many turns as
+# it counts.
 TRUTH_REPLICATES, TRUTH_LENGTH, TRUTH_RTOL, TRUTH_SEED = 64, 10.0, 1e-3, 987_654
 FIRST_SEED, SEED_STEP = 5000, 37
 # Shares of a sound interval; a single figure scatters by 3 % over 200 repeats.
@@ -28,8 +28,10 @@ POOLED, LOWEST = (0.94, 0.96), 0.90
 
 
 class Row(Record):
-    """One figure: truth with its error, shares of repeats whose stated and whose statistical error alone hold it, mean
-    half-width and mean offset relative to it."""
+    """One figure: truth with its error, shares of repeats in which the stated error, and the statistical one alone, cover it.
+
+    Also mean half-width and mean offset relative to the truth.
+    """
 
     figure: str = shown("figure")
     truth: float = shown("truth")
@@ -57,19 +59,22 @@ def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -
     results = [simulate(with_numerics(scene, seed=seed)) for seed in counted.over(seeds)]
     rows = [row(name, truth, results) for name in FIGURES]
     turns = sum(result.cost["turns"] for result in results) / repeats
-    each = scene.numerics.turns + scene.numerics.warm_up_turns
+    turns_each = scene.numerics.turns + scene.numerics.warm_up_turns
     longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
-    asked = each * (scene.numerics.replicates + scene.numerics.companions)
-    took = f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were {asked:.0f}"
-    sentences = [conclusion(rows, repeats), f"{took}, and {100.0 * longer:.0f} % of the runs were lengthened."]
-    table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, COLUMNS)
+    planned = turns_each * (scene.numerics.replicates + scene.numerics.companions)
+    length = (
+        f"A run took {turns:.0f} shaft turns over all replicates and companions instead of the {planned:.0f} asked for, and "
+        f"{100.0 * longer:.0f} % of the runs were lengthened."
+    )
+    sentences = [conclusion(rows, repeats), length]
+    table = tabled(f"95 % intervals that contain the truth, {repeats} repeats", rows, COLUMNS)
     written = records(rows)
-    told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
-    return reported("coverage", (table,), sentences, written, rows=written, **told, conclusion=" ".join(sentences))
+    figures: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
+    return reported("coverage", (table,), sentences, written, rows=written, **figures, conclusion=" ".join(sentences))
 
 
 def one_bearing(scene: Scene) -> Scene:
-    """The scene with the rollers that its seed draws: another seed would be another bearing, not a repeat."""
+    """The scene with the rollers of its seed, since another seed would be another bearing, not a repeat."""
     radii = scene.geometry.roller_radii
     if radii is None:
         return scene
@@ -79,7 +84,7 @@ def one_bearing(scene: Scene) -> Scene:
 
 
 def truth_of(scene: Scene) -> Scene:
-    """The scene as its truth is found: long after its transient, or as long as asked for where a schedule runs."""
+    """The scene of the truth: long after the transient, or as long as asked for with a schedule."""
     numerics = scene.numerics
     steady = scene.operation.schedule is None
     turns = TRUTH_LENGTH * numerics.turns
@@ -124,7 +129,7 @@ def figure_of(result: SimulationResult, name: str) -> Quantity:
 
 
 def pooled(rows: list[Row]) -> float:
-    """Share over all figures, those that say the same (slip and speed; contact and impact of a dry pocket) once."""
+    """Share over all figures; those that agree by definition (slip and speed; contact and impact of a dry pocket) count once."""
     same = {"cage_slip"}
     truth = {one.figure: one.truth for one in rows}
     if truth["impact_contact_force_N"] == truth["impact_force_N"]:
@@ -134,7 +139,7 @@ def pooled(rows: list[Row]) -> float:
 
 
 def conclusion(rows: list[Row], repeats: int) -> str:
-    """Whether the intervals are what they claim to be."""
+    """Whether the intervals cover the truth as often as they claim."""
     low, high = POOLED
     share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
     narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]

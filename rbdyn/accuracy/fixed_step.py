@@ -5,11 +5,10 @@ a predicted velocity: with a = a(x, v),
 
     x' = x + h v + h^2/2 a,   v* = v + h a,   a' = a(x', v*),   v' = v + h/2 (a + a')
 
-One right-hand side a step, because a' serves the next step; second order, for v* is off by O(h^2) only. What has no
-position of its own (spins, the clock) takes the v-formulas.
+One right-hand side a step, because a' serves the next step; second order, because the error of v* is O(h^2). Components
+without a position (spins, the clock) use the v-formulas.
 
-It and the classical Runge-Kutta method keep a tally as our method does, at step ends: works by their own weights, largest
-loads, the cage's whirl.
+Both methods keep a tally at step ends, as ours does: works by their own weights, largest loads, the whirl of the cage.
 """
 
 import math
@@ -40,8 +39,8 @@ def right_hand_side(bearing, y, dy, power, loads, scratch):
 class RightHandSide:
     """f(t, y) -> dy/dt of a bearing; counts its calls and raises BudgetSpent past ``budget`` of them.
 
-    The state carries its own time, so ``t`` is not read. The machine code is called without looking up the types of
-    the parameters each time, which would take twenty times as long as the right-hand side itself.
+    The state has its own time, so ``t`` is not read. Calls go straight to the machine code: a look-up of the types of the
+    parameters would take twenty times as long as the right-hand side itself.
     """
 
     def __init__(self, bearing: RollerBearing, size: int, budget: int) -> None:
@@ -59,7 +58,7 @@ class RightHandSide:
 
     def fill(self, y: Array, dy: Array) -> None:
         """Write the derivative of ``y`` (n,) into ``dy`` (1, n), contiguous. Raises ValueError for another size."""
-        # The machine code takes size and order on trust; SciPy also hands over columns of a matrix.
+        # The machine code checks neither size nor order, and SciPy also passes columns of a matrix.
         if y.size != self.size:
             raise ValueError(f"the state has {y.size} components, not {self.size}")
         self.calls += 1
@@ -87,7 +86,7 @@ def all_finite(y):
 
 @kernel
 def book(tally, y, body, loads):
-    """Take up the largest loads at a step's end, and place and speed of the cage's centre as a sample of its whirl."""
+    """Book the largest loads at the end of a step, and place and speed of the cage's centre as a sample of its whirl."""
     for force in range(LOADS):
         tally.largest[force] = max(tally.largest[force], loads[0, force])
     x, y_place = y[body + state.CAGE_X], y[body + state.CAGE_Y]
@@ -98,12 +97,12 @@ def book(tally, y, body, loads):
 def runge_kutta_4(bearing, y, step, steps, scratch, tally):
     """Advance ``y`` in place by ``steps`` steps of ``step`` [s] of the classical fourth-order method.
 
-    Returns the steps done: fewer than asked for where the state ceased to be finite.
+    Returns the number of steps made: fewer than ``steps`` where the state ceased to be finite.
     """
     n = y.size
     k, stage = np.zeros((4, n)), np.empty(n)
     power, loads = np.empty((4, POWERS)), np.empty((4, LOADS))
-    for done in range(steps):
+    for step_number in range(steps):
         for s in range(k.shape[0]):
             reach = 0.0 if s == 0 else step if s == 3 else 0.5 * step
             for i in range(n):
@@ -115,7 +114,7 @@ def runge_kutta_4(bearing, y, step, steps, scratch, tally):
         for p in range(POWERS):
             tally.work[p] += step / 6.0 * (power[0, p] + 2.0 * (power[1, p] + power[2, p]) + power[3, p])
         if not all_finite(y):
-            return done
+            return step_number
     return steps
 
 
@@ -123,13 +122,13 @@ def runge_kutta_4(bearing, y, step, steps, scratch, tally):
 def velocity_verlet(bearing, velocity_of, y, step, steps, scratch, tally):
     """Advance ``y`` in place by ``steps`` steps of ``step`` [s] of velocity Verlet, with ``velocity_of(layout)``.
 
-    Returns the steps done: fewer than asked for where the state ceased to be finite.
+    Returns the number of steps made: fewer than ``steps`` where the state ceased to be finite.
     """
     n = y.size
     k, new = np.zeros((2, n)), np.empty(n)
     power, loads = np.empty((2, POWERS)), np.empty((2, LOADS))
     derivative_once(bearing, y, 0, k, power, loads, scratch)
-    for done in range(steps):
+    for step_number in range(steps):
         for i in range(n):
             new[i] = y[i] + step * k[0, i]
             if velocity_of[i] >= 0:
@@ -148,7 +147,7 @@ def velocity_verlet(bearing, velocity_of, y, step, steps, scratch, tally):
             loads[0, force] = loads[1, force]
         book(tally, y, state.PARTS * bearing.rollers, loads)
         if not all_finite(y):
-            return done
+            return step_number
     return steps
 
 

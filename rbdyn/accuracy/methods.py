@@ -1,28 +1,238 @@
-"""Our method compared with others on one compiled right-hand side: error of the motion against time, at equal error.
+"""Methods compared on one compiled right-hand side: error of the motion against time, at equal error.
 
-A stretch of motion starts where a replicate has settled; its end is what two references agree on. The motion is chaotic: two
-runs part about 500-fold a shaft turn, so a method can be distinguished from another over part of a turn only, and every span has
-its own floor below which the reference itself is not known.
+A stretch of motion starts where a replicate has settled; two references agree on its end. The motion is chaotic: two runs
+separate about 500-fold a shaft turn. So methods differ only over part of a turn, and each span has a floor below which the
+reference itself is uncertain.
+
+The integrators are ours, fixed steps, SciPy's and CVODE. ``method.ready(stretch, setting)`` sets up and returns a call that
+integrates once; only that call is timed. All adaptive methods get the same absolute tolerance, a fraction ``setting`` of the
+scale of each component, and no relative one. Their norms differ, so compare them at equal error, never at equal setting.
 """
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.accuracy.integrators import DOP853, METHODS, OURS, Method, NotInstalledError, Stretch, compiled
+from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.integrators.advance import ACCEPTED, DERIVATIVES, NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of
-from rbdyn.dynamics.run import Run, prepare
+from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales
+from rbdyn.dynamics.run import Run, prepare, with_numerics
 from rbdyn.scene import Scene
+
+# Right-hand sides a turn past which a method counts as failed.
+BUDGET_PER_TURN = 4_000_000
+# The least relative tolerance that SciPy takes: next to the absolute ones it is round-off.
+NO_RELATIVE_TOLERANCE = 2.3e-14
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From the state ``start`` (n,) over so many shaft turns; ``scale`` (n,): scale of the errors of each component."""
+
+    scene: Scene
+    bearing: RollerBearing
+    start: Array
+    turns: float
+    scale: Array
+
+    @property
+    def duration(self) -> float:
+        """Its length [s]."""
+        return self.turns * self.scene.turn_s
+
+
+class NotInstalledError(RunError):
+    """A method whose package is missing."""
+
+
+class Arrived(NamedTuple):
+    """State at the end, right-hand sides it took."""
+
+    y: Array
+    derivatives: int
+
+
+class Method(NamedTuple):
+    """``ready(stretch, setting)`` gives the timed call, which raises RunError. Settings, loosest first: tolerances of
+    an ``adaptive`` method, else steps in contact times (approach over speed of a race contact)."""
+
+    name: str
+    adaptive: bool
+    settings: tuple[float, ...]
+    ready: Callable[[Stretch, float], Callable[[], Arrived]]
+
+    def label(self, stretch: Stretch, setting: float) -> str:
+        """A setting in words."""
+        if self.adaptive:
+            return f"rtol {setting:g}"
+        return f"{steps_of(stretch.duration, fixed_step(stretch.scene, setting)) / stretch.turns:.0f} steps a turn"
+
+
+def ready_ours(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
+    """As in a simulation, with its tally: works, largest loads, whirl."""
+    limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN, "method": "rk45"}
+    scene = with_numerics(stretch.scene, **limits)
+    return _over(stretch, Run(scene, stretch.bearing, 0, rtol, Stop()))
+
+
+def _over(stretch: Stretch, run: Run) -> Callable[[], Arrived]:
+    """The call that takes a run over a stretch."""
+    run.carry.y[:] = stretch.start
+
+    def go() -> Arrived:
+        run.to(stretch.turns)
+        return Arrived(run.carry.y, int(run.carry.counts[DERIVATIVES]))
+
+    return go
+
+
+def fixed_step(scene: Scene, contact_times: float) -> float:
+    """A step given in contact times [s]."""
+    scale = scales(scene)
+    return contact_times * scale.length / scale.speed
+
+
+class FixedStepRun(Run):
+    """A run whose steps are fixed: about ``step`` [s], cut so that a whole number of them fits each leg."""
+
+    def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, step: float, verlet: bool) -> None:
+        super().__init__(scene, bearing, replicate, 1.0, Stop())
+        self.step, self.verlet, self.pairs = step, verlet, velocity_of(self.layout)
+
+    def to(self, turns: float) -> None:
+        """Advance to a time given in shaft turns since the start. Raises RunError where the state explodes."""
+        carry, turn_s = self.carry, self.scene.turn_s
+        duration = turns * turn_s - carry.clock[NOW]
+        if duration <= 0.0:
+            return
+        steps = steps_of(duration, self.step)
+        rest = (carry.y, duration / steps, steps, carry.scratch, self.tally)
+        steps_made = (
+            velocity_verlet(self.bearing, self.pairs, *rest) if self.verlet else runge_kutta_4(self.bearing, *rest)
+        )
+        carry.clock[NOW] += duration * steps_made / steps
+        carry.counts[ACCEPTED] += steps_made
+        carry.counts[DERIVATIVES] += steps_made if self.verlet else 4 * steps_made
+        if steps_made < steps:
+            raise RunError(f"not finite after {carry.clock[NOW] / turn_s:.2g} turns")
+
+
+def by_fixed_step(verlet: bool) -> Callable[..., Callable[[], Arrived]]:
+    """``ready`` of velocity Verlet, or else of the classical Runge-Kutta method."""
+
+    def ready(stretch: Stretch, contact_times: float) -> Callable[[], Arrived]:
+        step = fixed_step(stretch.scene, contact_times)
+        return _over(stretch, FixedStepRun(stretch.scene, stretch.bearing, 0, step, verlet))
+
+    return ready
+
+
+def compiled(stretch: Stretch) -> RightHandSide:
+    """The compiled right-hand side with the budget of a stretch."""
+    return RightHandSide(stretch.bearing, stretch.start.size, int(BUDGET_PER_TURN * stretch.turns))
+
+
+def by_scipy(name: str, function: Callable[[Stretch], Any] = compiled) -> Callable[..., Callable[[], Arrived]]:
+    """``ready`` of a method of scipy.integrate.solve_ivp, on the right-hand side that ``function(stretch)`` gives."""
+
+    def ready(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
+        from scipy.integrate import solve_ivp
+
+        right_hand_side = function(stretch)
+        options = {"method": name, "rtol": NO_RELATIVE_TOLERANCE, "atol": rtol * stretch.scale}
+
+        def go() -> Arrived:
+            with warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore")
+                try:
+                    solution = solve_ivp(right_hand_side, (0.0, stretch.duration), stretch.start, **options)
+                except (BudgetSpent, ValueError) as error:  # its LU refuses a Jacobian that is not finite
+                    raise RunError(_why(error)) from None
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y[:, -1], right_hand_side.calls)
+
+        return go
+
+    return ready
+
+
+def by_cvode(name: str) -> Callable[..., Callable[[], Arrived]]:
+    """``ready`` of CVODE (SUNDIALS) by scikit-sundae, with "Adams" or "BDF" formulas; raises NotInstalledError."""
+
+    def ready(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
+        try:
+            from sksundae.cvode import CVODE
+        except ImportError:
+            raise NotInstalledError("not installed: pip install 'rbdyn[bench]'") from None
+        right_hand_side = compiled(stretch)
+        spent: list[BudgetSpent] = []
+
+        def fill(t: float, y: Array, dy: Array) -> None:
+            try:
+                right_hand_side.fill(y, dy.reshape(1, -1))
+            except BudgetSpent as error:
+                # No exception gets through its C code: a derivative that is not finite ends the run.
+                spent.append(error)
+                dy[:] = np.nan
+
+        steps = int(BUDGET_PER_TURN * stretch.turns) + 1
+        solver = CVODE(fill, method=name, rtol=NO_RELATIVE_TOLERANCE, atol=rtol * stretch.scale, max_num_steps=steps)
+
+        def go() -> Arrived:
+            solver.init_step(0.0, stretch.start)
+            solution = solver.step(stretch.duration, tstop=stretch.duration)
+            if spent:
+                raise RunError(_why(spent[0]))
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y, right_hand_side.calls)
+
+        return go
+
+    return ready
+
+
+def _why(error: Exception) -> str:
+    return f"over {BUDGET_PER_TURN} right-hand sides a turn" if isinstance(error, BudgetSpent) else str(error)
+
+
+def _decades(first: int, last: int) -> tuple[float, ...]:
+    return tuple(10.0**-power for power in range(first, last + 1))
+
+
+def _halved(first: float, count: int) -> tuple[float, ...]:
+    return tuple(first * 0.5**k for k in range(count))
+
+
+OURS = Method("rbdyn RK45", True, (1e-1, 3e-2, 1e-2, *_decades(3, 10)), ready_ours)
+RUNGE_KUTTA_4 = Method("RK4, fixed step", False, _halved(4.0, 9), by_fixed_step(verlet=False))
+VELOCITY_VERLET = Method("velocity Verlet", False, _halved(4.0, 11), by_fixed_step(verlet=True))
+SCIPY_RK45 = Method("SciPy RK45", True, _decades(0, 9), by_scipy("RK45"))
+DOP853 = Method("SciPy DOP853", True, _decades(0, 10), by_scipy("DOP853"))
+COMPILED = (OURS, RUNGE_KUTTA_4, VELOCITY_VERLET)
+METHODS = (
+    *COMPILED,
+    SCIPY_RK45,
+    DOP853,
+    Method("SciPy LSODA", True, _decades(0, 8), by_scipy("LSODA")),
+    Method("SciPy Radau", True, _decades(0, 5), by_scipy("Radau")),
+    Method("SciPy BDF", True, _decades(0, 5), by_scipy("BDF")),
+    Method("CVODE Adams", True, _decades(0, 8), by_cvode("Adams")),
+    Method("CVODE BDF", True, _decades(0, 6), by_cvode("BDF")),
+)
 
 DEFAULT_TURNS, LONGEST_TURNS = 0.25, 1.0
 SPANS = (0.25, 0.5, 1.0)  # shaft turns after which the two references are compared
@@ -115,9 +325,9 @@ def end_of(method: Method, stretch: Stretch, setting: float) -> Array:
     return method.ready(stretch, setting)().y
 
 
-def agreement_table(known: Reference) -> Table:
+def agreement_table(references: Reference) -> Table:
     """How far the references are apart after each span."""
-    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in known.agreement.items()]
+    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in references.agreement.items()]
     return Table(
         f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}",
         ("turns", "positions apart [m]", "worst component over its scale"),
@@ -126,7 +336,7 @@ def agreement_table(known: Reference) -> Table:
 
 
 OK = "ok"
-# A run is timed again and again, at most so often and, past the first time, for so long.
+# A run is timed at most so often and, after the first time, for at most so long [s].
 REPEATS, TIMED_S = 5, 0.1
 # Points over the common range of errors, evenly spaced in the logarithm.
 POINTS = 41
@@ -148,7 +358,7 @@ class Speedup:
 class Attempt(Record):
     """One method at one setting over all stretches: worst error, processor time and right-hand sides a shaft turn.
 
-    Where it failed, ``status`` says why, the errors are None and the time is what it took to fail.
+    Where it failed, ``status`` says why, the errors are None and the time is that until it failed.
     """
 
     method: str = shown("method")
@@ -170,30 +380,30 @@ def study(
     stretches = starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
-    known = reference(stretches, counted.step)
-    attempts = [each for method in methods for each in counted.over(attempts_of(method, stretches, known))]
-    ratios = speedups(attempts, known.floor(turns))
-    sentences = conclusion(attempts, ratios, known.floor(turns), turns)
+    references = reference(stretches, counted.step)
+    attempts = [one for method in methods for one in counted.over(attempts_of(method, stretches, references))]
+    ratios = speedups(attempts, references.floor(turns))
+    sentences = conclusion(attempts, ratios, references.floor(turns), turns)
     written = records(attempts)
     return reported(
         "methods",
-        (agreement_table(known), table(attempts, turns), ratio_table(ratios)),
+        (agreement_table(references), table(attempts, turns), ratio_table(ratios)),
         (*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
         written,
-        lambda path: _draw(attempts, known.floor(turns), turns, path),
+        lambda path: _draw(attempts, references.floor(turns), turns, path),
         rows=written,
         conclusion=" ".join(sentences),
         turns=turns,
         starts=STARTS,
-        reference=known.as_dict(),
-        resolved_m=known.floor(turns),
+        reference=references.as_dict(),
+        resolved_m=references.floor(turns),
         times_faster={name: asdict(ratio) for name, ratio in ratios.items()},
         compile_s=compile_s,
     )
 
 
 def compiling(stretch: Stretch, methods: Sequence[Method]) -> float:
-    """Compile, or fetch from disk, all that the methods need; returns the seconds it took."""
+    """Compile, or load from disk, all that the methods need; returns the seconds that it took."""
     started = time.perf_counter()
     prepare(stretch.scene, stretch.bearing)
     compiled(stretch)
@@ -203,23 +413,23 @@ def compiling(stretch: Stretch, methods: Sequence[Method]) -> float:
     return time.perf_counter() - started
 
 
-def attempts_of(method: Method, stretches: Sequence[Stretch], known: Reference) -> Iterator[Attempt]:
+def attempts_of(method: Method, stretches: Sequence[Stretch], references: Reference) -> Iterator[Attempt]:
     """An attempt a setting; a single one where the method is not installed."""
     for setting in method.settings:
         try:
-            yield attempt(method, setting, stretches, known)
+            yield attempt(method, setting, stretches, references)
         except NotInstalledError as error:
             yield Attempt(method.name, "", str(error), None, None, None, None)
             return
 
 
-def attempt(method: Method, setting: float, stretches: Sequence[Stretch], known: Reference) -> Attempt:
+def attempt(method: Method, setting: float, stretches: Sequence[Stretch], references: Reference) -> Attempt:
     """Error of a first run over each stretch, time of later ones. Raises NotInstalledError."""
     errors: list[Error] = []
     turns = sum(stretch.turns for stretch in stretches)
     cpu_s = derivatives = 0.0
     label = method.label(stretches[0], setting)
-    for stretch, end in zip(stretches, known.ends, strict=True):
+    for stretch, end in zip(stretches, references.ends, strict=True):
         status, y, calls, seconds = run(method, stretch, setting)
         if y is None:
             return Attempt(method.name, label, status, None, None, seconds / stretch.turns * 1e3, None)
@@ -255,7 +465,7 @@ def timed(method: Method, stretch: Stretch, setting: float) -> float:
 
 
 def curve(attempts: Sequence[Attempt], method: str, floor: float) -> list[tuple[float, float]]:
-    """(position error [m], ms a turn) of what arrived with an error that the reference resolves."""
+    """(position error [m], ms a turn) of attempts with an error that the reference resolves."""
     return [
         (a.position_error_m, a.turn_ms)
         for a in attempts
@@ -272,20 +482,22 @@ def speedups(attempts: Sequence[Attempt], floor: float) -> dict[str, Speedup]:
 
 
 def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: float, turns: float) -> list[str]:
-    """In words: who is faster at equal error, and what failed."""
+    """Which method is faster at equal error, and what failed."""
     sentences = []
     if ratios:
         faster = ", ".join(
             f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
             for name, ratio in ratios.items()
         )
-        what = f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}"
-        sentences.append(f"{what}: geometric mean, least and greatest over the errors in common.")
+        sentences.append(
+            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}: geometric mean, least and "
+            "greatest over the errors in common."
+        )
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
     settings = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
     if settings:
         sentences.append(f"Failed settings: {settings}.")
-    sentences.append(f"Errors below {floor:.1g} m are not resolved and count for nothing.")
+    sentences.append(f"Errors below {floor:.1g} m are not resolved and do not count.")
     return sentences
 
 
@@ -325,16 +537,15 @@ def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
     low, high = max(points[0][0] for points in fronts), min(points[-1][0] for points in fronts)
     if not low < high:
         return None
-    at = np.linspace(np.log(low), np.log(high), POINTS)
-    our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
+    log_error = np.linspace(np.log(low), np.log(high), POINTS)
+    our_time, their_time = (np.interp(log_error, *np.log(np.array(points)).T) for points in fronts)
     ratio = np.exp(their_time - our_time)
     return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())
 
 
 def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:
     """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
-    from rbdyn.plots.error_against_time import failed_at_the_edge, logarithmic, method_lines
-    from rbdyn.plots.style import GREY, label_ends, plt, save
+    from rbdyn.plots.style import GREY, failed_at_the_edge, label_ends, logarithmic, method_lines, plt, save
 
     figure, axis = plt.subplots(figsize=(8.6, 6.0))
     across = f"largest position error after {turns:g} shaft turns, worst of the starts [m]"
@@ -349,12 +560,12 @@ def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) ->
         if not a.position_error_m and a.turn_ms and a.method in colours:
             failures.setdefault(a.method, ([], colours[a.method]))[0].append(a.turn_ms)
     axis.margins(0.08)
-    left, right = axis.get_xlim()
-    if floor > left:
-        axis.axvspan(left, floor, color="0.93", zorder=0)
+    limits = axis.get_xlim()
+    if floor > limits[0]:
+        axis.axvspan(limits[0], floor, color="0.93", zorder=0)
         axis.annotate("not resolved", (floor, 0.5), xycoords=axis.get_xaxis_transform(), fontsize=8,
                       color=GREY, ha="left", rotation=90, xytext=(3, 0), textcoords="offset points")  # fmt: skip
-    axis.set_xlim(left, right)
+    axis.set_xlim(limits)
     axis.set_ylim(top=axis.get_ylim()[1] * 1.6)
     failed_at_the_edge(axis, failures)
     label_ends(axis, ends)

@@ -1,4 +1,4 @@
-"""What a study hands over: one record, tables to print, sheets and pictures to write."""
+"""Report of a study: one record, tables to print, sheets and pictures to write."""
 
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.records import save_table
-from rbdyn.base.render import terminal
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.result import versions, write_json
 
 T = TypeVar("T")
-# Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
+# By heading: field of a row and format of its figure, see ``cell``, or a function from a row to its text.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
 
 
@@ -32,21 +32,21 @@ class Report:
 
 
 class Progress:
-    """Counts what is done out of a known total."""
+    """Counts steps of a known total."""
 
     def __init__(self, report: Reporter, total: int) -> None:
-        self.report, self.total, self.done = report, total, 0
+        self.report, self.total, self.count = report, total, 0
 
     def step(self, *part: int) -> None:
-        """One more is done; what a ``part`` counts of its own does not matter here."""
-        self.done += 1
+        """Count one more step; the counts of a ``part`` itself do not matter."""
+        self.count += 1
         if self.report is not None:
-            self.report(self.done, self.total)
+            self.report(self.count, self.total)
 
     def over(self, items: Iterable[T]) -> Iterator[T]:
-        """The items; when the next one is asked for, one more is done."""
-        for each in items:
-            yield each
+        """The items; each counts as a step when the next one is requested."""
+        for item in items:
+            yield item
             self.step()
 
 
@@ -66,7 +66,9 @@ def columns_of(kind: type[Any]) -> dict[str, tuple[str, str]]:
 def tabled(title: str, rows: Iterable[Any], columns: Columns) -> Table:
     """Table of rows, a line each."""
     lines = [
-        tuple(each(row) if callable(each) else cell(getattr(row, each[0]), each[1]) for each in columns.values())
+        tuple(
+            column(row) if callable(column) else cell(getattr(row, column[0]), column[1]) for column in columns.values()
+        )
         for row in rows
     ]
     return Table(title, tuple(columns), lines)
@@ -78,8 +80,9 @@ def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
 
 
 def flat(row: Mapping[str, Any], opened: str = "") -> dict[str, Any]:
-    """A record without nesting, for a sheet: figures of a table within it become ``name_table``, or plain ``name`` where
-    that is ``opened``.
+    """A record without nesting, for a sheet: figures of a table within it become ``name_table``.
+
+    Those of the table ``opened`` become plain ``name``.
     """
     row = {key: value for key, value in row.items() if key != opened} | (row.get(opened) or {})
     nested = {key: value for key, value in row.items() if isinstance(value, dict)}
@@ -101,7 +104,7 @@ def reported(
     form: str = "",
     **parts: Any,
 ) -> Report:
-    """A study of one sheet and at most one picture, which have its name as its format has; ``parts`` of its record."""
+    """Report of one sheet and at most one picture, named like the format; ``parts`` go into the record."""
     pictures = {} if draw is None else {stem: draw}
     return Report(stem, record(form or f"rbdyn.{stem}/1", **parts), tables, sentences, {stem: sheet}, pictures)
 

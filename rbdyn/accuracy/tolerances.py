@@ -1,14 +1,14 @@
 """Error against run time of the time integration: bias of the statistics at each tolerance, and error of the motion itself.
 
 Every tolerance runs the same seeded replicates, one at a time, after everything was compiled; the reference is the tightest.
-What an error allows to be said of a relative difference d, known to its 95 % half-width e, where a is the accuracy sought:
+What an error allows to say of a relative difference d with the 95 % half-width e, where a is the margin:
 
-- within, where e <= a and |d| <= a;
-- beyond, where |d| > a and either e <= a, or |d| - e > a: a large difference is plain in spite of a large error;
-- undecided otherwise: the error hides it.
+- within, where e <= a and |d| <= a
+- beyond, where |d| > a and either e <= a, or |d| - e > a: a large difference is clear in spite of a large error
+- undecided otherwise: the error exceeds it
 
-Half-widths fall as one over the root of the counted turns; with replicates Student's factor falls too. From this law
-follow the turns or the replicates that would decide.
+Half-widths decrease as one over the root of the counted turns; with more replicates Student's factor decreases too. This law
+gives the turns or the replicates that would decide.
 """
 
 import math
@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 import numpy as np
 
 from rbdyn.accuracy import methods
-from rbdyn.accuracy.integrators import COMPILED
+from rbdyn.accuracy.methods import COMPILED
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
@@ -35,10 +35,10 @@ from rbdyn.scene import Scene
 
 Verdict = Literal["within", "beyond", "undecided"]
 
-# A per cent is less than two bearings of one lot differ by.
-SOUGHT = 0.01
+# Relative differences up to this do not matter: two bearings of one lot differ by more.
+MARGIN = 0.01
 NORMAL = 1.96
-# From so many replicates on Student's factor is that of the normal distribution to two digits.
+# From so many replicates on Student's factor equals that of the normal distribution to two digits.
 MANY = 100
 
 
@@ -50,37 +50,38 @@ class Difference(NamedTuple):
     error: float
 
 
-def judged(value: float, error: float, sought: float = SOUGHT) -> Verdict:
-    """What can be said of a difference that is known to ``error``; all relative. An error of NaN decides nothing."""
+def judged(value: float, error: float, margin: float = MARGIN) -> Verdict:
+    """Verdict on a difference with its ``error``; all relative. An error of NaN decides nothing."""
     size = abs(value)
-    if size > sought and (error <= sought or size - error > sought):
+    if size > margin and (error <= margin or size - error > margin):
         return "beyond"
-    return "within" if error <= sought and size <= sought else "undecided"
+    return "within" if error <= margin and size <= margin else "undecided"
 
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict:
-    """That of several differences at once: one beyond settles it, one undecided leaves it open."""
-    given = set(verdicts)
-    return "beyond" if "beyond" in given else "undecided" if "undecided" in given else "within"
+    """Verdict on several differences at once: one beyond decides it, else one undecided leaves it open."""
+    kinds = set(verdicts)
+    return "beyond" if "beyond" in kinds else "undecided" if "undecided" in kinds else "within"
 
 
 def check_replicates(scene: Scene) -> None:
     """Raises InputError for a single replicate, whose mean has no error here."""
     if scene.numerics.replicates < 2:
-        what = "numerics.replicates = 1: the study compares means over replicates"
-        raise InputError([f"{what}; give at least 2, better 8"])
+        raise InputError(
+            ["numerics.replicates = 1: the study compares means over replicates; give at least 2, better 8"]
+        )
 
 
-def turns_needed(error: float, turns: float, sought: float = SOUGHT) -> float:
-    """Counted turns of a replicate at which a half-width of ``error`` after ``turns`` would fall to ``sought``."""
-    return turns * (error / sought) ** 2
+def turns_needed(error: float, turns: float, margin: float = MARGIN) -> float:
+    """Counted turns of a replicate at which a half-width of ``error`` after ``turns`` would fall to ``margin``."""
+    return turns * (error / margin) ** 2
 
 
-def replicates_needed(error: float, replicates: int, sought: float = SOUGHT) -> int:
-    """Replicates at which a half-width of ``error`` over ``replicates`` > 1 of them would fall to ``sought``."""
+def replicates_needed(error: float, replicates: int, margin: float = MARGIN) -> int:
+    """Replicates at which a half-width of ``error`` over ``replicates`` > 1 of them would fall to ``margin``."""
     scatter = error * math.sqrt(replicates) / student_factor(replicates - 1)
-    needed = max(math.ceil((NORMAL * scatter / sought) ** 2), 2)
-    while needed < MANY and student_factor(needed - 1) * scatter > sought * math.sqrt(needed):
+    needed = max(math.ceil((NORMAL * scatter / margin) ** 2), 2)
+    while needed < MANY and student_factor(needed - 1) * scatter > margin * math.sqrt(needed):
         needed += 1
     return needed
 
@@ -96,15 +97,16 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.2g} %"
 
 
-def undecided(hidden: Iterable[Difference], scene: Scene, sought: float = SOUGHT) -> str:
-    """What hides what, and the turns or replicates that would show; the least known of ``hidden`` speaks for all."""
+def undecided(hidden: Iterable[Difference], scene: Scene, margin: float = MARGIN) -> str:
+    """Largest error of ``hidden`` differences, and the turns or replicates that would decide."""
     worst = max(hidden, key=lambda difference: difference.error)
     numerics = scene.numerics
-    turns = turns_needed(worst.error, numerics.turns, sought)
-    replicates = replicates_needed(worst.error, numerics.replicates, sought)
-    hides = f"errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where})"
-    fix = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
-    return f"undecided: {hides}; to show {percent(sought)} {fix}"
+    turns = turns_needed(worst.error, numerics.turns, margin)
+    replicates = replicates_needed(worst.error, numerics.replicates, margin)
+    return (
+        f"undecided: errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where}); to show "
+        f"{percent(margin)} raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
+    )
 
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
@@ -113,7 +115,7 @@ OUTPUTS: dict[str, Callable[[Replicate], float]] = {
     "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
     "power_loss_W": lambda run: run.power_loss,
 }
-# A gap of the power balance, or an error of a load, below this hurts nobody; neither of them scatters.
+# A gap of the power balance, or an error of a load, below this does not matter; neither of them scatters.
 NEGLIGIBLE = 0.005
 
 
@@ -124,40 +126,40 @@ class Bias(Record):
     bias: dict[str, float]
     bias_error: dict[str, float]
 
-    def verdict_of(self, name: str, sought: float = SOUGHT) -> Verdict:
-        """Whether an output is off by more than ``sought``, as far as its error shows."""
-        return judged(self.bias[name], self.bias_error[name], sought)
+    def verdict_of(self, name: str, margin: float = MARGIN) -> Verdict:
+        """Whether an output is off by more than ``margin``, as far as its error shows."""
+        return judged(self.bias[name], self.bias_error[name], margin)
 
-    def verdict(self, sought: float = SOUGHT) -> Verdict:
-        """That of all outputs together."""
-        return overall(self.verdict_of(name, sought) for name in OUTPUTS)
+    def verdict(self, margin: float = MARGIN) -> Verdict:
+        """Verdict on all outputs together."""
+        return overall(self.verdict_of(name, margin) for name in OUTPUTS)
 
     @property
     def known_to(self) -> float:
         """Largest 95 % error of any output."""
         return max(self.bias_error[name] for name in OUTPUTS)
 
-    def hidden(self, row: str, sought: float = SOUGHT) -> list[Difference]:
-        """Differences that their errors hide; ``row`` says where."""
+    def hidden(self, row: str, margin: float = MARGIN) -> list[Difference]:
+        """Undecided differences; ``row`` says where."""
         return [
             Difference(f"{name} at {row}", self.bias[name], self.bias_error[name])
             for name in OUTPUTS
-            if self.verdict_of(name, sought) == "undecided"
+            if self.verdict_of(name, margin) == "undecided"
         ]
 
 
 B = TypeVar("B", bound=Bias)
 
 
-def first_within(rows: Iterable[B], name: Callable[[B], str], sought: float) -> tuple[B | None, list[Difference]]:
-    """The first row, cheapest first, shown to be within what is sought, and what errors hide of those before."""
+def first_within(rows: Iterable[B], name: Callable[[B], str], margin: float) -> tuple[B | None, list[Difference]]:
+    """The first row, cheapest first, with all outputs within the margin, and the undecided differences before it."""
     hidden: list[Difference] = []
     for row in rows:
-        verdict = row.verdict(sought)
+        verdict = row.verdict(margin)
         if verdict == "within":
             return row, hidden
         if verdict == "undecided":
-            hidden += row.hidden(name(row), sought)
+            hidden += row.hidden(name(row), margin)
     return None, hidden
 
 
@@ -173,8 +175,7 @@ class Row(Bias):
 
 
 class StatisticsBias(Record):
-    """Rows, loosest tolerance first; the last is the reference. ``failures``: tolerances at which a replicate could
-    not go on, and why."""
+    """Rows, loosest tolerance first; the last is the reference. ``failures``: reasons by tolerance of runs that failed."""
 
     rows: Sequence[Row]
     failures: dict[float, str]
@@ -205,23 +206,26 @@ def statistics_bias(
     return StatisticsBias(rows[::-1], failures)
 
 
-def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
-    """Which tolerance to take: the loosest shown to bias no output and to close in power, or what hides it.
+def conclusion(rows: Sequence[Row], scene: Scene, margin: float = MARGIN) -> str:
+    """Which tolerance to take: the loosest that biases no output and closes in power, or why that is undecided.
 
-    The last row, with which the others are compared, is no evidence for itself.
+    The last row is the reference and no evidence for itself.
     """
     reference = rows[-1]
     closing = [row for row in rows[:-1] if row.power_gap <= NEGLIGIBLE]
-    chosen, hidden = first_within(closing, lambda row: f"rtol {row.rtol:g}", sought)
-    rest = undecided(hidden, scene, sought) if hidden else ""
-    if chosen is None:
-        looser = f"no tolerance looser than the reference, rtol {reference.rtol:g}"
-        kept = f"biases of at most {percent(sought)} and a power balance that closes within {percent(NEGLIGIBLE)}"
-        return rest or f"{looser}, has {kept}"
-    biases = f"biases measure at most {percent(sought)} (their errors at most {percent(chosen.known_to)})"
-    closes = f"whose power balance closes within {percent(NEGLIGIBLE)}: {chosen.turn_ms:.2f} ms a shaft turn"
-    which = f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose {biases} and {closes}"
-    return f"{which}. The scene has {scene.numerics.rtol:g}." + (f" Looser ones are {rest}." if hidden else "")
+    best, hidden = first_within(closing, lambda row: f"rtol {row.rtol:g}", margin)
+    rest = undecided(hidden, scene, margin) if hidden else ""
+    if best is None:
+        return rest or (
+            f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(margin)} and a "
+            f"power balance that closes within {percent(NEGLIGIBLE)}"
+        )
+    sentence = (
+        f"rtol {best.rtol:g} is {'one' if hidden else 'the loosest'} whose biases measure at most {percent(margin)} (their "
+        f"errors at most {percent(best.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
+        f"{best.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
+    )
+    return f"{sentence} Looser ones are {rest}." if hidden else sentence
 
 
 def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
@@ -236,24 +240,24 @@ def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
     return Bias(value, bias, bias_error)
 
 
-def table(biases: StatisticsBias, sought: float = SOUGHT) -> Table:
+def table(biases: StatisticsBias, margin: float = MARGIN) -> Table:
     """Table for the terminal; failed tolerances at the end."""
     reference = biases.rows[-1]
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
-    ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(sought, reference)})
+    ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(margin, reference)})
     failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in biases.failures]
     return replace(ran, rows=[*ran.rows, *failed])
 
 
-def bias_columns(sought: float, reference: Bias | None = None) -> dict[str, Callable[[Bias], str]]:
-    """Columns of the bias of each output with its error, and of what they say; ``reference`` is not judged."""
+def bias_columns(margin: float, reference: Bias | None = None) -> dict[str, Callable[[Bias], str]]:
+    """Columns of the bias of each output with its error, and of the verdict; ``reference`` has none."""
 
     def output(name: str) -> Callable[[Bias], str]:
         return lambda row: f"{signed_with_error(100.0 * row.bias[name], 100.0 * row.bias_error[name])} %"
 
     return {
         **{name: output(name) for name in OUTPUTS},
-        f"within {percent(sought)}": lambda row: "reference" if row is reference else row.verdict(sought),
+        f"within {percent(margin)}": lambda row: "reference" if row is reference else row.verdict(margin),
     }
 
 
@@ -269,7 +273,7 @@ def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Repli
     )
 
 
-# Of the record of the trajectories, what stands in that of the study.
+# Keys of the record of the trajectories that the record of the study contains.
 MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
 
 
@@ -278,43 +282,43 @@ def study(
     progress: Reporter = None,
     turns: float = methods.DEFAULT_TURNS,
     rtols: Sequence[float] = TOLERANCES,
-    sought: float = SOUGHT,
+    margin: float = MARGIN,
 ) -> Report:
-    """``rbdyn accuracy SCENE tolerances``: bias of the statistics, judged to ``sought``, and the trajectories of the compiled methods.
+    """``rbdyn accuracy SCENE tolerances``: bias of the statistics against a ``margin``, and trajectories of the compiled methods.
 
     Raises InputError, RunError where a reference fails, KeyboardInterrupt.
     """
     check_replicates(scene)
     motion = methods.study(scene, progress, turns, COMPILED)
     biases = statistics_bias(scene, rtols, progress)
-    chosen = conclusion(biases.rows, scene, sought)
+    choice = conclusion(biases.rows, scene, margin)
     numerics, rows = scene.numerics, records(biases.rows)
     agreement, trajectories, _ = motion.tables
     failures = {f"{rtol:g}": why for rtol, why in biases.failures.items()}
-    told = record(
+    content = record(
         "rbdyn.accuracy/1",
         rows=rows,
-        sought=sought,
+        sought=margin,
         failures=failures,
-        conclusion=chosen,
+        conclusion=choice,
         turns=numerics.turns,
         replicates=numerics.replicates,
         trajectory={key: motion.record[key] for key in MOTION},
     )
-    sentences = *motion.sentences, chosen, *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items())
+    sentences = *motion.sentences, choice, *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items())
     return Report(
         "accuracy",
-        told,
-        (agreement, trajectories, table(biases, sought)),
+        content,
+        (agreement, trajectories, table(biases, margin)),
         (*sentences, f"{numerics.replicates} replicates of {numerics.turns:g} turns"),
         {"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
-        {"accuracy": lambda path: _draw(biases.rows, path, sought), "trajectory": motion.pictures["methods"]},
+        {"accuracy": lambda path: _draw(biases.rows, path, margin), "trajectory": motion.pictures["methods"]},
     )
 
 
-def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
+def _draw(rows: Sequence[Row], path: Any, margin: float) -> None:
     """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
-    from rbdyn.plots.error_against_time import biases_at_work
+    from rbdyn.plots.style import biases_at_work
 
     labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
-    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")
+    biases_at_work(rows, path, margin, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")

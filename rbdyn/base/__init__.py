@@ -1,7 +1,7 @@
-"""Ground floor of both packages; knows no bearing.
+"""Shared parts of both packages, without any bearing: input, records, files, words and commands.
 
-- ``faults``: errors that say how to fix them; ``fields``: keys with units; ``arrays``
-- ``records``: results as JSON, tables and CSV; ``storage``: finished parts on disk; ``cache``: digests and the user's folder; ``sources``: the code they depend on
-- ``words``: how values, errors and counts are written; ``blocks``, ``render``: what is said, and its renderings
-- ``loading``, ``streams``, ``terminal``, ``options``, ``ranges``: what commands share; ``forecast``: how long runs take
+- ``faults``: what a user typed, its number types, and errors that say how to fix them; ``arrays``
+- ``records``: results as JSON, tables and CSV; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
+- ``words``: how values, errors and counts are written; ``blocks``: what is said; ``terminal``, ``markdown``, ``html``: its renderings
+- ``loading``, ``streams``, ``command``: what commands share; ``forecast``: how long runs take
 """

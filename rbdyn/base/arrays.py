@@ -1,4 +1,4 @@
-"""Arrays by what they hold: the types that most of both packages works on."""
+"""Types of arrays by their elements."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +6,4 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-
-
 Rows = NDArray[np.intp]

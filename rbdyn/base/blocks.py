@@ -1,4 +1,4 @@
-"""What a result says, as one tree of blocks that terminal, Markdown and HTML render. Text is plain: a renderer escapes it."""
+"""Blocks of a report: one tree that terminal, Markdown and HTML render. Text is plain: a renderer escapes it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 
 class Detail(IntEnum):
-    """How much a reader of the terminal asks for: quietly the least, usually more, verbosely all. Files hold all."""
+    """Level of detail on the terminal; files hold all blocks."""
 
     LEAST = 0
     USUAL = 1
@@ -15,7 +15,7 @@ class Detail(IntEnum):
 
     @classmethod
     def of(cls, quiet: bool, verbose: bool = False) -> Self:
-        """That of the options ``--quiet`` and ``--verbose``, of which the first counts."""
+        """Level by the options ``--quiet`` and ``--verbose``; the first prevails."""
         return cls.LEAST if quiet else cls.ALL if verbose else cls.USUAL
 
 
@@ -30,7 +30,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Note:
-    """A limit of the model that was met, or another remark on how far the result can be trusted."""
+    """A remark on the validity of the result, such as a limit of the model."""
 
     text: str
     detail: Detail = Detail.USUAL
@@ -54,7 +54,7 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Table:
-    """A table whose first column names the row; ``folded`` ones are opened on demand, ``sortable`` ones sorted by any column.
+    """A table whose first column names the row; a ``folded`` one opens on demand, a ``sortable`` one sorts by any column.
 
     ``text_columns``: further columns that hold text rather than numbers.
     """
@@ -69,7 +69,7 @@ class Table:
     detail: Detail = Detail.LEAST
 
     def without_empty_columns(self) -> Self:
-        """The same table, columns in which no row says anything left out."""
+        """The same table without its empty columns."""
         full = [place for place in range(len(self.header)) if place == 0 or any(row[place] for row in self.rows)]
         return replace(
             self,
@@ -81,7 +81,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Tile:
-    """One figure that the eye finds first: its name, value and unit, and further figures of the same unit by what they are."""
+    """One prominent figure: its name, value and unit, and further figures of that unit by name."""
 
     name: str
     value: str
@@ -91,7 +91,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Tiles:
-    """Figures next to each other; ``value`` says what their values are."""
+    """Prominent figures next to each other; ``value`` describes their values."""
 
     caption: str
     value: str
@@ -100,7 +100,7 @@ class Tiles:
 
     @property
     def table(self) -> Table:
-        """The same figures as a table, a row each."""
+        """The same figures as a table, one row each."""
         names = list(dict.fromkeys(name for tile in self.tiles for name, _ in tile.further))
         rows = [
             [
@@ -115,9 +115,9 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Figures:
-    """Still pictures next to each other with one caption; left out where pictures cannot be shown.
+    """Still pictures next to each other with one caption; left out where a rendering has no pictures.
 
-    pictures : SVG, or what draws it; only a page calls for it
+    pictures : SVG, or functions that draw it, which only a page calls
     """
 
     pictures: Sequence[str | Callable[[], str]]
@@ -128,7 +128,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Widget:
-    """Place of an interactive picture; left out where there are no scripts."""
+    """Place of an interactive picture; left out where a rendering has no scripts."""
 
     name: str
     detail: Detail = Detail.LEAST
@@ -147,12 +147,12 @@ class Section:
 
 
 def notes(texts: Iterable[str], detail: Detail = Detail.USUAL) -> list[Block]:
-    """A note a text."""
+    """One note for each text."""
     return [Note(text, detail=detail) for text in texts]
 
 
 def says(block: Block) -> bool:
-    """Whether there is anything in a block: a table has rows, a list items, a paragraph words."""
+    """Whether a block has content: a table rows, a list items, a paragraph words."""
     match block:
         case Table(rows=content) | Bullets(items=content) | Tiles(tiles=content) | Figures(pictures=content):
             return bool(content)

@@ -1,7 +1,7 @@
 """Records: frozen dataclasses whose fields, listed once, are the keys of their JSON form, in this order.
 
-A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` or ``outside_json``; ``derived`` ones follow from
-the others; one whose default is None is left out where it is None.
+The key of a field is its name, unless it is ``keyed`` otherwise, ``spread`` or ``outside_json``. ``derived`` fields follow from
+the others. A field whose default is None is left out where it is None.
 
 Cells of CSV files are written so that no program takes them for formulas and numbers keep their digits.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# What fields are declared to be, of a class.
+# Declared types of the fields of a class.
 _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
 
 
@@ -32,7 +32,7 @@ def keyed(*path: str, **options: Any) -> Any:
 
 
 def spread(**options: Any) -> Any:
-    """A table or record whose keys stand among those of its owner; None has none. Read, it gets all keys of no other field."""
+    """A table or record whose keys are merged into those of its owner; read back, it takes all keys of no other field."""
     return keyed(**options)
 
 
@@ -54,52 +54,52 @@ def outside_json(**options: Any) -> Any:
 @dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, outside_json))
 @dataclass(frozen=True)
 class Record:
-    """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only.
+    """Base of all records, which makes them frozen dataclasses; ``kw_only``: with named arguments only.
 
-    One that states itself in brief, before this base, keeps its own ``repr``.
+    A record whose first base is ``Brief`` keeps the ``repr`` of that.
     """
 
     def __init_subclass__(cls, kw_only: bool = False) -> None:
         dataclass(frozen=True, kw_only=kw_only, repr=not issubclass(cls, Brief))(cls)
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            if "by" in one.metadata:
-                object.__setattr__(self, one.name, one.metadata["by"](self))
+        for item in fields(self):
+            if "by" in item.metadata:
+                object.__setattr__(self, item.name, item.metadata["by"](self))
 
     def as_dict(self) -> dict[str, Any]:
         """JSON form, which shares nothing with the record: plain numbers, lists and tables, units in the names."""
-        found: dict[str, Any] = {}
-        for one, path in json_fields(self):
-            value = plain(getattr(self, one.name))
-            if value is None and one.default is None:
+        record: dict[str, Any] = {}
+        for item, path in json_fields(self):
+            value = plain(getattr(self, item.name))
+            if value is None and item.default is None:
                 continue
-            table = found
+            table = record
             for key in path[:-1]:
                 table = table.setdefault(key, {})
             table.update({path[-1]: value} if path else value or {})
-        return found
+        return record
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
-        taken = {key for _, path in json_fields(cls) for key in path[:1]}
-        found: dict[str, Any] = {}
-        for one, path in json_fields(cls):
-            if not one.init or (path and one.default is None and path[0] not in data):
+        own_keys = {key for _, path in json_fields(cls) for key in path[:1]}
+        values: dict[str, Any] = {}
+        for item, path in json_fields(cls):
+            if not item.init or (path and item.default is None and path[0] not in data):
                 continue
-            value: Any = data if path else {key: value for key, value in data.items() if key not in taken}
+            value: Any = data if path else {key: value for key, value in data.items() if key not in own_keys}
             for key in path:
                 value = value[key]
-            if path or value or one.default is MISSING:
-                found[one.name] = restored(_kinds(cls)[one.name], value)
-        return cls(**found)
+            if path or value or item.default is MISSING:
+                values[item.name] = restore(_kinds(cls)[item.name], value)
+        return cls(**values)
 
 
 def json_fields(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
-    """Fields that JSON holds, each with its keys there from the outermost in; one that is spread has none of its own."""
-    paths = ((one, one.metadata.get("path", (one.name,))) for one in fields(record))
-    return [(one, path) for one, path in paths if path is not None]
+    """Fields in JSON, each with its keys from the outermost in; a ``spread`` field has no key of its own."""
+    paths = ((item, item.metadata.get("path", (item.name,))) for item in fields(record))
+    return [(item, path) for item, path in paths if path is not None]
 
 
 def plain(value: Any) -> Any:
@@ -107,30 +107,30 @@ def plain(value: Any) -> Any:
     if isinstance(value, Record):
         return value.as_dict()
     if isinstance(value, Mapping):
-        return {str(key): plain(each) for key, each in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(each) for each in value]
+        return [plain(item) for item in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def finite(value: float) -> float | None:
-    """A figure; None where it is infinite or no number, which JSON does not know."""
+    """A figure; None where it is infinite or NaN, which JSON cannot hold."""
     return value if math.isfinite(value) else None
 
 
-def restored(kind: Any, value: Any) -> Any:
-    """A value of JSON as the ``kind`` that a field is declared to be. Raises KeyError or TypeError where it is none."""
-    origin, of = get_origin(kind), get_args(kind)
+def restore(kind: Any, value: Any) -> Any:
+    """A value of JSON as the declared ``kind`` of a field. Raises KeyError or TypeError where it is of another kind."""
+    origin, kinds = get_origin(kind), get_args(kind)
     if kind is Any:
         return value
     if origin in (UnionType, Union):
-        for each in of:
+        for candidate in kinds:
             with suppress(KeyError, TypeError):
-                return restored(each, value)
+                return restore(candidate, value)
     elif origin is dict and isinstance(value, dict):
-        return {key: restored(of[1], each) for key, each in value.items()}
+        return {key: restore(kinds[1], item) for key, item in value.items()}
     elif origin in (list, tuple) and isinstance(value, list):
-        return origin(restored(of[0], each) for each in value)
+        return origin(restore(kinds[0], item) for item in value)
     elif isinstance(kind, type) and issubclass(kind, Record) and isinstance(value, dict):
         return kind.from_dict(value)
     elif type(value) is kind or (kind is float and type(value) is int):
@@ -138,20 +138,20 @@ def restored(kind: Any, value: Any) -> Any:
     raise TypeError(f"{value!r} is not of {kind}")
 
 
-# As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
+# A number as every program writes it: float() also accepts 1_000, nan and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-# What a formula begins with, also behind quotes: these are text of their own.
+# The start of a formula, also behind quotes, which belong to the text.
 FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 
 
 def quoted_cell(value: Any) -> Any:
-    """A cell as it is written: text that is no number and looks like a formula with one quote more in front."""
+    """A cell as written: text that looks like a formula, but is no number, gets a further quote in front."""
     formula = isinstance(value, str) and FORMULA.match(value) and not NUMBER.fullmatch(value)
     return f"'{value}" if formula else value
 
 
 def plain_cell(text: str) -> str:
-    """The text of a cell as it was before it was written."""
+    """Inverse of ``quoted_cell``: the text of a cell as read."""
     return text[1:] if text.startswith("'") and FORMULA.match(text) else text
 
 

@@ -1,6 +1,6 @@
-"""Finished parts of a long command, a line each in a file next to its results: one that was stopped goes on from there.
+"""Checkpoints of long commands: finished parts, a line each in a file next to the results, from which a command resumes.
 
-A line is there whole or not at all: it begins with the SHA-256 of the rest, and what does not fit it is not read.
+Each line begins with the SHA-256 of the rest; a damaged line is ignored.
 """
 
 import hashlib
@@ -9,32 +9,32 @@ import os
 from pathlib import Path
 from typing import Any
 
-from rbdyn.base.sources import source_digest
+from rbdyn.base.digests import source_digest
 from rbdyn.result import versions
 
 
-class Kept:
-    """Records by key in the file ``path``; without one nothing is kept."""
+class Checkpoint:
+    """Records by key in the file ``path``; None saves nothing."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        self._found: dict[str, Any] = {}
+        self._records: dict[str, Any] = {}
         if path is not None and path.exists():
             for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
                 digest, _, text = line.partition(" ")
                 if digest == digest_of(text):
-                    self._found.update([json.loads(text)])
+                    self._records.update([json.loads(text)])
 
     def get(self, key: str) -> Any:
         """The record of a key, or None."""
-        return self._found.get(key)
+        return self._records.get(key)
 
     def put(self, key: str, record: Any) -> None:
-        """Keep a record; it is on the disk when this returns. Raises OSError."""
+        """Save a record; it is on the disk when this returns. Raises OSError."""
         if self.path is None:
             return
         text = json.dumps([key, record])
-        # Begun on a new line, lest the end of one that was cut short spoil it.
+        # The line break comes first, in case an interrupted write left a partial line.
         with self.path.open("a", encoding="utf-8") as file:
             file.write(f"\n{digest_of(text)} {text}\n")
             file.flush()
@@ -47,19 +47,19 @@ def run_key(scene: dict[str, Any], version: str) -> str:
 
 
 def code_version(*modules: str) -> str:
-    """Version of all that the bits of a run depend on: packages, and the code that these modules run."""
+    """Version of all that decides the bits of a run: packages, and the code that these modules run."""
     packages = {name: version for name, version in versions().items() if name != "python"}
     return json.dumps({**packages, "sources": source_digest(*modules)}, sort_keys=True)
 
 
 def sign(record: dict[str, Any]) -> None:
-    """Put the digest of all else under ``sha256``, so that a record read back is known to be as it was written."""
+    """Put the digest of all other keys under ``sha256``, by which ``intact`` recognizes an unchanged record."""
     record.pop("sha256", None)
     record["sha256"] = digest_of(json.dumps(record))
 
 
 def intact(record: dict[str, Any]) -> bool:
-    """Whether a record read from JSON is as ``sign`` left it."""
+    """Whether a record from JSON is unchanged since ``sign``."""
     rest = {key: value for key, value in record.items() if key != "sha256"}
     return record.get("sha256") == digest_of(json.dumps(rest))
 

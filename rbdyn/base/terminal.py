@@ -1,230 +1,145 @@
-"""What the commands share: exit codes, messages, JSON, progress. Knows no physics.
+"""Blocks as text in the width of the terminal. Loads ``rich`` only for tables."""
 
-
-
-How long the rest of a row of runs takes, from when those before it ended. Loads nothing.
-"""
-
-import errno
-import json
+import io
 import os
+import shutil
 import sys
-import time
-from bisect import bisect_left
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NoReturn
+from collections.abc import Iterable, Sequence
+from textwrap import wrap
+from typing import NamedTuple
 
-import typer
+from rbdyn.base.blocks import Block, Bullets, Detail, Heading, Note, Paragraph, Table, Tiles, says
 
-from rbdyn.base.blocks import Table
-from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.render.terminal import show
-from rbdyn.base.storage import digest_of
-from rbdyn.base.streams import FAILED
-from rbdyn.result import read_json, write_json
-
-# Ends that are looked back on: what a run takes may change on the way.
-LOOK_BACK = 256
-# A first report that comes within this time [s] counts runs that were there before.
-AT_ONCE_S = 0.2
+# Characters around the text of each column of a table, and around the whole table.
+PADDING, FRAME = 3, 1
+# Longest cell that is never broken.
+SHORT = 20
+# Width of tables in a file or a pipe.
+WIDE = 160
 
 
-class Remaining:
-    """Time left of runs, so many ``workers`` at once, that take about equally long.
-
-    As many run as there are workers, so a run began when the one as many places before it ended. The first ones, which also
-    wait for what is compiled, count only until others have ended.
-    """
-
-    def __init__(self, workers: int = 1, clock: Callable[[], float] = time.monotonic) -> None:
-        self._workers, self._clock = max(workers, 1), clock
-        self._ends = deque([(0, clock())], maxlen=LOOK_BACK)
-        self._total = 0
-
-    def update(self, done: int, total: int) -> None:
-        """So many of all runs have ended by now."""
-        self._total, now = total, self._clock()
-        last, since = self._ends[-1]
-        if len(self._ends) == 1 and (done == last or now - since < AT_ONCE_S):
-            self._ends[0] = done, now
-        elif done > last:
-            self._ends.append((done, now))
-
-    @property
-    def seconds(self) -> float | None:
-        """Time left [s]; None until a second run has ended."""
-        done = self._ends[-1][0]
-        if self._total <= done:
-            return 0.0 if self._total else None
-        first, workers = self._ends[0][0], min(self._workers, self._total - self._ends[0][0])
-        if done < first + 2:
-            return None
-        each = self._each(first, workers, done)
-        left, now = self._total - done, self._clock()
-        running = range(done + 1, done + min(workers, left) + 1)
-        begun = [self._end(max(place - workers, first)) for place in running]
-        # One that takes longer than the others may end at any time.
-        free = sorted(max(start + each - now, 0.0) for start in begun)
-        rounds, more = divmod(left - len(free), len(free))
-        return max(time_free + each * (rounds + (place < more)) for place, time_free in enumerate(free))
-
-    def _each(self, first: int, workers: int, done: int) -> float:
-        """What a run takes, by those that began as another ended; before there are any, by all."""
-        since = next(count for count, _ in self._ends if count >= min(first + workers, done))
-        if since < done:
-            starts, ends = (sum(self._end(place - back) for back in range(workers)) for place in (since, done))
-            return (ends - starts) / (done - since)
-        begin = self._ends[0][1]
-        whole = sum(self._end(place) - begin for place in range(done - min(workers, done - first) + 1, done + 1))
-        return whole / (done - first)
-
-    def _end(self, place: int) -> float:
-        """When the run at a place, from 1, ended; those before the first known one, when that was."""
-        return self._ends[min(bisect_left(self._ends, place, key=lambda each: each[0]), len(self._ends) - 1)][1]
-
-
-def clock_words(seconds: float | None) -> str:
-    """Time left as h:mm:ss; dashes while it is not known."""
-    if seconds is None:
-        return "-:--:--"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d}"
-
-
-BAD_INPUT = 2
-# Names what a folder of results was made of.
-MARK = "made_by.json"
-
-
-@contextmanager
-def guarded(as_json: bool) -> Iterator[None]:
-    """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
-    try:
-        yield
-    except InputError as error:
-        _leave(as_json, BAD_INPUT, error.faults)
-    except RunError as error:
-        _leave(as_json, FAILED, [str(error)])
-    except KeyboardInterrupt as error:
-        _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was kept'}"])
-    except MemoryError as error:
-        _leave(
-            as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
-        )
-    except OSError as error:
-        sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
-        _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
-
-
-def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
-    for sentence in sentences:
-        print(sentence, file=sys.stderr)
-    failed = {"status": "interrupted" if code == INTERRUPTED else f"failed: {sentences[0]}"}
-    if as_json:
-        print_json({"status": "refused", "faults": sentences} if code == BAD_INPUT else failed)
-    raise typer.Exit(code)
-
-
-def print_json(record: dict[str, Any]) -> None:
-    """One JSON object on standard output."""
-    print(json.dumps(record, indent=1, allow_nan=False))
-
-
-def hand_over(
-    record: Callable[[], dict[str, Any]],
-    as_json: bool,
-    answer: Callable[[], None],
-    folder: Path | None = None,
-    files: Sequence[str] = (),
-) -> None:
-    """The ``record`` as JSON; else what ``answer`` prints, and the names of the files written, where there is a folder."""
-    if as_json:
-        print_json(record())
+def show(blocks: Iterable[Block], detail: Detail = Detail.USUAL) -> None:
+    """Print blocks on standard output, within the width of a terminal."""
+    if not sys.stdout.isatty():
+        print(text(blocks, detail), end="")
         return
-    answer()
-    if folder:
-        print(f"written to {folder}: {', '.join(files)}")
+    bold = os.environ.get("TERM", "dumb") != "dumb"
+    print(text(blocks, detail, shutil.get_terminal_size().columns, bold), end="")
 
 
-@contextmanager
-def keeping(path: Path | None) -> Iterator[None]:
-    """Let Ctrl-C say that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        if path is None or not path.exists():
-            raise
-        raise KeyboardInterrupt(f"what was finished is kept in {path}: start again to go on") from None
+def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | None = None, bold: bool = False) -> str:
+    """Text of the blocks up to a level of detail, each on lines of its own, without pictures.
 
-
-def output_folder(path: Path, command: str, source: Path) -> Path:
-    """Make the folder that ``--out`` names, for what ``command`` makes of the file ``source``.
-
-    The rule of all commands: a folder belongs to one command and one file, noted in its ``made_by.json``. Results of the
-    same file, by its place or its content, are written over, those of another stay and the folder is refused. All commands
-    of ``doe`` count as one, for those on one study share its store. Raises InputError.
+    width : columns of the terminal; None for a file, whose sentences are one line each.
+    bold : whether headings and captions are in bold type.
     """
-    mark, source = path / MARK, source.resolve()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        digest = digest_of(source.read_bytes())
-        # From the folder on, so that both can be moved, or mounted elsewhere, together.
-        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        marked = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if marked["command"] != command or (own["file"] != marked["file"] and digest != marked["sha256"]):
-            raise InputError(
-                [
-                    f"--out {path}: holds what {marked['command']} made of {os.path.normpath(path / marked['file'])}; "
-                    "name another folder or remove this one"
-                ]
-            )
-        write_json(mark, own)
-    except OSError as error:
-        raise InputError([f"--out {path}: is no folder to write to ({error.strerror}); name another"]) from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
-    return path
+    page = Page(width, bold)
+    written = ""
+    for block in blocks:
+        if block.detail <= detail and says(block):
+            titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
+            written += ("\n" if titled and written and not written.endswith("\n\n") else "") + _render(block, page)
+    return written
 
 
-@contextmanager
-def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
-    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``. ``workers``: how many go on at once, all
-    processors by None."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
+class Page(NamedTuple):
+    """Page of output: its width in characters, None without a limit, and whether it has bold type."""
+
+    width: int | None
+    bold: bool
+
+    def lines(self, text: str) -> str:
+        """A text with line breaks between words at the width of the page."""
+        if self.width is None:
+            return f"{text}\n"
+        broken = (wrap(part, self.width, break_long_words=False, break_on_hyphens=False) for part in text.split("\n"))
+        return "".join(f"{line}\n" for lines in broken for line in lines or [""])
+
+    def title(self, text: str) -> str:
+        """A heading or a caption."""
+        return f"\033[1m{self.lines(text)}\033[0m" if self.bold else self.lines(text)
+
+
+def _render(block: Block, page: Page) -> str:
+    match block:
+        case Paragraph(text):
+            return page.lines(text)
+        case Note(text):
+            return page.lines(f"note: {text}")
+        case Heading(text):
+            return page.title(text)
+        case Bullets(items):
+            return "".join(map(page.lines, items))
+        case Tiles():
+            return _table(block.table, page)
+        case Table():
+            return _table(block, page)
+    return ""
+
+
+def _table(table: Table, page: Page) -> str:
+    """A table; one wider than the page continues below with its first column repeated, so that no word is broken."""
+    from rich import box
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
-    from rich.text import Text
+    from rich.table import Table as Grid
 
-    remaining = Remaining(workers or os.cpu_count() or 1)
-
-    class TimeLeft(ProgressColumn):
-        """The speed that rich estimates is lost where a run takes longer than half a minute."""
-
-        def render(self, task: Task) -> Text:
-            return Text(clock_words(remaining.seconds), style="progress.remaining")
-
-    def progress(done: int, total: int) -> None:
-        remaining.update(done, total)
-        bar.update(task, completed=done, total=total)
-
-    with Progress(
-        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
-    ) as bar:
-        task = bar.add_task(title, total=None)
-        yield progress
-
-
-def notice(quiet: bool) -> Callable[[str], None] | None:
-    """What prints a sentence while a command runs, to standard error, at once; nothing where it is to be quiet."""
-    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
+    texts = [*zip(table.header, *table.rows, strict=True)]
+    words = {0, *table.text_columns}
+    paper = io.StringIO()
+    console = Console(file=paper, width=page.width or WIDE, highlight=False, markup=False, color_system=None)
+    for part in fitting_parts(texts, console.width):
+        grid = Grid(box=box.SIMPLE_HEAD)
+        for place, width in part:
+            justify = "left" if place in words else "right"
+            grid.add_column(table.header[place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
+        for row in table.rows:
+            grid.add_row(*(row[place] for place, _ in part))
+        console.print(grid)
+    caption = page.title(table.caption) if table.caption else ""
+    note = page.lines(table.note) if table.note else ""
+    # rich fills every line to the width of the table.
+    body = "".join(f"{line.rstrip()}\n" for line in paper.getvalue().splitlines())
+    return f"{caption}{body}{note}"
 
 
-def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print one table."""
-    show([Table(title, header, rows)])
+def fitting_parts(texts: Sequence[Sequence[str]], room: int) -> list[list[tuple[int, int]]]:
+    """Parts of a table no wider than ``room``, each with the (place, width) of its columns; ``texts``: the cells by column.
+
+    A column is never narrower than its longest word and its short cells, such as a value with its error. The first column is in
+    every part. Cells too wide for the room next to it are broken.
+    """
+    from rich.cells import cell_len
+
+    room -= FRAME
+    whole_cells = ([*column[0].split(), *(part for text in column[1:] for part in _pieces(text))] for column in texts)
+    least = [max(map(cell_len, cells), default=1) for cells in whole_cells]
+    whole = [max((cell_len(line) for text in column for line in text.splitlines()), default=1) for column in texts]
+    first = min(least[0], max(room // 2 - PADDING, 1)) if len(texts) > 1 else min(least[0], room - PADDING)
+    limit = max(room - first - 2 * PADDING, 1)
+    least = [first, *(min(width, limit) for width in least[1:])]
+    parts: list[list[int]] = [[0]]
+    for column in range(1, len(texts)):
+        if sum(least[place] + PADDING for place in [*parts[-1], column]) > room and len(parts[-1]) > 1:
+            parts.append([0])
+        parts[-1].append(column)
+    return [
+        list(zip(part, _widths([(least[place], whole[place]) for place in part], room), strict=True)) for part in parts
+    ]
+
+
+def _pieces(text: str) -> list[str]:
+    """Pieces of a cell that are never broken."""
+    return text.split() if len(text) > SHORT else [text]
+
+
+def _widths(ends: Sequence[tuple[int, int]], room: int) -> list[int]:
+    """Widths of columns between their least and their whole width, the narrowest widened first."""
+    widths = [least for least, _ in ends]
+    spare = room - sum(width + PADDING for width in widths)
+    while spare > 0:
+        short = [place for place, (_, whole) in enumerate(ends) if widths[place] < whole]
+        if not short:
+            break
+        widths[min(short, key=lambda place: widths[place])] += 1
+        spare -= 1
+    return widths

@@ -1,4 +1,4 @@
-"""How names and numbers are written for people, and the small tables that a notebook shows of a record."""
+"""Names, numbers, values with errors and counts as text, and the small tables that a notebook shows of a record."""
 
 import math
 import re
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple, TypeGuard
 
-# Unit by the end of a name; the longest that fits counts.
+# Unit by the end of a name; the longest match counts.
 UNITS = {
     "mm": "mm", "um": "µm", "mm_um": "mm, µm", "m": "m", "deg": "deg", "mrad": "mrad", "rpm": "rpm", "m_s": "m/s", "m_s2": "m/s²",
     "s": "s", "ms": "ms", "h": "h", "hz": "Hz", "N": "N", "Nm": "N m", "N_m": "N/m", "N_s_m": "N s/m", "s_m": "s/m", "W": "W",
@@ -18,9 +18,9 @@ MOST_PARTS = 3
 UNITLESS = {"mu_m"}
 # A number below this many digits before the point is written without an exponent.
 PLAIN_BELOW = 1e7
-# What is smaller is left over from rounding.
+# Smaller numbers are remainders of rounding.
 NOISE = 1e-12
-# Of more decimals than these a number is written with an exponent.
+# A number with more decimals is written with an exponent.
 MOST_DECIMALS = 9
 MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 
@@ -42,13 +42,13 @@ def label(name: str) -> str:
 
 
 def shown(value: Any, digits: int = 4) -> str:
-    """A value for a table: numbers to ``digits`` significant ones; nothing for what is undefined."""
+    """A value for a table: a number to so many significant ``digits``; an empty text for an undefined value."""
     if value is None:
         return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return ", ".join(shown(each, digits) for each in value)
+        return ", ".join(shown(item, digits) for item in value)
     if not isinstance(value, float):
         return str(value)
     if not math.isfinite(value):
@@ -58,13 +58,13 @@ def shown(value: Any, digits: int = 4) -> str:
 
 
 def counted(number: float, noun: str) -> str:
-    """'1 run', '2 runs', '0 classes': a number of things."""
+    """'1 run', '2 runs', '0 classes': a number with its noun."""
     ending = "" if number == 1 else "es" if noun.endswith(("s", "x", "ch", "sh")) else "s"
     return f"{number:.0f} {noun}{ending}" if number == round(number) else f"{number:g} {noun}{ending}"
 
 
 def are(number: float) -> str:
-    """'is' or 'are', of a number of things."""
+    """'is' or 'are', for a number of things."""
     return "is" if number == 1 else "are"
 
 
@@ -74,75 +74,75 @@ def decimals(error: float) -> int:
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:
-    """'87.09' and '0.35' of 87.0943 and 0.352: the error to two significant digits, the value to the same place.
+    """'87.09' and '0.35' for 87.0943 and 0.352: the error > 0 to two significant digits, the value to the same place.
 
-    The error is positive. Where plain digits are many, both have one exponent: '2.31e-12' and '0.12e-12'.
+    Very large and very small ones share an exponent: '2.31e-12' and '0.12e-12'.
     """
     places, largest = decimals(error), max(abs(value), error)
     if largest < PLAIN_BELOW and places <= MOST_DECIMALS:
         return _to_place(value, places), _to_place(error, places)
     power = int(f"{largest:e}".partition("e")[2])
-    texts = [f"{_to_place(each / 10.0**power, places + power)}e{power}" for each in (value, error)]
+    texts = [f"{_to_place(number / 10.0**power, places + power)}e{power}" for number in (value, error)]
     return texts[0], texts[1]
 
 
 def _to_place(value: float, places: int) -> str:
-    """A number to so many decimals; whole tens, hundreds and so on where ``places`` is negative."""
+    """A number to so many decimals; to tens, hundreds and so on where ``places`` is negative."""
     return f"{round(value, places) if places < 0 else value:z.{max(places, 0)}f}"
 
 
 def with_error(value: float | None, error: float | None) -> str:
     """'87.09 ± 0.35': the error to two significant digits, the value to the same place, five digits without an error.
 
-    This is the only place where a value is written with its error.
+    This is the only function that writes a value with its error.
     """
-    if value is None or not math.isfinite(value) or not known(error):
+    if value is None or not math.isfinite(value) or not has_size(error):
         return shown(value, 5)
     return " ± ".join(rounded(value, error))
 
 
 def value_alone(value: float, error: float | None) -> str:
-    """'87.09' where the error, or its parts, stand elsewhere."""
+    """'87.09' without its error, to the same place."""
     return with_error(value, error).partition(" ± ")[0]
 
 
 def signed_with_error(value: float, error: float | None) -> str:
-    """'+1.00 ± 0.52' of a difference."""
+    """'+1.00 ± 0.52' for a difference."""
     text = with_error(value, error)
     return text if text.startswith("-") or not math.isfinite(value) else f"+{text}"
 
 
 def error_alone(error: float | None) -> str:
-    """'± 0.35' where the value stands elsewhere; nothing where the error is unknown."""
+    """'± 0.35' without the value; an empty text for an unknown error."""
     if error == 0.0:
         return "± 0"
-    return f"± {rounded(error, error)[1]}" if known(error) else ""
+    return f"± {rounded(error, error)[1]}" if has_size(error) else ""
 
 
-def known(error: float | None) -> TypeGuard[float]:
-    """Whether an error is one to round by: a positive finite number."""
+def has_size(error: float | None) -> TypeGuard[float]:
+    """Whether an error is a positive finite number, by which a value can be rounded."""
     return error is not None and math.isfinite(error) and error > 0.0
 
 
 def improvement(gain: float, error: float | None, goal: str, unit: str = "%") -> str:
-    """'3.30 ± 0.62 % less' of an improvement with its 95 % half-width: which way the response itself went.
+    """'3.30 ± 0.62 % less' for an improvement with its 95 % half-width, in the direction of the response itself.
 
-    ``goal``: "min" or "max", else the distance from a target is what grew less.
+    ``goal``: "min" or "max"; any other is a target, whose distance decreases.
     """
     better, worse = {"min": ("less", "more"), "max": ("more", "less")}.get(goal, ("off target less", "off target more"))
-    size = with_error(abs(gain), error) if known(error) else f"{abs(gain):.2f}"
+    size = with_error(abs(gain), error) if has_size(error) else f"{abs(gain):.2f}"
     return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
 
 
 def chance(probability: float) -> str:
-    """A probability to three decimals: '0.978', and 'above 0.999' or 'below 0.001' where that would be one or zero."""
+    """A probability to three decimals, such as '0.978', or 'above 0.999' or 'below 0.001' near one and zero."""
     if probability > 0.9995:
         return "above 0.999"
     return "below 0.001" if probability < 0.0005 else f"{probability:.3f}"
 
 
 class Figure(NamedTuple):
-    """A figure of a result: what it is, its value, the half-width of its 95 % interval where there is one, its unit."""
+    """A figure of a result: its description, its value, the half-width of its 95 % interval if any, its unit."""
 
     words: str
     value: float | None
@@ -151,25 +151,25 @@ class Figure(NamedTuple):
 
 
 class Brief:
-    """A result that a notebook shows as a line or a small table of figures, not as all that it holds."""
+    """A result that a notebook shows as a line or a small table of its main figures."""
 
     def brief(self) -> tuple[str, list[Figure]]:
-        """What is to be known next to the figures, and these."""
+        """A remark on the result, and its main figures."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
         remark, figures = self.brief()
-        told = [f"{each.words} {with_error(each.value, each.error)} {each.unit}".rstrip() for each in figures[:4]]
-        return f"<{type(self).__name__}: {', '.join([*told, remark])}>"
+        texts = [f"{one.words} {with_error(one.value, one.error)} {one.unit}".rstrip() for one in figures[:4]]
+        return f"<{type(self).__name__}: {', '.join([*texts, remark])}>"
 
     def _repr_html_(self) -> str:
         remark, figures = self.brief()
-        rows = [(each.words, with_error(each.value, each.error), each.unit) for each in figures]
+        rows = [(one.words, with_error(one.value, one.error), one.unit) for one in figures]
         return html_table(f"{type(self).__name__}: {remark}", ("figure", "value ± 95 %", "unit"), rows)
 
 
 def filled_page(template: str, marks: Mapping[str, str]) -> str:
-    """A page with its ``{{MARKS}}`` put in; in one pass, so that nothing put in can be taken for a mark."""
+    """A page with the values of its ``{{MARKS}}``, inserted in one pass so that no value is read as a mark."""
     return MARK.sub(lambda mark: marks[mark[1]], template)
 
 

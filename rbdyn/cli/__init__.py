@@ -1,12 +1,12 @@
 """The command ``rbdyn``. Physics is imported inside the commands, so that help comes at once.
 
-- ``app``: simulate, map, accuracy; ``simulation_output``: what the first of them says and writes; ``show``: a run as pictures
+- ``app``: simulate, map, accuracy and show; ``simulation_output``, ``show``: what simulate and show print and write
 - ``ball``: the command of ball bearings; ``ball_output``: an equilibrium; ``ball_studies``: its studies and sweeps
-- ``keys``: what every key of a scene means
-- ``manual``: keys, commands, equations and the prose between them as one page
-- ``new``: the command; ``new_scene``: a scene of a catalogue bearing, from a template
+- ``manual``: keys of a scene, and the manual as one page: keys, commands, equations and the prose between them
+- ``new``: the command; ``new_options``: its options as typed; ``new_drawing``: a bearing of one's own
+- ``new_scene``: a scene of a catalogue bearing or of one's own, from a template
 
-What the commands of both packages share stands in ``rbdyn.base``.
+``rbdyn.base`` has what the commands of both packages share.
 """
 
 from rbdyn.base.loading import Loading

@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` are modules of their own."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; other modules have ``ball``, ``new``, ``keys`` and ``manual``."""
 
 import sys
 from pathlib import Path
@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rbdyn.base import options as given
-from rbdyn.base import terminal
+from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
 from rbdyn.base.records import save_table
-from rbdyn.base.render.terminal import show as show_blocks
+from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
 from rbdyn.cli.ball import ball
-from rbdyn.cli.keys import command as keys
-from rbdyn.cli.manual.command import manual
+from rbdyn.cli.manual import describe_keys, manual
 from rbdyn.cli.new import new
 
 if TYPE_CHECKING:
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-# Options that ``rbdyn accuracy`` had, and what took their place.
+# Former options of ``rbdyn accuracy``, and what replaces them.
 SCRIPT = "run python examples/benchmarks/{}"
 FORMER = {
     **{
@@ -43,55 +41,57 @@ FORMER = {
 }
 
 app.command()(ball)
-app.command("keys")(keys)
+app.command("keys")(describe_keys)
 app.command()(new)
 app.command()(manual)
 
 
 @app.callback()
-def main(version: given.Version = False) -> None:
+def main(version: command.Version = False) -> None:
     """Dynamics of rolling bearings: forces, whirl and power loss with their errors."""
 
 
 @app.command()
 def simulate(
-    scene: given.SceneFile,
-    assignments: given.Set = None,
-    turns: given.Turns = None,
-    replicates: given.Replicates = None,
-    seed: given.Seed = None,
-    workers: given.Workers = None,
+    scene: command.SceneFile,
+    assignments: command.Set = None,
+    turns: command.Turns = None,
+    replicates: command.Replicates = None,
+    seed: command.Seed = None,
+    workers: command.Workers = None,
     target: Annotated[
         str | None,
-        given.valued(
+        command.valued(
             "2%",
-            "Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+            "Choose tolerance, turns and replicates so that the errors of impact, whirl and loss are at most this.",
             "those given",
         ),
     ] = None,
-    out: given.Out = None,
-    as_json: given.Json = False,
-    quiet: given.Quiet = False,
-    verbose: given.Verbose = False,
+    out: command.Out = None,
+    as_json: command.Json = False,
+    quiet: command.Quiet = False,
+    verbose: command.Verbose = False,
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
-    with terminal.guarded(as_json):
+    with command.guarded(as_json):
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
-        folder = terminal.output_folder(out, "rbdyn simulate", scene) if out else None
+        folder = command.output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with terminal.progress_bar("simulating", quiet or as_json, workers) as progress:
-            result = run_scene(loaded, workers, progress, target=aim, notice=terminal.notice(quiet))
+        with command.progress_bar("simulating", quiet or as_json, workers) as progress:
+            result = run_scene(loaded, workers, progress, target=aim, notice=command.notice(quiet))
         loaded = type(loaded).from_dict(result.scene)
-        from rbdyn.cli import simulation_output as answer
+        from rbdyn.cli import simulation_output
 
-        files = answer.write(loaded, result, folder) if folder else []
+        files = simulation_output.write(loaded, result, folder) if folder else []
         detail = Detail.of(quiet, verbose)
-        terminal.hand_over(result.as_dict, as_json, lambda: show_blocks(answer.blocks(result), detail), folder, files)
+        command.hand_over(
+            result.as_dict, as_json, lambda: show_blocks(simulation_output.blocks(result), detail), folder, files
+        )
 
 
-@app.command(cls=given.refusing(FORMER))
+@app.command(cls=command.refusing(FORMER))
 def accuracy(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
     study: Annotated[
@@ -103,26 +103,26 @@ def accuracy(
             show_default="tolerances; methods of a ball bearing",
         ),
     ] = None,
-    assignments: given.Set = None,
-    out: Annotated[Path | None, given.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
-    as_json: given.Json = False,
-    quiet: given.Quiet = False,
-    verbose: Annotated[bool, given.verbose_flag("Also versions.")] = False,
+    assignments: command.Set = None,
+    out: Annotated[Path | None, command.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
+    as_json: command.Json = False,
+    quiet: command.Quiet = False,
+    verbose: Annotated[bool, command.verbose_flag("Also versions.")] = False,
 ) -> None:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
-    with terminal.guarded(as_json):
+    with command.guarded(as_json):
         from rbdyn import accuracy as studies
         from rbdyn.scene import Scene
 
         loaded = Scene.load(scene, assignments or [])
-        name = studies.chosen(study, loaded)
-        folder = terminal.output_folder(out, "rbdyn accuracy", scene) if out else None
-        with terminal.progress_bar(name, quiet or as_json) as progress:
+        name = studies.study_name(study, loaded)
+        folder = command.output_folder(out, "rbdyn accuracy", scene) if out else None
+        with command.progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress)
         files = studies.write(report, folder) if folder else []
-        terminal.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
+        command.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
     if report.failed:
-        raise typer.Exit(terminal.FAILED)
+        raise typer.Exit(command.FAILED)
 
 
 def map_blocks(mapped: "SlipMap") -> list[Block]:
@@ -149,37 +149,37 @@ def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
 
 @app.command("map")
 def slip_map(
-    scene: given.SceneFile,
+    scene: command.SceneFile,
     speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
-    assignments: given.Set = None,
-    turns: given.Turns = None,
-    replicates: given.Replicates = None,
-    seed: given.Seed = None,
-    workers: given.Workers = None,
+    assignments: command.Set = None,
+    turns: command.Turns = None,
+    replicates: command.Replicates = None,
+    seed: command.Seed = None,
+    workers: command.Workers = None,
     out: Annotated[
-        Path | None, given.folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
+        Path | None, command.folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
     ] = None,
-    as_json: given.Json = False,
-    quiet: given.Quiet = False,
+    as_json: command.Json = False,
+    quiet: command.Quiet = False,
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
-    with terminal.guarded(as_json):
+    with command.guarded(as_json):
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
-        folder = terminal.output_folder(out, "rbdyn map", scene) if out else None
-        from rbdyn.base.ranges import axis_values
+        folder = command.output_folder(out, "rbdyn map", scene) if out else None
+        from rbdyn.base.faults import axis_values
         from rbdyn.dynamics import slip_map as study
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
-        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json, workers) as progress:
-            mapped = study.slip_map(loaded, *axes, workers, progress, points, terminal.notice(quiet))
+        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
+            mapped = study.slip_map(loaded, *axes, workers, progress, points, command.notice(quiet))
         files = _write_map(mapped, folder) if folder else []
-        terminal.hand_over(mapped.as_dict, as_json, lambda: show_blocks(map_blocks(mapped)), folder, files)
+        command.hand_over(mapped.as_dict, as_json, lambda: show_blocks(map_blocks(mapped)), folder, files)
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:
-        raise typer.Exit(terminal.FAILED)
+        raise typer.Exit(command.FAILED)
 
 
 def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":
@@ -203,27 +203,27 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, given.folder_option("Write here.", "'show' next to the result")] = None,
-    turns: Annotated[float | None, given.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
+    out: Annotated[Path | None, command.folder_option("Write here.", "'show' next to the result")] = None,
+    turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
-    animate: Annotated[bool, given.flag("--animate", says="Also a moving picture and a player.")] = False,
-    lyapunov: Annotated[bool, given.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
-    as_json: given.Json = False,
-    quiet: given.Quiet = False,
-    verbose: Annotated[bool, given.verbose_flag("Also peaks of the spectra.")] = False,
+    animate: Annotated[bool, command.flag("--animate", says="Also a moving picture and a player.")] = False,
+    lyapunov: Annotated[bool, command.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
+    as_json: command.Json = False,
+    quiet: command.Quiet = False,
+    verbose: Annotated[bool, command.verbose_flag("Also peaks of the spectra.")] = False,
 ) -> None:
     """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
-    with terminal.guarded(as_json):
-        from rbdyn.cli import show as motion
+    with command.guarded(as_json):
+        from rbdyn.cli import show as motion_output
 
-        request = motion.request_of(result, turns, replicate)
-        folder = terminal.output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
-        with terminal.progress_bar("showing", quiet or as_json) as progress:
-            record = motion.write(request, folder, animate, lyapunov, progress, terminal.notice(quiet or as_json))
-        terminal.hand_over(
+        request = motion_output.request_of(result, turns, replicate)
+        folder = command.output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
+        with command.progress_bar("showing", quiet or as_json) as progress:
+            record = motion_output.write(request, folder, animate, lyapunov, progress, command.notice(quiet or as_json))
+        command.hand_over(
             lambda: record,
             as_json,
-            lambda: show_blocks(motion.blocks(record), Detail.of(quiet, verbose)),
+            lambda: show_blocks(motion_output.blocks(record), Detail.of(quiet, verbose)),
             folder,
             record["files"],
         )

@@ -7,10 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.base.blocks import Detail
+from rbdyn.base.command import (
+    FAILED,
+    Json,
+    Quiet,
+    SceneFile,
+    Set,
+    folder_option,
+    guarded,
+    hand_over,
+    output_folder,
+    valued,
+    verbose_flag,
+)
 from rbdyn.base.faults import InputError
-from rbdyn.base.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
-from rbdyn.base.render.terminal import show
-from rbdyn.base.terminal import FAILED, guarded, hand_over, output_folder
+from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
     from rbdyn.scene import BallScene
@@ -36,7 +47,7 @@ def ball(
     race_limits: Annotated[
         str | None, study_option("CLASS", "Race errors with which bearings meet P2, P4 or P5")
     ] = None,
-    wanted: Annotated[
+    target_yield: Annotated[
         float | None, valued("SHARE", "Share of bearings that must meet --race-limits.", "0.95", "--yield")
     ] = None,
     seed: Annotated[
@@ -56,7 +67,7 @@ def ball(
         if seed is not None and race_limits is None:
             loaded = _seeded(loaded, seed)
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        requested = _requested(sweeps, wanted, studies)
+        requested = _requested(sweeps, target_yield, studies)
         if sweeps:
             from rbdyn.cli.ball_studies import run_sweep
 
@@ -64,7 +75,7 @@ def ball(
         for name, value in requested.items():
             from rbdyn.cli.ball_studies import run as run_study
 
-            share = 0.95 if wanted is None else wanted
+            share = 0.95 if target_yield is None else target_yield
             draw = 1 if seed is None else seed
             raise typer.Exit(run_study(loaded, name, value, share, draw, out, scene, as_json, quiet))
         folder = output_folder(out, "rbdyn ball", scene) if out else None
@@ -74,20 +85,20 @@ def ball(
         result, path = with_runout(loaded, equilibrium(loaded))
         files = write(result, folder, path) if folder else []
         hand_over(result.as_dict, as_json, lambda: show(blocks(result), Detail.of(quiet, verbose)), folder, files)
-    if not result.found:
+    if not result.is_equilibrium:
         if not as_json:
             print(f"no equilibrium: {result.status}", file=sys.stderr)
         raise typer.Exit(FAILED)
 
 
-def _requested(sweeps: list[str] | None, wanted: float | None, studies: dict[str, str | None]) -> dict[str, str]:
+def _requested(sweeps: list[str] | None, target_yield: float | None, studies: dict[str, str | None]) -> dict[str, str]:
     """The study asked for, with its values. Raises InputError for two, and for a yield of none."""
     requested = {name: value for name, value in studies.items() if value is not None}
     flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
     if len(flags) > 1:
         raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
-    if wanted is not None and studies["race_limits"] is None:
-        raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
+    if target_yield is not None and studies["race_limits"] is None:
+        raise InputError([f"--yield {target_yield:g}: is a share of --race-limits; add that or leave it out"])
     return requested
 
 

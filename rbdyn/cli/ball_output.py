@@ -1,4 +1,4 @@
-"""What ``rbdyn ball`` says and writes of an equilibrium."""
+"""What ``rbdyn ball`` prints and writes of an equilibrium."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 def blocks(result: BallResult) -> list[Block]:
-    """Balls, places, contacts, life and stiffness of each row, what the rings do, notes; nothing without an equilibrium."""
-    if not result.found:
+    """Balls, places, contacts, life and stiffness of each row, forces of the rings, notes; nothing without an equilibrium."""
+    if not result.is_equilibrium:
         return []
-    found = [
+    rows = [
         block
         for name, row in result.row_reports.items()
         for block in (*_row_tables(f"{name} row" if name else "", row), *map(Paragraph, _row_sentences(row)))
@@ -38,12 +38,12 @@ def blocks(result: BallResult) -> list[Block]:
         sentences.append(_runout(result.runout))
     from rbdyn.compiled.kernel import compiler_notes
 
-    return [*found, *map(Paragraph, sentences), *notes(result.notes or ()), *notes(compiler_notes(), Detail.ALL)]
+    return [*rows, *map(Paragraph, sentences), *notes(result.notes or ()), *notes(compiler_notes(), Detail.ALL)]
 
 
 def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
-    """The result with the runout of its ring and the path it takes, where the scene has form errors."""
-    if scene.errors is None or not result.found:
+    """The result with the runout of its ring, and the path of that, where the scene has form errors."""
+    if scene.errors is None or not result.is_equilibrium:
         return result, None
     from rbdyn.cli.ball_studies import runout_record
 
@@ -54,7 +54,7 @@ def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.D
 def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) -> list[str]:
     """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
-    if not result.found:
+    if not result.is_equilibrium:
         return ["result.json"]
     from rbdyn.plots.ball import pictures
 
@@ -67,7 +67,7 @@ def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) 
 
 
 def _row_tables(title: str, row: RowReport) -> list[Block]:
-    """The balls; for who asks for all also the stiffness matrix and what the search cost."""
+    """The balls; in full detail also the stiffness matrix and the cost of the search."""
     header = ("azimuth [deg]", "inner angle [deg]", "outer angle", "inner load [N]", "outer load", "centrifugal [N]")
     keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
     balls = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]

@@ -1,4 +1,4 @@
-"""Studies of ``rbdyn ball``: sweeps over keys, runout, preload, clearance, wear, race limits; what they say and write."""
+"""Studies of ``rbdyn ball``: sweeps over keys, runout, preload, clearance, wear, race limits; their tables and files."""
 
 import sys
 from collections.abc import Sequence
@@ -9,26 +9,23 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
-from rbdyn.base.faults import InputError, MethodError
-from rbdyn.base.ranges import axis_values
-from rbdyn.base.render.terminal import show
-from rbdyn.base.terminal import FAILED, hand_over, keeping, output_folder, progress_bar
+from rbdyn.base.command import FAILED, checkpoint_message, hand_over, output_folder, progress_bar
+from rbdyn.base.faults import InputError, MethodError, axis_values
+from rbdyn.base.terminal import show
 from rbdyn.base.words import counted, label, with_error
-from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
-from rbdyn.quasistatic.result import remarks, tipping
+from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
+from rbdyn.quasistatic.result import remarks, ring_columns, row_columns, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.lots import Lot, design
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
-from rbdyn.quasistatic.runout.turn import Followed
-from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
-from rbdyn.quasistatic.sweep.result import SweepResult
-from rbdyn.quasistatic.sweep.run import grouped
+from rbdyn.quasistatic.runout.turn import RingPath
+from rbdyn.quasistatic.sweep import SweepResult, notes_by_topic
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
 
-# Points of a long table that are shown from its start, and from its end.
+# Points of a long table in the output from its start, and from its end.
 SHOWN = 8
 # Header and columns of the table: the larger of two columns; of a double-decker, those of both rows.
 HEADER = {
@@ -48,14 +45,14 @@ def run_sweep(
     scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool
 ) -> int:
     """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
-    from rbdyn.quasistatic.sweep.points import parsed
+    from rbdyn.quasistatic.sweep import keys_of_texts
 
-    keys = parsed(texts)
+    keys = keys_of_texts(texts)
     folder = output_folder(out, "rbdyn ball", source) if out else None
-    from rbdyn.quasistatic.sweep.run import sweep
+    from rbdyn.quasistatic.sweep import sweep
 
     kept_in = folder / "sweep.part" if folder else None
-    with keeping(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
+    with checkpoint_message(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
     files = write_sweep(result, folder) if folder else []
     hand_over(result.as_dict, as_json, lambda: show(sweep_blocks(result), Detail.of(quiet)), folder, files)
@@ -93,7 +90,7 @@ def write_sweep(result: "SweepResult", folder: Path) -> list[str]:
 
 
 def _row(result: "SweepResult", place: int) -> list[str]:
-    keys = [f"{value:.6g}" for value in result.at(place).values()]
+    keys = [f"{value:.6g}" for value in result.key_values(place).values()]
     if result.statuses[place] != "ok":
         return keys + ["failed"] * len(HEADER)
     return keys + [_cell(result, names, place) for names in HEADER.values()]
@@ -107,29 +104,30 @@ def _cell(result: "SweepResult", names: Sequence[str], place: int) -> str:
     return " / ".join(f"{unit * value:.4g}" for value in values)
 
 
-# What a study sweeps: function, unit of the values and that unit in SI.
+# What a study sweeps: its function, the unit of the values and that unit in SI.
 SWEPT = {
     "preload": (over_preload, "N", 1.0),
     "clearance": (over_clearance, "um", 1e-6),
     "wear": (over_wear, "um", 1e-6),
 }
-# What its record tells of a point, by column of the table.
+# Figures of a point in its record, by column of the table.
 SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
-# Bearings of a lot that are solved in full to size the limits of race errors.
+# Bearings of a lot that are solved in full to set the limits of race errors.
 SOLVED = 100
 
 
-def runout_record(scene: BallScene) -> tuple[dict[str, Any], Followed]:
+def runout_record(scene: BallScene) -> tuple[dict[str, Any], RingPath]:
     """Runout of the turning ring over the form errors of its scene [um], and the path. Raises InputError, RunError."""
     followed = follow_ring(scene)
-    told = asdict(followed.runout(bench_of(scene).face_radius))
-    turns = told.pop("turns")
-    return {**{f"{name}_um": 1e6 * value for name, value in told.items()}, "turns": turns}, followed
+    runout = asdict(followed.runout(bench_of(scene).face_radius))
+    turns = runout.pop("turns")
+    return {**{f"{name}_um": 1e6 * value for name, value in runout.items()}, "turns": turns}, followed
 
 
 def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
-    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; and the points
-    as a sweep tells them. Raises InputError for a double-decker, or where the sweep is refused.
+    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; also as a sweep.
+
+    Raises InputError for a double-decker, or for values that cannot be swept.
     """
     run, unit, si = SWEPT[swept]
     try:
@@ -148,49 +146,53 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     }, table
 
 
-def _table(scene: BallScene, key: str, values: Sequence[float], scan: Sweep) -> SweepResult:
+def _table(scene: BallScene, key: str, values: Sequence[float], scan: Scan) -> SweepResult:
     """Figures, balls and notes of the points scanned."""
     points, places = scan.points, np.arange(len(values))
     solutions, ratings = [point.solution for point in points], [point.rating for point in points]
-    told_of = ("figures", "displacement", "reaction", "stiffness")
-    balls, displacement, reaction, stiffness = (np.array([getattr(s, of) for s in solutions]) for of in told_of)
+    names = ("figures", "displacement", "reaction", "stiffness")
+    balls, displacement, reaction, stiffness = (np.array([getattr(s, name) for s in solutions]) for name in names)
     statuses = tuple(solution.status for solution in solutions)
     columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
     for column in columns.values():
         column[[status != OK for status in statuses]] = np.nan
-    told = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
-    notes, rows = grouped(told, places, statuses), {"row": [(places, balls)]}
+    placed = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
+    notes, rows = notes_by_topic(placed, places, statuses), {"row": [(places, balls)]}
     return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
 
 
-def _best(scan: Sweep, which: str, si: float) -> dict[str, float]:
+def _best(scan: Scan, which: str, si: float) -> dict[str, float]:
     point = getattr(scan, which)
     return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
 
 
-def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int = 1) -> dict[str, Any]:
-    """Limits of roundness and side-sway of both races with which bearings meet a class with a wanted yield.
+def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, seed: int = 1) -> dict[str, Any]:
+    """Limits of roundness and side-sway of both races with which the share ``target_yield`` of bearings meets a class.
 
-    The lot has amplitudes that fall as 1/order from order 1 to 40 (``runout_lots.Lot``). Raises InputError.
+    The lot has amplitudes that fall as 1/order from order 1 to 40 (``lots.Lot``). Raises InputError.
     """
     row = _single(scene, "race-limits")
     if tolerance_class not in get_args(ToleranceClass):
-        known = ", ".join(get_args(ToleranceClass))
-        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {known}"])
+        classes = ", ".join(get_args(ToleranceClass))
+        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {classes}"])
     if row.bearing.bore_mm is None:
         raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
     try:
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
             raise MethodError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
-        asked: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
-        limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
+        targets: dict[str, Any] = {
+            "radial_limit": allowed.radial,
+            "axial_limit": allowed.axial,
+            "target_yield": target_yield,
+        }
+        limits = design(bench_of(row), Lot(), **targets, seed=seed, solved=SOLVED)
     except MethodError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
         "class": tolerance_class,
-        "wanted": wanted,
+        "wanted": target_yield,
         **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
         "yield": limits.yielded,
         "standard_error": limits.standard_error,
@@ -213,7 +215,7 @@ def run(
     scene: BallScene,
     name: str,
     value: str,
-    wanted: float,
+    target_yield: float,
     seed: int,
     out: Path | None,
     source: Path,
@@ -224,7 +226,7 @@ def run(
     folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
     table: SweepResult | None = None
     if name == "race_limits":
-        record = race_limits(scene, value, wanted, seed)
+        record = race_limits(scene, value, target_yield, seed)
     else:
         record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
     if folder:
@@ -243,8 +245,10 @@ def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
     if table is None:
         return _limits(record)
     best = [
-        Paragraph(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-        for title, at in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
+        Paragraph(
+            f"{title} at {point['value']:.4g}: {point['max_stress_MPa']:.0f} MPa, {point['L10_Mrev']:.4g} million turns"
+        )
+        for title, point in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
     ]
     return [points_table(table), *best, *notes(record["notes"])]
 

@@ -1,193 +1,226 @@
 """The command ``rbdyn new``. Physics is imported inside it, so that help comes at once."""
 
-import math
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from rbdyn.base.command import Json, guarded, print_json, valued
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
-from rbdyn.base.options import Json, valued
-from rbdyn.base.terminal import guarded, print_json
 
 if TYPE_CHECKING:
+    from rbdyn.cli.new_options import Typed
+    from rbdyn.cli.new_scene import OperatingPoint, Subject
     from rbdyn.properties.catalogue import Designation, Envelope
-    from rbdyn.properties.oils import NamedOil
 
+Value = TypeVar("Value")
 TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
-LISTED = "as listed"
-# Limits of a number that is typed, and its unit.
-LIMITS = {
-    "--speed": (-1e6, 1e6, "rpm"),
-    "--load": (0.0, 1e7, "N"),
-    "--preload": (-1e8, 1e8, "N"),
-    "--temperature": (-60.0, 220.0, "C"),
-    "--bore": (1.0, 2000.0, "mm"),
-    "--outside": (2.0, 4000.0, "mm"),
-    "--width": (0.5, 1000.0, "mm"),
-}
+LISTED, OF_OWN = "as listed; of own: estimated", "only with own"
+SIZES = ("--bore", "--outside", "--width")
+
+Designations = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="DESIGNATION|own", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B; own: a drawing of one's own."
+    ),
+]
+Text = str | None
+Rollers = Annotated[Text, valued("Z", "Number of rollers.", OF_OWN)]
+Roller = Annotated[Text, valued("DxL", "Diameter x length of a roller in mm: 7x7.", OF_OWN)]
+Balls = Annotated[Text, valued("Z", "Number of balls.", OF_OWN)]
+Ball = Annotated[Text, valued("MM", "Diameter of a ball.", OF_OWN)]
+Pitch = Annotated[Text, valued("MM", "Diameter of the circle through the centres of rollers or balls.", OF_OWN)]
+ContactAngle = Annotated[Text, valued("DEG", "Contact angle of the balls.", OF_OWN)]
+Conformity = Annotated[
+    Text, valued("SHARE", "Groove radius over ball diameter, or INNER/OUTER: 0.515/0.525.", "0.52/0.53, only with own")
+]
+Speed = Annotated[Text, valued("RPM", "Speed of the inner ring.", "half the reference speed")]
+Load = Annotated[Text, valued("N", "Radial load.", "0.1 C")]
+Preload = Annotated[Text, valued("N", "Axial preload of a ball bearing.", "what loads half of the balls")]
+Oil = Annotated[str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')]
+Temperature = Annotated[str, typer.Option(metavar="C", help="Temperature of the oil.")]
+Clearance = Annotated[Text, valued("CLASS|MM", "C2, CN, C3, C4 or C5, or diametral in mm.", "of DESIGNATION, else CN")]
+Lubrication = Annotated[
+    Text, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath, or grease where --oil is one")
+]
+Guidance = Annotated[
+    Text, valued("PART", "What guides the cage: outer, inner or roller.", "of DESIGNATION, else outer")
+]
+CageMaterial = Annotated[
+    Text, valued("NAME", "Material of the cage: brass, peek, polyamide.", "of DESIGNATION, else brass")
+]
+Bore = Annotated[Text, valued("MM", "Bore, where the table lacks the bearing.", LISTED)]
+Outside = Annotated[Text, valued("MM", "Outside diameter.", LISTED)]
+Width = Annotated[Text, valued("MM", "Width.", LISTED)]
+Shaft = Annotated[Text, valued("CLASS", "Tolerance class of the shaft: k5. Writes the table mounting.", "loose")]
+Housing = Annotated[Text, valued("CLASS", "Tolerance class of the housing: H7. Writes the table mounting.", "loose")]
 
 
 def new(
-    designation: Annotated[
-        list[str], typer.Argument(metavar="DESIGNATION", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B.")
-    ],
-    speed: Annotated[float | None, valued("RPM", "Speed of the inner ring.", "half the reference speed")] = None,
-    load: Annotated[float | None, valued("N", "Radial load.", "0.1 C")] = None,
-    preload: Annotated[
-        float | None, valued("N", "Axial preload of a ball bearing.", "what loads half of the balls")
-    ] = None,
-    oil: Annotated[
-        str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')
-    ] = OIL,
-    temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
-    clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3, C4 or C5.", "of DESIGNATION, else CN")] = None,
-    lubrication: Annotated[
-        str | None, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath, or grease where --oil is one")
-    ] = None,
-    bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
-    outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
-    width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
-    shaft: Annotated[
-        str | None, valued("CLASS", "Tolerance class of the shaft: k5. Writes the table mounting.", "loose")
-    ] = None,
-    housing: Annotated[
-        str | None, valued("CLASS", "Tolerance class of the housing: H7. Writes the table mounting.", "loose")
-    ] = None,
+    designation: Designations,
+    rollers: Rollers = None,
+    roller: Roller = None,
+    balls: Balls = None,
+    ball: Ball = None,
+    pitch: Pitch = None,
+    contact_angle: ContactAngle = None,
+    conformity: Conformity = None,
+    speed: Speed = None,
+    load: Load = None,
+    preload: Preload = None,
+    oil: Oil = OIL,
+    temperature: Temperature = f"{TEMPERATURE_C:g}",
+    clearance: Clearance = None,
+    lubrication: Lubrication = None,
+    guidance: Guidance = None,
+    cage_material: CageMaterial = None,
+    bore: Bore = None,
+    outside: Outside = None,
+    width: Width = None,
+    shaft: Shaft = None,
+    housing: Housing = None,
     as_json: Json = False,
 ) -> None:
-    """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""
+    """Write a commented scene of a catalogue bearing, or of one's own, its interior estimated, on standard output."""
+    texts = {
+        "--rollers": rollers, "--roller": roller, "--balls": balls, "--ball": ball, "--pitch": pitch,
+        "--contact-angle": contact_angle, "--conformity": conformity, "--speed": speed, "--load": load,
+        "--preload": preload, "--oil": oil, "--temperature": temperature, "--clearance": clearance,
+        "--lubrication": lubrication, "--guidance": guidance, "--cage-material": cage_material, "--bore": bore,
+        "--outside": outside, "--width": width, "--shaft": shaft, "--housing": housing,
+    }  # fmt: skip
     with guarded(as_json):
-        from rbdyn.base.options import filled
-        from rbdyn.cli import new_scene
-        from rbdyn.properties.catalogue import read_designation
-        from rbdyn.properties.oils import oil_named
-        from rbdyn.scene import Scene
+        from rbdyn.cli.new_options import Typed
 
-        words, sizes = " ".join(designation), {"--bore": bore, "--outside": outside, "--width": width}
-        numbers = {"--speed": speed, "--load": load, "--preload": preload, "--temperature": temperature, **sizes}
-        faults = [fault for name, value in numbers.items() if value is not None and (fault := _fault(name, value))]
-        lubricant, named = _read(oil_named, "--oil", oil, faults), _read(read_designation, "DESIGNATION", words, faults)
-        chosen = None if clearance is None else _read(_class_named, "--clearance", clearance, faults)
-        refuse(faults)
-        assert lubricant is not None and named is not None
-        rollers = named.kind == "cylindrical_roller"
-        refuse(_misfits(named, speed, preload, chosen))
-        wanted = chosen or named.stated("clearance") or CLEARANCE
-        supply = _supply(lubrication, lubricant, oil, rollers)
-        point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted, supply)
-        fill = new_scene.roller_values if rollers else new_scene.ball_values
-        box = _read(lambda text: _envelope(named, sizes), "DESIGNATION", words, faults)
-        inside: Any = None if box is None else _read(lambda text: fill(named, box, point), "DESIGNATION", words, faults)
-        refuse(faults)
-        values = inside | _mounting(box, shaft, housing, temperature)
-        template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
-        text = filled(template.read_text(encoding="utf-8"), values)
-        data = tomllib.loads(text)
-        # What is wrong with an estimate comes from the sizes that were given.
-        typed = " ".join(f"{option} {value:g}" for option, value in sizes.items() if value is not None)
-        source = f"{typed}: estimated inside" if typed else f"DESIGNATION {named.name}"
-        notes = getattr(Scene.from_dict(data, source), "unit_notes", ())
-        refuse(f"{source}: {note}" for note in notes)
+        text = scene_text(" ".join(designation), Typed(texts))
         if as_json:
-            print_json(data)
+            print_json(tomllib.loads(text))
         else:
             print(text)
 
 
-def _mounting(sizes: "Envelope", shaft: str | None, housing: str | None, temperature: float) -> dict[str, Any]:
+def scene_text(words: str, typed: "Typed") -> str:
+    """The commented scene that designation and options ask for, checked. Raises InputError with all faults at once."""
+    from rbdyn.base.command import fill_template
+    from rbdyn.cli import new_scene
+    from rbdyn.cli.new_drawing import OWN, own_subject
+    from rbdyn.cli.new_options import typed_fault
+    from rbdyn.properties.catalogue import ROLLERS
+    from rbdyn.properties.oils import oil_named
+    from rbdyn.scene import Scene
+
+    typed.read_numbers()
+    typed.read("--oil", oil_named)
+    first, _, rest = words.strip().partition(" ")
+    own = first.lower() == OWN
+    subject = own_subject(rest.strip(), typed) if own else _catalogue_bearing(words, typed)
+    rollers = subject.kind == ROLLERS
+    point = _operating_point(subject, typed)
+    fill = new_scene.roller_values if rollers else new_scene.ball_values
+    name = OWN if own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
+    cause = f"--clearance {point.clearance}" if own else name
+    values = _or_fault(cause, lambda: fill(subject, point)) | _mounting(subject.sizes, typed, point.temperature)
+    template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
+    text = fill_template(template.read_text(encoding="utf-8"), values)
+    # What is wrong with an estimate comes from the sizes that were given.
+    sizes = " ".join(typed.listing(*SIZES))
+    source = f"{sizes}: estimated inside" if sizes and not own else OWN if own else f"DESIGNATION {subject.name}"
+    try:
+        notes = getattr(Scene.from_dict(tomllib.loads(text), source), "unit_notes", ())
+        refuse(f"{source}: {note}" for note in notes)
+    except InputError as error:
+        raise InputError([typed_fault(typed, fault) for fault in error.faults]) from None
+    return text
+
+
+def _or_fault(name: str, attempt: Callable[[], Value]) -> Value:
+    """What an attempt gives. Raises InputError, with the name in front, where it raises MethodError."""
+    try:
+        return attempt()
+    except MethodError as error:
+        raise InputError([f"{name}: {error}"]) from None
+
+
+def _operating_point(subject: "Subject", typed: "Typed") -> "OperatingPoint":
+    from rbdyn.cli.new_options import clearance_of, supply_of
+    from rbdyn.cli.new_scene import OperatingPoint
+    from rbdyn.properties.oils import oil_named
+
+    oil, temperature = typed.read("--oil", oil_named), typed.number("--temperature")
+    assert oil is not None and temperature is not None
+    clearance = typed.read("--clearance", clearance_of)
+    clearance = subject.clearance or CLEARANCE if clearance is None else clearance
+    speed, load, preload = (typed.number(option) for option in ("--speed", "--load", "--preload"))
+    return OperatingPoint(speed, load, preload, oil, temperature, clearance, supply_of(typed))
+
+
+def _mounting(sizes: "Envelope", typed: "Typed", temperature: float) -> dict[str, Any]:
     """Values of [mounting], none of them without a class. Raises InputError for a class or a size that is not listed."""
     from rbdyn.cli.new_scene import mounting_values
     from rbdyn.properties.tolerances import housing_interference, shaft_interference
 
-    faults = list[str]()
-    if shaft is not None:
-        _read(lambda zone: shaft_interference(sizes.bore, zone), "--shaft", shaft, faults)
-    if housing is not None:
-        _read(lambda zone: housing_interference(sizes.outside, zone), "--housing", housing, faults)
-    refuse(faults)
-    return mounting_values(sizes, shaft, housing, temperature)
+    typed.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone))
+    typed.read("--housing", lambda zone: housing_interference(sizes.outside, zone))
+    refuse(typed.faults)
+    classes = typed["--shaft"], typed["--housing"]
+    where = " ".join(typed.listing("--shaft", "--housing"))
+    name = f"{where}: the usual seat of the other ring, of {sizes.bore:g} x {sizes.outside:g} mm"
+    return _or_fault(name, lambda: mounting_values(sizes, *classes, temperature))
 
 
-def _fault(option: str, value: float) -> str | None:
-    least, largest, unit = LIMITS[option]
-    if not math.isfinite(value):
-        return f"{option} {value}: is not a finite number; write a plain number"
-    if least <= value <= largest:
-        return None
-    kelvin = value - 273.15
-    meant = unit == "C" and least <= kelvin <= largest
-    remedy = f"if {value:g} K are meant, write {kelvin:.4g}" if meant else "fix it"
-    return f"{option} {value:g}: must be from {least:g} to {largest:g} {unit}; {remedy}"
+def _catalogue_bearing(words: str, typed: "Typed") -> "Subject":
+    """The bearing of a designation. Raises InputError with all faults at once."""
+    from rbdyn.cli.new_drawing import OF_DRAWINGS, OWN
+    from rbdyn.cli.new_options import cage_material_of, clearance_of, guidance_of, kind_faults
+    from rbdyn.cli.new_scene import catalogue_subject
+    from rbdyn.properties.catalogue import ROLLERS, read_designation
 
-
-def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
-    """What ``reader`` makes of a text; None, and one more fault, where it refuses it."""
+    name = one_line(words, LONGEST_NAME)
+    for option in typed.listing(*OF_DRAWINGS):
+        typed.note(f"{option}: is of a bearing of one's own; leave it out, or write {OWN} in place of {name}")
+    clearance = typed.read("--clearance", clearance_of)
+    cage = typed.read("--guidance", guidance_of), typed.read("--cage-material", cage_material_of)
     try:
-        return reader(text)
+        named = read_designation(words)
     except MethodError as error:
-        faults.append(f"{name} {one_line(text, LONGEST_NAME)}: {error}")
-        return None
+        raise InputError([*typed.faults, f"DESIGNATION {name}: {error}"]) from None
+    rollers = named.kind == ROLLERS
+    kind_faults(typed, rollers)
+    _note_contradictions(named, typed, clearance)
+    refuse(typed.faults)
+    sizes = _or_fault(f"DESIGNATION {name}", lambda: _envelope(named, typed))
+    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, sizes, *cage))
 
 
-def _class_named(text: str) -> str:
-    """A clearance class as the tables name it. Raises MethodError."""
-    from rbdyn.properties.catalogue import CLEARANCE_CLASSES
+def _note_contradictions(named: "Designation", typed: "Typed", clearance: str | float | None) -> None:
+    """Note options that contradict a designation, and a clearance of a bearing that has a contact angle instead."""
+    from rbdyn.properties.catalogue import ANGULAR
 
-    name = text.strip().upper()
-    if name not in CLEARANCE_CLASSES:
-        raise MethodError(f"is no clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
-    return name
-
-
-def _supply(asked: str | None, oil: "NamedOil", oil_text: str, rollers: bool) -> str:
-    """How the bearing gets its oil, as asked for or as the oil says. Raises InputError for what contradicts the oil."""
-    from rbdyn.scene.lubricant import SUPPLIES
-
-    usual = "grease" if oil.grease else "bath"
-    if asked is None:
-        return usual
-    supply = asked.strip().lower().replace("-", "_")
-    what, name = f"--lubrication {one_line(asked, LONGEST_NAME)}", one_line(oil_text, LONGEST_NAME)
-    if supply not in SUPPLIES:
-        raise InputError([f"{what}: is no lubrication known here; choose one of {', '.join(SUPPLIES)}"])
-    if not rollers:
-        raise InputError([f"{what}: is one of cylindrical roller bearings; leave it out"])
-    if oil.grease and supply != "grease":
-        raise InputError([f"{what}: contradicts the grease of --oil {name}; leave one out"])
-    if supply == "grease" and not oil.grease:
-        raise InputError([f'{what}: --oil {name} is no grease; write --oil "grease VG 100" with its base oil'])
-    return supply
-
-
-def _misfits(named: "Designation", speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
-    """Options that the bearing has no use for, or that contradict its designation."""
-    faults, rollers, of_suffix = [], named.kind == "cylindrical_roller", named.stated("clearance")
-    if rollers and speed is not None and abs(speed) < 0.1:
-        faults.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
-    if rollers and preload is not None:
-        faults.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
+    of_suffix, cage = named.value_of("clearance"), named.value_of("cage")
     angular = "an angular contact bearing has a contact angle instead; leave it out"
-    if named.kind == "angular_contact_ball" and clearance is not None:
-        faults.append(f"--clearance {clearance}: {angular}")
+    if named.kind == ANGULAR and clearance is not None:
+        typed.fault("--clearance", angular)
     elif clearance is not None and of_suffix not in (None, clearance):
-        faults.append(f"--clearance {clearance}: contradicts {of_suffix} of {named.name}; leave one out")
-    if named.kind == "angular_contact_ball" and of_suffix is not None:
-        faults.append(f"DESIGNATION {named.name}: suffix {of_suffix}: {angular}")
-    return faults
+        typed.fault("--clearance", f"contradicts {of_suffix} of {named.name}; leave one out")
+    if named.kind == ANGULAR and of_suffix is not None:
+        typed.note(f"DESIGNATION {named.name}: suffix {of_suffix}: {angular}")
+    if cage is not None:
+        for option in typed.listing("--guidance", "--cage-material"):
+            typed.note(f"{option}: contradicts the cage {cage} of {named.name}; leave one out")
 
 
-def _envelope(named: "Designation", sizes: dict[str, float | None]) -> "Envelope":
+def _envelope(named: "Designation", typed: "Typed") -> "Envelope":
     """Boundary dimensions as typed or as the catalogue lists them. Raises MethodError, InputError."""
     from rbdyn.properties.catalogue import Envelope, envelope
 
-    given = [value for value in sizes.values() if value is not None]
-    if not given:
+    bore, outside, width = (typed.number(option) for option in SIZES)
+    if bore is None and outside is None and width is None:
         return envelope(named)
-    if len(given) < len(sizes):
-        missing = ", ".join(option for option, value in sizes.items() if value is None)
-        raise InputError([f"{missing}: missing; give all of {', '.join(sizes)} in mm, or none for a listed bearing"])
-    if given[0] >= given[1]:
-        raise InputError([f"--bore {given[0]:g}: not below --outside {given[1]:g}; fix them"])
-    return Envelope(*given)
+    if bore is None or outside is None or width is None:
+        missing = ", ".join(option for option in SIZES if typed[option] is None)
+        raise InputError([f"{missing}: missing; give all of {', '.join(SIZES)} in mm, or none for a listed bearing"])
+    if bore >= outside:
+        raise InputError([f"--bore {bore:g}: not below --outside {outside:g}; fix them"])
+    return Envelope(bore, outside, width)

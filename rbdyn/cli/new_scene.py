@@ -6,8 +6,14 @@ from typing import Any, NamedTuple
 
 from rbdyn.life.rollers import REFERENCE_SPEED_FACTOR
 from rbdyn.properties.catalogue import (
+    ANGULAR,
     CAGES,
+    DEEP,
+    NO_SERIES,
+    ROLLERS,
     SMALLEST_CLEARANCE_MM,
+    WIDEST_BAR,
+    BallInterior,
     Designation,
     Envelope,
     RollerInterior,
@@ -15,6 +21,14 @@ from rbdyn.properties.catalogue import (
     cage_estimate,
     radial_clearance,
     roller_interior,
+)
+from rbdyn.properties.drawing import (
+    STATED,
+    BallDrawing,
+    Boundary,
+    RollerDrawing,
+    drawing_ball_interior,
+    drawing_roller_interior,
 )
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
@@ -80,7 +94,17 @@ def _law(fit: Interference) -> str | None:
 POLYAMIDE = (
     "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
 )
-POLYAMIDE_DENSITY = 1.3e-3
+POLYAMIDE_NAME, POLYAMIDE_DENSITY = "polyamide", 1.3e-3
+# What a bearing of one's own is, next to its sizes, and how the templates name those that its drawing states or leaves open.
+OWN, OWN_SIZES = "a drawing of one's own.", ("own_bore", "own_outside", "own_width")
+NO_CLEARANCE = {"clearance": None, "clearance_by": ""}
+# Radii of the inner and the outer groove over the ball's diameter, as ISO 281 rates.
+USUAL_GROOVES = (0.52, 0.53)
+BLOCK_BETWEEN = f"{WIDEST_BAR:g} roller diameters, for a block from pocket to pocket is no bar; it is stiffer"
+# Upper end of the documented range of an effective length (unknown_inputs.toml).
+LONGEST_EFFECTIVE = 1.05
+# Of a side ring's width [%]; that of a bearing whose own width is an estimate too.
+SIDE_RING_ERROR, BLIND_SIDE_RING_ERROR = 30, 50
 # Where no suffix names a cage.
 USUAL_CAGE = "MA"
 # Guide clearance in pitch diameters.
@@ -103,40 +127,150 @@ USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 Values = dict[str, Any]
 
 
+class CageKind(NamedTuple):
+    """What guides a cage and what it is made of, and where each comes from: "of suffix MA", "stated", "assumed"."""
+
+    guidance: str
+    material: str
+    guidance_by: str
+    material_by: str
+
+    @property
+    def sentence(self) -> str:
+        """Both with their sources."""
+        guides = f"guided by the {self.guidance}{'s' if self.guidance == 'roller' else ' ring'}"
+        if self.guidance_by == self.material_by:
+            return f"{self.guidance_by}: {self.material}, {guides}"
+        return f"{self.material_by}: {self.material}; {self.guidance_by}: {guides}"
+
+
 class OperatingPoint(NamedTuple):
-    """What the user asks for; None where it is left to this module."""
+    """What the user asks for; None where it is left to this module. ``clearance``: a class of ISO 5753-1, or diametral [mm]."""
 
     speed: float | None
     load: float | None
     preload: float | None
     oil: NamedOil
     temperature: float
-    clearance: str
+    clearance: str | float
     supply: str = "bath"
 
 
-def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
-    """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
+class Subject(NamedTuple):
+    """The bearing that a scene is written of: by its designation, or by a drawing of one's own, whose ``boundary`` has sources.
+
+    ``title`` and ``reason`` make the heading. ``series`` is ``NO_SERIES`` of a drawing. ``cage`` is of rollers, ``grooves`` of balls:
+    radii of the inner and the outer one over the ball's diameter, None where ISO 281's are taken. ``clearance``: class of a suffix.
+    """
+
+    kind: str
+    name: str
+    title: str
+    reason: str
+    sizes: Envelope
+    inside: RollerInterior | BallInterior
+    boundary: Boundary | None = None
+    series: str = NO_SERIES
+    designation: str | None = None
+    without_effect: str | None = None
+    cage: CageKind | None = None
+    grooves: tuple[float, float] | None = None
+    clearance: str | None = None
+
+    @property
+    def width_known(self) -> bool:
+        """Whether the width of the rings is listed or stated."""
+        return self.boundary is None or self.boundary.width_by == STATED
+
+
+def catalogue_subject(
+    named: Designation, sizes: Envelope, guidance: str | None = None, material: str | None = None
+) -> Subject:
+    """A bearing by its designation; guidance and cage material as stated, else of its suffix. Raises MethodError for
+    impossible dimensions.
+    """
+    rollers = named.kind == ROLLERS
+    return Subject(
+        kind=named.kind,
+        name=named.name,
+        title=f"{named.name}, {sizes.bore:g} x {sizes.outside:g} x {sizes.width:g} mm",
+        reason="catalogues do not list what is inside.",
+        sizes=sizes,
+        inside=roller_interior(sizes, named.series == "10") if rollers else ball_interior(sizes, named),
+        series=named.series,
+        # Sizes that are typed are those of no listed bearing.
+        designation=named.name if rollers and sizes.reference_speed is not None else None,
+        without_effect=named.without_effect or None,
+        cage=cage_kind(named.value_of("cage"), guidance, material) if rollers else None,
+        clearance=named.value_of("clearance"),
+    )
+
+
+def roller_subject(drawing: RollerDrawing, boundary: Boundary, guidance: str | None, material: str | None) -> Subject:
+    """A roller bearing of one's own."""
+    rollers = f"{drawing.rollers} rollers of {drawing.diameter:g} x {drawing.length:g} mm"
+    return Subject(
+        kind=ROLLERS,
+        name="own",
+        title=f"{rollers} on a pitch diameter of {drawing.pitch_diameter:g} mm",
+        reason=OWN,
+        sizes=boundary.envelope,
+        inside=drawing_roller_interior(drawing),
+        boundary=boundary,
+        cage=cage_kind(None, guidance, material),
+    )
+
+
+def ball_subject(drawing: BallDrawing, boundary: Boundary, grooves: tuple[float, float] | None) -> Subject:
+    """A ball bearing of one's own; it is of deep grooves where it has a clearance in place of a contact angle."""
+    balls = f"{drawing.balls} balls of {drawing.diameter:g} mm"
+    return Subject(
+        kind=DEEP if drawing.contact_angle is None else ANGULAR,
+        name="own",
+        title=f"{balls} on a pitch diameter of {drawing.pitch_diameter:g} mm",
+        reason=OWN,
+        sizes=boundary.envelope,
+        inside=drawing_ball_interior(drawing),
+        boundary=boundary,
+        grooves=grooves,
+    )
+
+
+def cage_kind(suffix: str | None, guidance: str | None, material: str | None) -> CageKind:
+    """A cage as stated, else as its suffix says, else the usual one."""
+    usual_guidance, usual_material = CAGES[suffix or USUAL_CAGE]
+    source = f"of suffix {suffix}" if suffix else "assumed"
+    return CageKind(
+        guidance or usual_guidance,
+        material or usual_material,
+        STATED if guidance else source,
+        STATED if material else source,
+    )
+
+
+def roller_values(subject: Subject, point: OperatingPoint) -> Values:
+    """Values of ``roller_scene.toml``. Raises ValueError for an unlisted clearance."""
     from rbdyn.life.rollers import dynamic_capacity
 
-    inside = roller_interior(sizes, named.series == "10")
+    inside, sizes = subject.inside, subject.sizes
+    assert isinstance(inside, RollerInterior)
     diameter, pitch, listed = inside.roller_diameter, inside.pitch_diameter, sizes.dynamic_capacity
     by_iso = dynamic_capacity(inside.rollers, diameter * 1e-3, inside.effective_length * 1e-3, pitch * 1e-3)
     volume = math.pi / 4.0 * (pitch - diameter) ** 2 * sizes.outside
     ratings = "" if listed is None else f", C = {1e-3 * listed:g} kN, C0 = {1e-3 * (sizes.static_capacity or 0.0):g} kN"
-    common = _common(named, sizes, point, sizes.reference_speed or REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
+    common = _common(subject, point, sizes.reference_speed or REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
     flooded, scarce = point.supply in FLOODED_SUPPLIES, point.supply in SCARCE_SUPPLIES
     return {
         **inside._asdict(),
         **common,
-        **_clearance(sizes.bore, point.clearance, named.kind),
-        **_cage(named, sizes.width, inside),
-        "ratings": ratings,
+        **_clearance(sizes.bore, point.clearance, subject.kind),
+        **_cage(subject, inside),
+        "heading": _heading(subject, ratings or _rated(subject, by_iso)),
         "ring_mass": 1e-9 * MATERIALS["bearing_steel"].density * volume,
         "listed_capacity": listed,
+        **_estimated(subject, inside),
         "capacity_share": by_iso / (listed or by_iso),
-        # Sizes that are typed are those of no listed bearing.
-        "designation": json.dumps(named.name) if sizes.reference_speed is not None else None,
+        "designation": None if subject.designation is None else json.dumps(subject.designation),
         "supply": json.dumps(point.supply),
         "supply_by": SUPPLY_WORDS[point.supply],
         "inlet_distance": None if flooded else INLET_DISTANCE,
@@ -145,36 +279,80 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
     }
 
 
-def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
+def _estimated(subject: Subject, inside: RollerInterior) -> Values:
+    """Keys named in [uncertain] where they are estimates: not the bars between rollers that are counted, nor an effective length
+    whose documented range is longer than the roller.
+    """
+    short = LONGEST_EFFECTIVE * inside.effective_length <= inside.roller_length
+    return {
+        "estimated_length": '"bearing.effective_length_mm", ' if short else "",
+        "estimated_bar": '"cage.bar_width_mm", ' if subject.boundary is None else "",
+    }
+
+
+def ball_values(subject: Subject, point: OperatingPoint) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
     from rbdyn.life.balls import dynamic_capacity
 
-    inside = ball_interior(sizes, named)
+    inside = subject.inside
+    assert isinstance(inside, BallInterior)
     deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)
-    capacity = dynamic_capacity(inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle)
-    common = _common(named, sizes, point, BALL_SPEEDS[named.kind] / inside.pitch_diameter, capacity)
+    sizes = inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle
+    capacity = dynamic_capacity(*sizes, *(subject.grooves or ()))
+    common = _common(subject, point, BALL_SPEEDS[subject.kind] / inside.pitch_diameter, capacity)
     preload, why = point.preload, ""
     if preload is None and not deep:
         preload = float(f"{max(USUAL_PRELOAD * capacity, HALF_LOADED * common['load'] * math.tan(angle)):.2g}")
         why = "assumed: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C"
-    known = _clearance(sizes.bore, point.clearance, named.kind) if deep else dict.fromkeys(CLEARANCE_VALUES)
-    return {**inside._asdict(), **common, **known, "preload": preload, "preload_by": why}
+    clearance = _clearance(subject.sizes.bore, point.clearance, subject.kind) if deep else NO_CLEARANCE
+    heading = {"heading": _heading(subject, _rated(subject, capacity))}
+    return {
+        **inside._asdict(),
+        **common,
+        **clearance,
+        **_grooves(subject),
+        **heading,
+        "preload": preload,
+        "preload_by": why,
+    }
 
 
-def _common(named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float) -> Values:
-    """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]; no mounting."""
-    error = 9 if named.kind == "cylindrical_roller" else 20
+def _heading(subject: Subject, ratings: str) -> str:
+    return f"{subject.title}{ratings}: {subject.reason}"
+
+
+def _rated(subject: Subject, capacity: float) -> str:
+    """Capacity of a bearing of one's own; empty of one by its designation."""
+    if subject.boundary is None:
+        return ""
+    error = "catalogues state up to 15 % more" if subject.kind == ROLLERS else "+-15 %"
+    return f", C = {1e-3 * capacity:.3g} kN by ISO 281 ({error})"
+
+
+def _grooves(subject: Subject) -> Values:
+    inner, outer = subject.grooves or USUAL_GROOVES
+    own_grooves = subject.grooves is not None
+    return {
+        "inner_groove_factor": inner,
+        "outer_groove_factor": outer,
+        "inner_groove_by": STATED if own_grooves else "assumed: as ISO 281 rates; 0.515 to 0.525",
+        "outer_groove_by": STATED if own_grooves else "assumed: as ISO 281 rates; 0.52 to 0.54",
+    }
+
+
+def _common(subject: Subject, point: OperatingPoint, reference: float, capacity: float) -> Values:
+    """What both kinds of bearing have: boundary dimensions, oil, speed [rpm] and load [N]; no mounting."""
+    sizes, error = subject.sizes, 9 if subject.kind == ROLLERS else 20
     oil, base, grease = point.oil
     speed, load = point.speed, point.load
     speed = float(f"{USUAL_SPEED * reference:.2g}") if speed is None else speed
     load = float(f"{USUAL_LOAD * capacity:.2g}") if load is None else load
     return {
-        "name": named.name,
-        "without_effect": named.without_effect or None,
-        "kind": named.kind,
+        "without_effect": subject.without_effect,
+        "kind": subject.kind,
         "bore": sizes.bore,
         "outside": sizes.outside,
-        "width": sizes.width,
+        **_sources(subject.boundary),
         "oil": oil,
         "oil_by": "base oil of the grease" if grease else "",
         "base_oil": (base or "mineral") if oil.startswith("ISO VG") else None,
@@ -192,29 +370,39 @@ def _common(named: Designation, sizes: Envelope, point: OperatingPoint, referenc
     }
 
 
-CLEARANCE_VALUES = ("clearance", "clearance_class", "lower", "upper")
+def _sources(boundary: Boundary | None) -> Values:
+    """Where the boundary dimensions of a drawing come from; a catalogue lists them."""
+    if boundary is None:
+        return {**dict.fromkeys(("bore_by", "outside_by", "width_by"), ""), **dict.fromkeys(OWN_SIZES)}
+    own = dict(zip(OWN_SIZES, (boundary.bore, boundary.outside, boundary.width), strict=True))
+    return {"bore_by": boundary.bore_by, "outside_by": boundary.outside_by, "width_by": boundary.width_by, **own}
 
 
-def _clearance(bore: float, name: str, kind: str) -> Values:
-    lower, upper = (1e-3 * limit for limit in radial_clearance(bore, name, kind))
-    return dict(zip(CLEARANCE_VALUES, (round(0.5 * (lower + upper), 4), name, lower, upper), strict=True))
+def _clearance(bore: float, clearance: str | float, kind: str) -> Values:
+    if not isinstance(clearance, str):
+        return {"clearance": clearance, "clearance_by": STATED}
+    lower, upper = (1e-3 * limit for limit in radial_clearance(bore, clearance, kind))
+    middle = f"middle of {clearance}, {lower:.3f} to {upper:.3f} (ISO 5753-1)"
+    return {"clearance": round(0.5 * (lower + upper), 4), "clearance_by": middle}
 
 
-def _cage(named: Designation, width: float, inside: RollerInterior) -> Values:
-    """A cage of the kind that the suffix names, about the pitch circle."""
-    suffix = named.stated("cage")
-    guidance, material = CAGES[suffix or USUAL_CAGE]
-    soft, landed = material == "polyamide", guidance != "roller"
-    density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[material].density
+def _cage(subject: Subject, inside: RollerInterior) -> Values:
+    """A cage of its kind about the pitch circle."""
+    kind = subject.cage
+    assert kind is not None
+    soft, landed = kind.material == POLYAMIDE_NAME, kind.guidance != "roller"
+    density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[kind.material].density
     sizes = inside.rollers, inside.roller_diameter, inside.roller_length, inside.pitch_diameter
-    cage = cage_estimate(named.series, width, *sizes)
+    cage = cage_estimate(subject.series, subject.sizes.width, *sizes)
     guide = max(round(GUIDE_CLEARANCE * inside.pitch_diameter, 2), SMALLEST_CLEARANCE_MM)
     return {
         **cage._asdict(),
-        "cage_by": f"{f'of suffix {suffix}' if suffix else 'assumed'}: {material}, guided by the {guidance}{' ring' if landed else 's'}",
-        "guidance": guidance,
+        "side_ring_error": SIDE_RING_ERROR if subject.width_known else BLIND_SIDE_RING_ERROR,
+        "cage_by": kind.sentence,
+        "bar_width_by": BLOCK_BETWEEN if cage.bar_width == WIDEST_BAR * inside.roller_diameter else inside.bar_width_by,
+        "guidance": kind.guidance,
         "guide_clearance": guide if landed else None,
         "cage_mass": cage.volume * density,
         "land_width": round(cage.side_ring_width, 2) if landed else None,
-        "cage_material": POLYAMIDE if soft else json.dumps(material),
+        "cage_material": POLYAMIDE if soft else json.dumps(kind.material),
     }

@@ -1,6 +1,7 @@
-"""From a saved result to what its bearing does: pictures, a table of samples, the figures of the motion.
+"""What ``rbdyn show`` prints and writes: pictures and films of a saved result.
 
-A result keeps no motion. It keeps scene and seed, and equal scenes give equal bits: the history is computed anew.
+A saved result has no motion, but scene and seed, and equal scenes give equal bits. So the history is computed again; pictures,
+a table of samples and the figures of the motion are written.
 """
 
 from collections.abc import Callable
@@ -18,8 +19,7 @@ from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
     from rbdyn.base.forecast import Notice
-    from rbdyn.dynamics.motion.history import History
-    from rbdyn.dynamics.motion.orbit import Largest, Race, Spectrum
+    from rbdyn.dynamics.motion import History, Largest, Race, Spectrum
 
 FORMAT = "rbdyn.orbit/1"
 SHOWN_TURNS = 20.0
@@ -33,7 +33,7 @@ LOADS = {"pocket": "pocket_load", "dry_land": "land_load", "outer_race": "outer_
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be shown: the result, its file, its scene, and how many turns of which replicate, from 0."""
+    """What to show: the result, its file, its scene, and how many turns of which replicate, from 0."""
 
     result: SimulationResult
     path: Path
@@ -43,7 +43,7 @@ class Request:
 
     @property
     def notes(self) -> list[str]:
-        """Whether the motion may be another than that of the result."""
+        """A note where the motion may differ from that of the result."""
         now = versions()
         then = self.result.versions
         other = [name for name in now if then.get(name) != now[name]]
@@ -57,24 +57,24 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     """Read a result.json, or that of a folder. Raises InputError with every fault."""
     if path.is_dir():
         path = path / "result.json"
-    from rbdyn.dynamics.motion.history import most_turns
+    from rbdyn.dynamics.motion import most_turns
 
     result = SimulationResult.load(path)
     scene = Scene.from_dict(result.scene, f"{path}: scene")
     numerics, faults = scene.numerics, []
     fewest = FEWEST_SAMPLES / numerics.samples_per_turn
     most = min(most_turns(scene), numerics.turns)
-    chosen = min(SHOWN_TURNS, most) if turns is None else turns
+    counted_turns = min(SHOWN_TURNS, most) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
         faults.append(
             f"--turns {turns:g}: the result counted {counted(numerics.turns, 'turn')}; choose from {fewest:g} to that"
         )
-    elif chosen > most:
+    elif counted_turns > most:
         faults.append(f"--turns {turns:g}: memory has room for {most:.4g} turns of this scene; show no more")
     if not 1 <= replicate <= numerics.replicates:
         faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
     refuse(faults)
-    return Request(result, path, scene, chosen, replicate - 1)
+    return Request(result, path, scene, counted_turns, replicate - 1)
 
 
 def write(
@@ -86,7 +86,7 @@ def write(
     notice: "Notice" = None,
 ) -> dict[str, Any]:
     """Compute the motion, write everything into ``folder``; returns the record that is also in orbit.json."""
-    from rbdyn.dynamics.motion.history import history
+    from rbdyn.dynamics.motion import history
 
     motion = history(request.scene, request.turns, request.replicate, notice=notice)
     tasks: dict[str, Callable[[Path], object]] = {
@@ -95,8 +95,8 @@ def write(
     }
     steps = 1 + len(tasks) + animate + lyapunov
     files: list[str] = []
-    for done, (name, make) in enumerate(tasks.items(), 1):
-        progress(done, steps)
+    for step, (name, make) in enumerate(tasks.items(), 1):
+        progress(step, steps)
         make(folder / name)
         files.append(name)
     if animate:
@@ -108,7 +108,7 @@ def write(
         (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
     record = {**_record(request, motion), "notes": request.notes, "versions": versions()}
     if lyapunov:
-        from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
+        from rbdyn.dynamics.motion import lyapunov_exponent
 
         progress(steps - 1, steps)
         turns = min(LYAPUNOV_TURNS, request.scene.numerics.turns)
@@ -138,7 +138,7 @@ def _pictures(request: Request, motion: "History") -> dict[str, Callable[[Path],
 def _record(request: Request, motion: "History") -> dict[str, Any]:
     import numpy as np
 
-    from rbdyn.dynamics.motion import orbit
+    from rbdyn.dynamics import motion as orbit
 
     eccentricity = orbit.eccentricity(motion)
     clearance = motion.scene.guide_clearance_m
@@ -169,7 +169,7 @@ def _record(request: Request, motion: "History") -> dict[str, Any]:
 
 
 def _race(motion: "History", race: "Race") -> dict[str, float]:
-    from rbdyn.dynamics.motion import orbit
+    from rbdyn.dynamics import motion as orbit
 
     return {
         "pressure_GPa": float(orbit.contact_pressure(motion, race).max()) * 1e-9,
@@ -182,8 +182,8 @@ def _race(motion: "History", race: "Race") -> dict[str, float]:
 def _life(motion: "History") -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
     life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
-    known = life.as_record(*motion.scene.operation.speeds)
-    return {**known, "equivalent_load_N": life.equivalent_load, "method": method}
+    record = life.as_record(*motion.scene.operation.speeds)
+    return {**record, "equivalent_load_N": life.equivalent_load, "method": method}
 
 
 def _largest(hit: "Largest") -> dict[str, float | int | None]:
@@ -198,7 +198,7 @@ def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
 
 
 def blocks(record: dict[str, Any]) -> list[Block]:
-    """The figures that a person looks for first; the peaks of the spectra for who asks for all; notes."""
+    """The main figures; in full detail also the peaks of the spectra; notes."""
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
     return [Table(title, ("figure", "value"), _figures(record)), *_spectra(record["spectra"]), *notes(record["notes"])]
 

@@ -1,4 +1,4 @@
-"""What ``rbdyn simulate`` says and writes of a roller bearing."""
+"""What ``rbdyn simulate`` prints and writes of a roller bearing."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -7,16 +7,17 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.forecast import span
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label
+from rbdyn.result import SimulationResult
+from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
-    from rbdyn.result import Quantity, SimulationResult
-    from rbdyn.scene import Scene
+    from rbdyn.result import Quantity
 
 # Length of the history that --out draws.
 TRACE_TURNS = 10.0
 
 
-def blocks(result: "SimulationResult") -> list[Block]:
+def blocks(result: SimulationResult) -> list[Block]:
     """Figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
     from rbdyn.compiled.kernel import compiler_notes
 
@@ -36,22 +37,22 @@ def blocks(result: "SimulationResult") -> list[Block]:
     ]
 
 
-def write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:
+def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     """Write result.json, history.csv and pictures; returns the names of the files."""
     from rbdyn import plots
-    from rbdyn.dynamics.motion.history import history, most_turns
+    from rbdyn.dynamics.motion import history, most_turns
 
     result.save(folder / "result.json")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
-    shown = history(scene, turns, notice=None)  # the simulation has stated its pace
-    save_table(shown.table(), folder / "history.csv", "%.6g")
+    motion = history(scene, turns, notice=None)  # the simulation has stated its pace
+    save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
-    plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
-    plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
+    plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
+    plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
     return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
-def _figures(result: "SimulationResult") -> "dict[str, Quantity]":
+def _figures(result: SimulationResult) -> "dict[str, Quantity]":
     """Figures of a run by their words; the contact force only where a film makes it another than the whole force."""
     contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
     orbit = result.cage_orbit_radius_share
@@ -69,7 +70,7 @@ def _figures(result: "SimulationResult") -> "dict[str, Quantity]":
 def _table(figures: "dict[str, Quantity]") -> Table:
     header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)")
     rows = [
-        (words, figure.shown, _error(figure.statistical_error), _error(figure.numerical_error))
+        (words, figure.value_text, _error(figure.statistical_error), _error(figure.numerical_error))
         for words, figure in figures.items()
     ]
     return Table("", header, rows)
@@ -79,17 +80,17 @@ def _error(error: float | None) -> str:
     return "not estimated" if error is None else error_alone(error)
 
 
-def _run_sentence(result: "SimulationResult") -> str:
+def _run_sentence(result: SimulationResult) -> str:
     return (
         f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power "
         f"balance closes to {100.0 * result.power_gap:.2g} %; {counted(result.replicates, 'replicate')}, seed "
-        f"{result.seed}; {result.cost['wall_s']:.2f} s{_predicted(result.cost)}, {result.cost['compile_s']:.1f} s to "
+        f"{result.seed}; {result.cost['wall_s']:.2f} s{_prediction(result.cost)}, {result.cost['compile_s']:.1f} s to "
         "load or compile"
     )
 
 
-def _predicted(cost: dict[str, float]) -> str:
-    """What was stated of the wall time on the way, if anything."""
+def _prediction(cost: dict[str, float]) -> str:
+    """Wall time as stated during the runs; empty where none was."""
     if "predicted_most_s" not in cost:
         return ""
     return f" (predicted: {span(cost['predicted_least_s'], cost['predicted_most_s'])})"
@@ -106,7 +107,7 @@ def _race_sentence(race: str, contact: dict[str, float]) -> str:
 
 
 def _clearances(clearance: dict[str, Any]) -> list[Block]:
-    """What makes each clearance in operation, the radial one with its fits one by one."""
+    """Parts of each clearance in operation, the radial one with its fits one by one."""
     plays = {
         "clearance": clearance,
         "guide clearance": clearance.get("guide"),
@@ -130,8 +131,8 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
     )
 
 
-def _further(result: "SimulationResult") -> list[Block]:
-    """What only a careful reader asks for: the transient, the losses one by one, the cost."""
+def _further(result: SimulationResult) -> list[Block]:
+    """Full detail: the transient, the losses one by one, the cost."""
     losses = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
     losses += [
         (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance.items()
@@ -148,12 +149,12 @@ def _further(result: "SimulationResult") -> list[Block]:
 
 
 def _target_sentence(target: dict[str, Any]) -> str:
-    chosen, cost = target["chosen"], target["cost"]
+    choice, cost = target["chosen"], target["cost"]
     errors = target["relative_error"].items()
     reached = ", ".join(f"{label(name)} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
     return (
         f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
-        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol "
-        f"{chosen['rtol']:g}; {cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
+        f"{counted(choice['replicates'], 'replicate')} of {counted(choice['turns'], 'turn')} at rtol "
+        f"{choice['rtol']:g}; {cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
         f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
     )

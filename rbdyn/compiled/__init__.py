@@ -1,6 +1,6 @@
-"""How code is compiled here.
+"""Compilation of kernels.
 
-- ``kernel``: kernels, laws chosen by type, entry points; their machine code on disk, checked before it is used
-- ``parts``: a compiler of kernels made of numba's inner parts, which stock numba replaces where they changed
+- ``kernel``: kernels, laws by type, entry points; their machine code on disk, verified before use
+- ``parts``: a compiler of kernels from numba's internal parts; stock numba replaces it where these changed
 - ``elementary``: exponentials, logarithms, roots and angles that vectorise, with their errors
 """

@@ -1,19 +1,18 @@
-"""How compiled code is made here: plain kernels, laws chosen by type, and cached entry points.
+"""Compiled code: plain kernels, laws by type, and cached entry points.
 
-- ``@kernel``: a small pure function of floats and arrays, compiled as part of whatever calls it.
-- ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
-  NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
-- ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
-  kept on disk, in a folder named by a hash of every module that kernels are made of (``records.sources``), so that
-  an edit can never bring back stale code.
+- ``@kernel``: a small pure function of floats and arrays, compiled as part of its callers.
+- ``@law``: a function with a body for each type of its first argument (a NamedTuple of parameters), selected at compile time. A
+  law that a scene does not use is not compiled.
+- ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is saved in a
+  folder named by a hash of all modules with kernels (``base.digests``), so an edit never reuses stale code.
 
-``parts`` compiles all of them from numba's inner parts, which a new release may change. Where this numba lacks one, or the
-self-test fails, its own ``njit`` compiles them: the same bits, more than twice the time. ``compiler_notes`` says so.
+``parts`` compiles all of them from numba's internal parts, which a new release may change. Where this numba lacks a part, or the
+self-test fails, its own ``njit`` compiles them: the same bits in more than twice the time. ``compiler_notes`` reports it.
 
-Machine code on disk is one file for each function and signature, whole or absent, and checked before it is used. numba's own
-cache trusts what it reads: an empty file ends the process, and a flipped bit becomes machine code. Here a file opens with
-the hash of the rest, and the rest names what it is of. What fails a check is removed and compiled anew. A file gets its name
-once it is whole, so that processes may share a folder. Where nothing can be written the run goes on without.
+Machine code on disk is one complete file for each function and signature, verified before use. numba's own cache trusts its
+files: an empty file ends the process, and a flipped bit becomes machine code. Here a file begins with the hash of the rest, which
+names its function and signature. A file that fails a check is removed and compiled anew. It gets its final name when complete, so
+processes may share a folder. A run continues without saved code where nothing can be written.
 """
 
 import contextlib
@@ -38,15 +37,14 @@ import numba.extending
 from llvmlite.binding import get_host_cpu_features
 from numba import njit, types
 
-from rbdyn.base.cache import content_of, user_cache, with_digest
-from rbdyn.base.sources import compiled_digest
+from rbdyn.base.digests import compiled_digest, content_of, user_cache, with_digest
 
-# Set to anything in the environment, numba's own njit compiles.
+# Environment variable that selects numba's own njit.
 STOCK = "RBDYN_STOCK_NUMBA"
-# Doubles in the widest vector register. Loops that run over whole vectors leave no scalar rest; results do not depend on
-# it, for every lane is rounded by itself.
+# Doubles in the widest vector register. Loops over whole vectors have no scalar rest. Results do not depend on it, since each
+# lane is rounded separately.
 VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
-# Code in a file depends on them.
+# Versions on which saved code depends.
 VERSIONS = (sys.implementation.cache_tag, llvmlite.__version__, numba.__version__)
 # Whether kernels stay Python: NUMBA_DISABLE_JIT.
 INTERPRETED: bool = getattr(numba.config, "DISABLE_JIT", False)
@@ -54,15 +52,15 @@ INTERPRETED: bool = getattr(numba.config, "DISABLE_JIT", False)
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """Folder of the compiled code of exactly these kernels, made when it is first needed; None where there is no home."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(named).absolute() if named else user_cache()
+    """Folder of the compiled code of exactly these kernels, created at the first use; None for a user without a home."""
+    override = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(override).absolute() if override else user_cache()
     digest = hashlib.sha256(repr((VERSIONS, compiled_digest())).encode())
     return None if base is None else base / "rbdyn" / digest.hexdigest()[:16]
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under another name and rename it. Raises OSError, and leaves no part of it."""
+    """Write a file under another name and rename it. Raises OSError without leaving a partial file."""
     unfinished = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
     try:
         unfinished.write_bytes(content)
@@ -75,7 +73,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def _remove(path: Path) -> None:
-    """Remove a file, or what stands in its place, as far as that is allowed."""
+    """Remove a file, or a folder of that name, as far as permissions allow."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:
@@ -84,20 +82,20 @@ def _remove(path: Path) -> None:
 
 
 def working_parts() -> tuple[ModuleType | None, str]:
-    """The module ``parts`` where it works with this numba, else None and why."""
+    """The module ``parts`` where it works with this numba, else None with the reason."""
     if os.environ.get(STOCK):
         return None, f"{STOCK} is set"
     try:
         from rbdyn.compiled import parts
 
         _test_once(parts.self_test)
-    except Exception as error:  # numba puts what goes wrong in a compiler into errors of its own
+    except Exception as error:  # numba raises errors of its own for failures of a compiler
         return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
     return parts, ""
 
 
 def compiler_notes() -> tuple[str, ...]:
-    """A sentence where stock numba compiles, for a person who asks for details."""
+    """A sentence where stock numba compiles, for verbose output."""
     sentence = (
         f"stock numba {numba.__version__} compiles ({WHY_STOCK}): the results are the same, "
         "the first run takes more than twice as long"
@@ -138,25 +136,25 @@ def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a small pure function into its callers; ``.py_func`` keeps the interpreted one."""
+    """Compile a small pure function into its callers; ``.py_func`` is the interpreted one."""
     return _inner(function, INLINED)
 
 
 def settled_kernel(function: Callable[..., Any]) -> Any:
-    """``kernel`` with a ``reordered_sum``: its order is chosen here, the same for all callers."""
+    """``kernel`` with a ``reordered_sum``, whose order is settled here, the same for all callers."""
     return _inner(function, SETTLED)
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """Compile a longer function that is called from several places and not copied into them."""
+    """Compile a longer function that several kernels call, without a copy in each of them."""
     return _inner(function, ROUTINE)
 
 
 def law(declaration: Callable[..., Any]) -> Any:
-    """Declare a law. Register a body for one or more parameter types with ``@declared.body(ParameterType)``; ``.bodies``
-    holds them by type.
+    """Declare a law.
 
-    Works compiled (the choice costs nothing) and interpreted. Raises TypeError where no body is registered.
+    ``@declared.body(ParameterType)`` registers a body for one or more parameter types; ``.bodies`` holds them by type. Works
+    compiled (the choice costs nothing) and interpreted. Raises TypeError for a type without a body.
     """
     bodies: dict[type, Callable[..., Any]] = {}
 
@@ -189,7 +187,7 @@ def _leaves(of: Any) -> list[types.Type]:
 
 
 def alike(one: Any, other: Any) -> bool:
-    """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
+    """Whether two sets of parameters have one type and numbers only; decided at compile time."""
     if isinstance(one, tuple) and type(one) is type(other):
         return all(alike(x, y) for x, y in zip(one, other, strict=True))
     return isinstance(one, float | int) and isinstance(other, float | int)
@@ -208,7 +206,7 @@ def _alike(one, other):
 def either(first: bool, one: Any, other: Any) -> Any:
     """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch.
 
-    Where they are not alike they cannot be mixed: ``other``, whatever is asked for.
+    Sets that are not ``alike`` cannot be mixed and always give ``other``.
     """
     return one if first and alike(one, other) else other
 
@@ -243,34 +241,31 @@ def _choice(of: Any) -> Callable[..., Any]:
 
 
 def entry(function: Callable[..., Any]) -> Any:
-    """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
+    """Compile a function that Python calls, without the GIL and with its machine code saved on disk."""
     make: Any = njit
     compiled = make(**ENTRY)(function)
     if not INTERPRETED:
         compiled = PARTS.Entry.of(compiled) if PARTS else compiled
         if (folder := cache_folder()) is not None:
-            keep_code(compiled, folder)
+            save_code(compiled, folder)
     return compiled
 
 
-def keep_code(compiled: Any, folder: Path) -> None:
-    """Let a dispatcher keep its machine code in a folder, and look for it there."""
+def save_code(compiled: Any, folder: Path) -> None:
+    """Let a dispatcher save its machine code in a folder, and load it from there."""
     try:
         compiled._cache = EntryCache(compiled.py_func, folder)
     except OSError:
-        return  # without a source file nothing distinguishes old code from new
+        return  # without a source file stale code cannot be recognized
     except (ImportError, AttributeError) as error:
-        warn_once(
-            f"numba {numba.__version__} lacks what keeping compiled code needs ({error}): every run compiles anew"
-        )
+        warn_once(f"numba {numba.__version__} cannot save compiled code ({error}): every run compiles anew")
 
 
 class EntryCache:
-    """Compiled code of one function; the methods are those that numba's dispatcher calls."""
+    """Saved code of one function; numba's dispatcher calls its methods."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        """Raises OSError where the source file of the function cannot be read, ImportError or AttributeError where this numba
-        lacks what it takes."""
+        """Raises OSError for an unreadable source file, ImportError or AttributeError for a numba without the necessary parts."""
         from numba.core.compiler import CompileResult
         from numba.core.serialize import dumps
 
@@ -287,12 +282,12 @@ class EntryCache:
         return str(self.folder)
 
     def path(self, signature: Any, magic: tuple[Any, ...]) -> Path:
-        """File of a signature on a processor, which ``magic`` names."""
+        """File of a signature on the processor that ``magic`` names."""
         text = repr((_text(signature), magic, WAY, VERSIONS))
         return self.folder / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:24]}.nbc"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """The compiled code of a signature, None where there is none. What cannot be loaded is removed."""
+        """The saved code of a signature; None without any. A file that cannot be loaded is removed."""
         context.refresh()
         magic = context.codegen().magic_tuple()
         path = self.path(signature, magic)
@@ -305,9 +300,9 @@ class EntryCache:
             return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Write compiled code, or say once a process that it cannot be."""
+        """Save compiled code, or warn once in a process that this fails."""
         if compiled.library.has_dynamic_globals:
-            return  # addresses of this process stand in the code
+            return  # the code contains addresses of this process
         magic = compiled.codegen.magic_tuple()
         content = self.dumps((self._key(signature, magic), self.reduce(compiled)))
         try:
@@ -315,12 +310,12 @@ class EntryCache:
             write_whole(self.path(signature, magic), with_digest(content))
         except OSError as error:
             warn_once(
-                f"compiled code cannot be kept in {self.folder} ({error.strerror}): every run compiles anew; "
-                "let NUMBA_CACHE_DIR name another folder"
+                f"compiled code cannot be saved in {self.folder} ({error.strerror}): every run compiles anew; set NUMBA_CACHE_DIR "
+                "to another folder"
             )
 
     def flush(self) -> None:
-        """Remove all that is kept of the function."""
+        """Remove all saved code of the function."""
         for path in self.folder.glob(f"{self.name}-*.nbc"):
             _remove(path)
 
@@ -330,15 +325,15 @@ class EntryCache:
 
 @functools.cache
 def warn_once(sentence: str) -> None:
-    """Say that compiled code is not kept; a handler of ``logging`` may take it elsewhere."""
+    """Warn that compiled code is not saved; a handler of ``logging`` may redirect the warning."""
     logging.getLogger("rbdyn").warning(sentence)
 
 
 def _payload(data: bytes, key: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What was compiled. Raises ValueError where the file is not as it was written, or of something else."""
-    written, compiled = pickle.loads(content_of(data))
-    if written != key:
-        raise ValueError("compiled code of something else")
+    """The compiled code in a file. Raises ValueError for a damaged file, or one of another function or signature."""
+    own_key, compiled = pickle.loads(content_of(data))
+    if own_key != key:
+        raise ValueError("compiled code of another function or signature")
     return compiled
 
 

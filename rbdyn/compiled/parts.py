@@ -1,10 +1,10 @@
-"""Compiler of functions that only compiled code calls, made of numba's own parts: ``kernel`` does without where they changed.
+"""Compiler of functions that only compiled code calls, from numba's own parts; ``kernel`` works without it where these changed.
 
-numba optimises every function with all that it calls, makes machine code of it, and does so again in each of its callers. What
-is linked into callers anyway is only inlined here; the rest is done once, for the whole that Python calls. Nothing is looked
-for that kernels do not hold, no references are counted, and named tuples are handed on whole. Together that takes half of the
-time off the first result of a simulation and four fifths off that of a row of balls. Nothing of numba's is replaced: what is
-compiled by other packages in the same process is compiled as ever.
+numba optimises every function with all its callees and generates machine code for it, then repeats this in each caller. Here a
+function that is linked into callers is only inlined; optimisation and code generation happen once, for the function that Python
+calls. Passes for features that kernels lack are left out, references are not counted, and named tuples are passed whole. This
+halves the time to the first result of a simulation, and leaves a fifth of it for a row of balls. Nothing of numba is replaced:
+other packages in the same process compile as usual.
 """
 
 import functools
@@ -30,7 +30,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering
 
-# Of numba's passes those that kernels need: they hold no closures, exceptions, unrolled tuples or array expressions.
+# numba's passes that kernels need: they have no closures, exceptions, unrolled tuples or array expressions.
 BEFORE_LOWERING = (
     untyped.TranslateByteCode,
     untyped.FixupArgs,
@@ -48,10 +48,10 @@ BEFORE_LOWERING = (
 
 
 class Part(JITCodeLibrary):
-    """Code of a function and of what it calls, to be linked into its callers; never machine code by itself."""
+    """Code of a function and its callees for linking into its callers, without machine code of its own."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Tidy functions up; what takes longer is done once, for the whole."""
+        """Simplify functions; longer optimisation happens once, for the whole."""
         ll_module.data_layout = self._codegen._data_layout
         passes, builder = self._codegen._function_pass_manager(opt=1)
         for function in ll_module.functions:
@@ -59,7 +59,7 @@ class Part(JITCodeLibrary):
                 passes.run(function, builder)
 
     def finalize(self) -> None:
-        """Link what it calls and inline it. Left for the callers to inline, small functions would swell before they shrink."""
+        """Link callees and inline them here: inlined by the callers, small functions would grow before they shrink."""
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -74,7 +74,7 @@ class SettledPart(Part):
     """A part that is optimised before it is linked into its callers."""
 
     def finalize(self) -> None:
-        """Settle the order of sums that the compiler may choose, whatever calls them."""
+        """Settle the order of sums that the compiler may choose, for all callers."""
         super().finalize()
         self._optimize_final_module()
 
@@ -93,10 +93,10 @@ class PartLowering(NativeLowering):
         super().__init__()
 
     def run_pass(self, state: Any) -> bool:
-        """Leave a function for callers to link in, known by a handle of its own."""
+        """Provide a function for linking into callers, with a handle of its own."""
         calls = (call.return_type for call in state.calltypes.values() if call is not None)
         if not any(map(_holds_array, (state.return_type, *calls))):
-            # It makes no array and returns none: its caller holds them all, and no references need be counted.
+            # The function creates and returns no array: its caller owns all of them, so references need no count.
             state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         super().run_pass(state)
@@ -116,7 +116,7 @@ class SettledLowering(PartLowering):
 
 
 class Whole:
-    """An argument handed on as it is. numba would take a tuple apart and build it anew at every call."""
+    """An argument passed whole, where numba would disassemble a tuple and rebuild it at every call."""
 
     def get_argument_type(self: Any) -> Any:
         """Its own type."""
@@ -135,35 +135,33 @@ for _kind, _model in ((types.NamedTuple, models.TupleModel), (types.NamedUniTupl
 
 
 def _from_start(index: Any) -> Any:
-    """Type of an index whose integers count from the start: numba looks for a negative one only where there can be one."""
+    """Type of an index whose integers count from the start: numba tests only signed integers for a negative index."""
     if isinstance(index, types.Integer):
-        bits: Any = index  # whose stubs leave this out
+        bits: Any = index  # the stubs lack its width
         return types.Integer.from_bitwidth(bits.bitwidth, signed=False)
     if isinstance(index, types.UniTuple):
         return types.UniTuple(_from_start(index.dtype), index.count)
     if isinstance(index, types.Tuple):
         kinds = [_from_start(kind) for kind in index.types]
-        return (
-            index if len(set(kinds)) == 1 else types.Tuple(kinds)
-        )  # of one type it would be laid out as another tuple
+        return index if len(set(kinds)) == 1 else types.Tuple(kinds)  # a tuple of one type would have another layout
     return index
 
 
 class KernelContext(CPUContext):
-    """How kernels become machine code: named tuples as ``WHOLE`` says, and every index of an array counts from the start.
+    """Code generation of kernels: named tuples are passed whole, and every index of an array counts from the start.
 
-    Where an index might count from the end, vector code must look first, and reads and writes one by one.
+    With an index that may count from the end, vector code would have to test it, and read and write elements one by one.
     """
 
     @classmethod
     def of(cls, context: CPUContext) -> "KernelContext":
-        """A copy of a context that differs in this only."""
+        """A copy of a context with this difference only."""
         own = context.subtarget(data_model_manager=WHOLE)
         own.__class__ = cls
         return own
 
     def get_function(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
-        """What reads or writes an item of an array, its indices without a sign; all else is numba's."""
+        """Reads and writes of array items have unsigned indices; all other functions are numba's."""
         key = getattr(fn, "typing_key", None)
         if key in (operator.getitem, operator.setitem) and isinstance(sig.args[0], types.Array):
             array, index, *value = sig.args
@@ -172,7 +170,7 @@ class KernelContext(CPUContext):
 
 
 class PartFlags(Flags):
-    """Options that stay as they are: numba looks functions up by them, thousands of times."""
+    """Immutable options, compared by identity: numba looks functions up by them thousands of times."""
 
     __eq__, __hash__ = object.__eq__, object.__hash__
 
@@ -190,18 +188,18 @@ class PartFlags(Flags):
 
 
 class Passes(PassManager):
-    """Passes one after the other, without timings, events and descriptions of types for each of them."""
+    """Passes in sequence, without the timings, events and type descriptions of each pass."""
 
     def run(self, state: Any) -> None:
         """Take a function through all passes."""
         for kind, _ in self.passes:
-            one = _pass_registry.get(kind).pass_inst
-            one.analysis = self._analysis
-            one.run_pass(state)
+            step = _pass_registry.get(kind).pass_inst
+            step.analysis = self._analysis
+            step.run_pass(state)
 
 
 class KernelCompiler(CompilerBase):
-    """numba's own but for passes that look for what no kernel holds, and for how named tuples are handed on."""
+    """numba's compiler without the passes that kernels do not need, and with whole named tuples."""
 
     lowering: type[NativeLowering] = NativeLowering
 
@@ -239,7 +237,7 @@ class SettledCompiler(PartCompiler):
     lowering = SettledLowering
 
 
-# Options of each kind of function. What is not said here would be as in the caller that came first.
+# Options of each kind of function; a missing option would be that of its first caller.
 WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
 ROUTINE: dict[str, Any] = {**dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler, "forceinline": False}
 INLINED: dict[str, Any] = {**ROUTINE, "forceinline": True}
@@ -248,24 +246,26 @@ ENTRY: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": KernelCompi
 
 
 class Inner(CPUDispatcher):
-    """Machine code that compiled code calls: without the wrappers that Python would need, a fifth of the time of compiling.
+    """Code that compiled code calls, without the wrappers for Python, which take a fifth of the compile time.
 
-    A call from Python goes to a twin that has them, compiled when first called.
+    A call from Python uses a twin with wrappers, compiled at the first call.
     """
 
     @classmethod
     def of(cls, dispatcher: Any) -> "Inner":
-        """The dispatcher itself, of this kind from now on."""
+        """The dispatcher itself, changed to this class."""
         dispatcher.__class__ = cls
         return dispatcher
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Compile once for all values of an argument: numba would do so for each constant anew."""
+        """Compile once for all values of an argument, where numba would compile for each constant."""
         plain = types.unliteral
-        return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
+        return super().get_call_template(
+            [plain(kind) for kind in args], {name: plain(kind) for name, kind in kws.items()}
+        )
 
     def compile(self: Any, sig: Any) -> Any:
-        """Compile without timing it for every caller that waits."""
+        """Compile without a timing for each waiting caller."""
         args, result = normalize_signature(sig)
         if args not in self.overloads:
             event_of_it = event.trigger_event("numba:compile", data={"dispatcher": self})
@@ -289,12 +289,12 @@ class Entry(CPUDispatcher):
 
     @classmethod
     def of(cls, dispatcher: Any) -> "Entry":
-        """The dispatcher itself, of this kind from now on."""
+        """The dispatcher itself, changed to this class."""
         dispatcher.__class__ = cls
         return dispatcher
 
     def compile(self, sig: Any) -> Any:
-        """Compile without looking for garbage: nearly nothing is, and the search takes a tenth of the time."""
+        """Compile without garbage collection, which finds nearly nothing and takes a tenth of the time."""
         enabled = gc.isenabled()
         gc.disable()
         try:
@@ -305,14 +305,14 @@ class Entry(CPUDispatcher):
 
 
 class Probe(NamedTuple):
-    """What the self-test hands on whole."""
+    """Argument of the self-test, passed whole."""
 
     factor: float
     rows: Any
 
 
 def self_test() -> None:
-    """Compile a small function of each kind. Raises RuntimeError where the answer is wrong, whatever numba raises where it cannot."""
+    """Compile a small function of each kind. Raises RuntimeError for a wrong result, and any error of numba."""
     make: Any = numba.njit
 
     def compiled(options: dict[str, Any], kind: Any = Inner) -> Callable[[Any], Any]:

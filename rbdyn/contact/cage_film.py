@@ -1,9 +1,9 @@
-"""Oil films that carry the cage: on the guide land, a short journal bearing, and between a roller and a plane pocket wall.
+"""Oil films of the cage: on the guide land, a short journal bearing, and between a roller and a plane pocket wall.
 
-The pocket's film is that of a rigid cylinder in isoviscous oil that rolls, slides, closes and parts.
-Reynolds' equation over the gap h + x^2/(2 R), with pressures that are nowhere negative (Reynolds' boundary: pressure and
-slope end together), so that wedge and squeeze share one film and one end of it. In X = x/sqrt(2 R h) everything depends
-on sigma = V sqrt(2 R/h)/|u| alone, V the closing speed and u the entrainment speed. With the film's end at X_e:
+The pocket's film is that of a rigid cylinder in isoviscous oil with rolling, sliding, closing and opening motion. It solves
+Reynolds' equation over the gap h + x^2/(2 R) without negative pressures (Reynolds' boundary: pressure and slope vanish together).
+So wedge and squeeze share one film with one end. In X = x/sqrt(2 R h) the film depends on sigma = V sqrt(2 R/h)/|u| alone, with V
+the closing speed and u the entrainment speed. With the film's end at X_e:
 
     dP/dX = (X - X_e) (X + X_e - sigma)/(1 + X^2)^3,    sigma = [(I_2 - I_3) - X_e^2 I_3]/[A - X_e I_3],
 
@@ -12,11 +12,11 @@ I_n the integral of (1 + X^2)^-n from -infinity to X_e and A = -1/[4 (1 + X_e^2)
 
 - closing alone: W = pi sigma/8, F = pi/3; the push is 3 sqrt(2) pi eta l (R/h)^1.5 V;
 - steady: W = 0.2040, F = 0.5423; 4.895 eta l u R/h (Martin 1916) and 4.601 eta l u sqrt(R/h);
-- parting fast: W = 16/(81 sigma^2), F = 16/(27 |sigma|); the push, 64/27 eta l |u|^3/V^2, dies away.
+- fast opening: W = 16/(81 sigma^2), F = 16/(27 |sigma|); the push, 64/27 eta l |u|^3/V^2, vanishes.
 
-Behind its end the oil runs on in streamers, which fill as much of the width as passes that end, at most all. Shear of
-the sliding acts on film and streamers: sqrt(2) eta U l sqrt(R/h) S, with S between 3 pi/4 and pi. Pressure takes the power
-2 u times the rolling force plus V times the push, the integral of h^3 (dp/dx)^2/(12 eta): it is never negative.
+Behind its end the oil continues in streamers, which fill the width in proportion to the flow there. Shear by sliding acts on
+film and streamers: sqrt(2) eta U l sqrt(R/h) S, with S between 3 pi/4 and pi. The power of the pressure is 2 u times the rolling
+force plus V times the push. It is the integral of h^3 (dp/dx)^2/(12 eta) and never negative.
 """
 
 import math
@@ -27,7 +27,7 @@ from rbdyn.compiled.kernel import kernel
 
 
 class ShortJournalFilm(NamedTuple):
-    """Lubricated guide land(s); the film thickness never counts as less than ``floor``."""
+    """Lubricated guide land(s) with a least film thickness ``floor``."""
 
     force_scale: float  # sum over lands of fill * eta R L^3/c^2 [N s]
     shear_scale: float  # sum over lands of fill * 2 pi eta R^3 L/c [N m s]
@@ -51,15 +51,15 @@ def short_journal_film(
 def journal_film_force(
     force_scale: float, eccentricity: float, radial_rate: float, wedge_rate: float
 ) -> tuple[float, float]:
-    """Radial and tangential film force [N] on the journal of a short bearing that carries no tension.
+    """Radial and tangential film force [N] on the journal of a short bearing without tension in the film.
 
     ``eccentricity`` e/c < 1; ``radial_rate`` = d(eccentricity)/dt [1/s]; ``wedge_rate`` = eccentricity times
     (sum of the two spin rates - 2 whirl rate) [1/s]. Radial is along the eccentricity, tangential 90 degrees
     ahead in the sense of rotation.
 
-    The pressure of the short bearing has the sign of 2 radial_rate cos(theta) - wedge_rate sin(theta), positive on
-    exactly half the circle; over that half all integrals are elementary in Sommerfeld's angle gamma. With
-    radial_rate = 0 the result is Ocvirk's half-film.
+    The pressure of the short bearing has the sign of 2 radial_rate cos(theta) - wedge_rate sin(theta), which is positive on
+    exactly half the circle. Over that half all integrals are elementary in Sommerfeld's angle gamma. With radial_rate = 0 the
+    result is Ocvirk's half-film.
     """
     a, b = 2.0 * radial_rate, -wedge_rate
     size = math.sqrt(a * a + b * b)
@@ -90,7 +90,7 @@ def journal_film_force(
 
 
 class PocketFilm(NamedTuple):
-    """Scales of the film forces for a film thickness h, which never counts as less than ``floor``."""
+    """Scales of the film forces for a film thickness h of at least ``floor``."""
 
     load: float  # push is load * |u| W/h [N s]
     reach: float  # sigma is reach * closing speed/(|u| sqrt(h)) [m^0.5]
@@ -115,9 +115,9 @@ def pocket_film(viscosity: float, radius: float, length: float, floor: float, fi
 def film_shape(entrainment, squeeze):
     """(|u| W [m/s], u F [m/s], S) for u = ``entrainment`` and u sigma = ``squeeze`` = V sqrt(2 R/h) [m/s] of any sign.
 
-    Continuous but for both nil, push and rolling force with their slopes. Best polynomials in s = sigma/(c + sqrt(c^2 +
-    sigma^2)), c = 1.5, which runs from parting, -1, to closing, 1; each with the factor by which its figure dies away,
-    those of W and F exact at closing alone. Within 2e-5 of W, 9e-5 of F and 3e-3 of S.
+    Continuous except where both are zero; push and rolling force have continuous slopes. Minimax polynomials in
+    s = sigma/(c + sqrt(c^2 + sigma^2)), c = 1.5, from -1 (opening) to 1 (closing), each with the factor of its decay. Those of W
+    and F are exact at closing alone. Errors: 2e-5 of W, 9e-5 of F and 3e-3 of S.
     """
     rolling = 1.5 * abs(entrainment)
     size = math.sqrt(rolling * rolling + squeeze * squeeze)
@@ -127,32 +127,31 @@ def film_shape(entrainment, squeeze):
     push_even = fma(q, fma(q, push_even, -0.1536401909), 0.13596921496)
     push_odd = fma(q, fma(q, fma(q, 0.0022681003687, -0.010738897703), 0.025251088542), -0.038733388365)
     push_odd = fma(q, fma(q, push_odd, 0.039270108325), -0.022036609111)
-    held_even = fma(q, fma(q, fma(q, -0.01950886196, 0.05958009961), -0.05131959137), -0.07168920924)
-    held_even = fma(q, held_even, 0.5422836794)
-    held_odd = fma(q, fma(q, fma(q, -0.003514312274, 0.005046344219), -0.00678407838), 0.06950470557)
+    rolling_even = fma(q, fma(q, fma(q, -0.01950886196, 0.05958009961), -0.05131959137), -0.07168920924)
+    rolling_even = fma(q, rolling_even, 0.5422836794)
+    rolling_odd = fma(q, fma(q, fma(q, -0.003514312274, 0.005046344219), -0.00678407838), 0.06950470557)
     shear_even = fma(q, fma(q, fma(q, -0.19791307, -0.00779131131), 0.877740417), 2.46133412)
     shear_odd = fma(q, fma(q, fma(q, -0.740088974, 1.94378141), -1.9319692), 0.728276131)
     rest = 1.0 + s
     push = size * (rest * rest * rest) * fma(s, push_odd, push_even)
-    return push, entrainment * rest * fma(s, held_odd, held_even), fma(s, shear_odd, shear_even)
+    return push, entrainment * rest * fma(s, rolling_odd, rolling_even), fma(s, shear_odd, shear_even)
 
 
 @kernel
 def wall_film(film, gap, closing, roller_surface, wall_surface):
-    """Film on one wall: (push [N] that parts roller and wall, net tangential force on the roller [N], sum of the shear
-    on the roller's surface [N], power lost [W]).
+    """Film on one wall: push, net tangential force on the roller, shear force on the roller's surface [N], and power loss [W].
 
-    ``gap`` [m] may be negative; ``closing`` [m/s]; surface speeds along the wall at the contact [m/s], the roller's
-    seen from the contact. Each surface is slowed by the rolling force; on the round one the pressure pushes twice as
-    much the other way, through its centre.
+    The push separates roller and wall. ``gap`` [m] may be negative; ``closing`` [m/s]; surface speeds along the wall at the
+    contact [m/s], that of the roller relative to the contact. The rolling force slows each surface. On the round surface the
+    pressure acts through its centre with twice that force in the opposite direction.
     """
     h = max(gap, film.floor)
     root = 1.0 / math.sqrt(h)
     entrainment = 0.5 * (roller_surface + wall_surface)
-    load, held, share = film_shape(entrainment, film.reach * root * closing)
+    load, resistance, share = film_shape(entrainment, film.reach * root * closing)
     push = film.load * root * root * load
     sliding = film.shear * root * share * (wall_surface - roller_surface)
-    rolling = film.rolling * root * held
+    rolling = film.rolling * root * resistance
     on_roller = sliding - rolling
     power = sliding * (wall_surface - roller_surface) + 2.0 * rolling * entrainment + push * closing
     return push, sliding + rolling, on_roller, power

@@ -13,8 +13,8 @@ class NoDamping(NamedTuple):
 class ViscousDamping(NamedTuple):
     """A fixed share of critical damping at every load, engaged smoothly over a short first approach.
 
-    c = 2 zeta sqrt(k m) with the tangent stiffness k; the engagement stands for the oil film that the surfaces press
-    out before they touch.
+    c = 2 zeta sqrt(k m) with the tangent stiffness k. The engagement represents the oil film that the surfaces squeeze out before
+    they touch.
     """
 
     scale: float  # 2 zeta sqrt(m) [sqrt(kg)]
@@ -41,7 +41,7 @@ def alpha_of_restitution(restitution: float, speed: float) -> float:
     def excess(d: float) -> float:
         return math.log1p(d) - math.log1p(-restitution * d) - d * (1.0 + restitution)
 
-    # Below the root the linear term wins, towards d = 1/e the logarithm grows without bound: bisection cannot fail.
+    # Below the root the linear term is larger; towards d = 1/e the logarithm is unbounded: bisection cannot fail.
     low, high = 0.0, 1.0 / restitution
     for _ in range(200):
         middle = 0.5 * (low + high)
@@ -54,8 +54,9 @@ def alpha_of_restitution(restitution: float, speed: float) -> float:
 
 @law
 def damped_load(damping, elastic_load, root_stiffness, approach, approach_rate):
-    """Load [N] >= 0 of a closed contact, from its elastic load [N], the root of its tangent stiffness [sqrt(N/m)], its
-    approach [m] > 0 and the rate of that [m/s].
+    """Load [N] >= 0 of a closed contact.
+
+    From the elastic load [N], the root of the tangent stiffness [sqrt(N/m)], the approach [m] > 0 and its rate [m/s].
     """
 
 

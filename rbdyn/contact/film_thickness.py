@@ -1,7 +1,7 @@
-"""Oil film of a rolling line contact: thickness, how far it parts the surfaces, and what the asperities carry.
+"""Oil film of a rolling line contact: thickness, lambda ratio, and the share of the load that asperities carry.
 
-Plain functions of floats or arrays, for setting up laws and for reports; none is called while a bearing turns.
-With U = eta u/(E' R), G = alpha E', W = Q/(l E' R), where u is the mean speed of the two surfaces.
+Plain functions of floats or arrays that broadcast, for the construction of laws and for reports. The groups are
+U = eta u/(E' R), G = alpha E', W = Q/(l E' R), with u the mean speed of the two surfaces.
 """
 
 import math
@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.properties.lubricants import Oil
+from rbdyn.properties.materials import Oil
 
-# Below, the fitted numerator of the thermal factor runs through zero (cold oil at high speed).
+# Least numerator of the thermal factor, whose fit passes zero for cold oil at high speed.
 SMALLEST_PRESSURE_TERM = 0.1
-# The starvation fit ends here; beyond, the inlet counts as flooded.
+# End of the starvation fit, from which the inlet counts as flooded.
 FLOODED = 8.0
 
 
@@ -51,16 +51,16 @@ def central_film(contact: RollingContact, oil: Oil, load: Any) -> Any:
 
 
 def minimum_film(contact: RollingContact, oil: Oil, load: Any) -> Any:
-    """Isothermal, flooded film where it is thinnest [m]: 2.65 R U^0.70 G^0.54 W^-0.13 (Dowson and Higginson 1966)."""
+    """Isothermal, flooded minimum film [m]: 2.65 R U^0.70 G^0.54 W^-0.13 (Dowson and Higginson 1966)."""
     speed, material, weight = _groups(contact, oil, load)
     return 2.65 * contact.radius * speed**0.70 * material**0.54 * weight**-0.13
 
 
 def thermal_factor(contact: RollingContact, oil: Oil, load: Any, slip: Any = 0.0) -> Any:
-    """What shear heating of the inlet leaves of the film, at a slip [m/s] (Gupta, Cheng and Zhu 1992).
+    """Reduction of the film by shear heating of the inlet, at a slip [m/s] (Gupta, Cheng and Zhu 1992).
 
-    (1 - 13.2 (p_H/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64), L = (-d eta/dT) u^2/k, S = slip/u. Zhou and
-    Hoeprich 1991, eq 21, print the same constants. The numerator is held above 0.1, where the fit ends.
+    (1 - 13.2 (p_H/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64), L = (-d eta/dT) u^2/k, S = slip/u. Zhou and Hoeprich 1991,
+    eq 21, print the same constants. The numerator is at least 0.1, the end of the fit.
     """
     pressure = hertz_pressure(contact, load) / contact.equivalent_modulus
     return inlet_heating(pressure, oil, contact.entrainment_speed, slip)
@@ -75,10 +75,10 @@ def inlet_heating(relative_pressure: Any, oil: Oil, entrainment_speed: Any, slip
 
 
 def starvation_factor(contact: RollingContact, load: Any, film: Any, inlet_distance: float) -> Any:
-    """What a short inlet leaves of a flooded film [m]; the oil begins ``inlet_distance`` half-widths ahead.
+    """Reduction of a flooded film [m] by a short inlet; the oil begins ``inlet_distance`` half-widths ahead.
 
-    1 - exp(-1.68005 s^0.8315 + 0.260137 s^1.558 - 0.016146 s^2.296), s = distance (b^2/(2 h R))^(2/3): a fit used
-    with ADORE-style inputs, where the distance is 10. One beyond s = 8.
+    1 - exp(-1.68005 s^0.8315 + 0.260137 s^1.558 - 0.016146 s^2.296), s = distance (b^2/(2 h R))^(2/3): a fit for ADORE-style
+    inputs, where the distance is 10. It is 1 from s = 8.
     """
     width = half_width(contact, load)
     s = np.minimum(inlet_distance * (width**2 / (2.0 * film * contact.radius)) ** (2.0 / 3.0), FLOODED)
@@ -87,7 +87,7 @@ def starvation_factor(contact: RollingContact, load: Any, film: Any, inlet_dista
 
 
 def film_in_service(contact: RollingContact, oil: Oil, load: Any, inlet_distance: float | None = None) -> Any:
-    """Central film [m] in pure rolling, with inlet heating and, where a distance is given, starvation."""
+    """Central film [m] in pure rolling, with inlet heating and, with an inlet distance, starvation."""
     film = central_film(contact, oil, load) * thermal_factor(contact, oil, load)
     if inlet_distance is None:
         return film
@@ -109,7 +109,7 @@ def lambda_ratio(film: Any, first_roughness: float, second_roughness: float) -> 
 def asperity_share(ratio: Any, b: float, c: float) -> Any:
     """Share of the load that asperities carry, exp(-b Lambda^c) (Zhou and Hoeprich 1991, eq 29).
 
-    ``b`` and ``c`` belong to a pair of surfaces: 2.32 and 0.97 for the raceways of a tapered roller bearing with a
+    ``b`` and ``c`` depend on the pair of surfaces: 2.32 and 0.97 for the raceways of a tapered roller bearing with a
     composite roughness of 0.16 um, 1.90 and 0.99 for its rib (Lubricants 11, 2023, 369, Table 4).
     """
     return np.exp(-b * np.asarray(ratio) ** c)

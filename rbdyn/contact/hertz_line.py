@@ -1,9 +1,9 @@
-"""Line contact: load against approach, by Palmgren (Chen et al. 2022, eq 6) or by one of its rivals.
+"""Line contact: load against approach, by Palmgren (Chen et al. 2022, eq 6) or by another law.
 
-A whole roller takes one of the plain laws. A roller with a profile, or between tilted rings, is cut into slices, each
-of which carries its share of a plain law at its own approach. Plain laws differ by 7 % at most between 50 and 800 N.
+A whole roller has one of the plain laws. A roller with a profile, or between tilted rings, has slices. Each slice carries its
+share of a plain law at its own approach. Plain laws differ by at most 7 % between 50 and 800 N.
 
-Pressure that leaves a permanent dent of 1e-4 of a rolling element's diameter (ISO 76).
+Limits of static pressure: ISO 76 allows a permanent dent of 1e-4 of the rolling element's diameter.
 """
 
 import math
@@ -19,14 +19,16 @@ BALLS, ROLLERS = 4200e6, 4000e6  # [Pa]
 
 
 def dent_sentence(pressure: float, limit: float, race: str) -> str:
-    """What a ``pressure`` above the ``limit`` [Pa] does to the "inner" or "outer" race, and the fix."""
+    """Sentence on a ``pressure`` above the ``limit`` [Pa] on the "inner" or "outer" race, with the fix."""
     kind = "rollers" if limit == ROLLERS else "balls"
-    what = f"{1e-6 * pressure:.0f} MPa on the {race} race are more than the {1e-6 * limit:.0f} MPa of ISO 76"
-    return f"{what}: the race dents; lessen the load or take more or larger {kind}"
+    return (
+        f"{1e-6 * pressure:.0f} MPa on the {race} race are more than the {1e-6 * limit:.0f} MPa of ISO 76: the race dents; reduce "
+        f"the load or take more or larger {kind}"
+    )
 
 
 EXPONENT = 10.0 / 9.0
-# Below this an overlap is round-off; it keeps logarithms and roots finite.
+# Least overlap: a smaller one is round-off. It keeps logarithms and roots finite.
 SMALLEST_APPROACH = 1e-18
 
 
@@ -59,7 +61,7 @@ class SlicedLineContact(NamedTuple):
 
 
 class TiltedLineContact(NamedTuple):
-    """As sliced, between races tilted against each other: delta_k = delta + x_k theta cos(psi - psi_0) - P_k."""
+    """Slices between races of different tilt: delta_k = delta + x_k theta cos(psi - psi_0) - P_k."""
 
     whole: Any
     relief: Array  # [m]
@@ -79,8 +81,8 @@ class LineContactOnBar(NamedTuple):
 def palmgren(equivalent_modulus: float, length: float) -> LineContact:
     """Palmgren's K = (E'/8) (1/0.39)^(10/9) l^(8/9).
 
-    With E' of steel on steel this is delta = 3.84e-5 Q^0.9 / l^0.8 (mm, N). Chen et al. 2022, eq 6, summed
-    over the slices: the -1/9 power holds the whole length, so any number of slices gives the same sum.
+    With E' of steel on steel this is delta = 3.84e-5 Q^0.9 / l^0.8 (mm, N), the sum of Chen et al. 2022, eq 6, over the slices.
+    The -1/9 power has the whole length, so any number of slices gives the same sum.
     """
     return LineContact(equivalent_modulus / 8.0 * (1.0 / 0.39) ** EXPONENT * length ** (8.0 / 9.0))
 
@@ -109,7 +111,7 @@ def dowson_higginson(equivalent_modulus: float, length: float, gamma: float) -> 
     )
 
 
-def sliced(
+def slice_contact(
     whole: Any, relief: Array, position: Array, tilt: float, direction: float
 ) -> SlicedLineContact | TiltedLineContact:
     """Cut a plain law into slices with profile drops and axial positions [m], tilted by ``tilt`` [rad].
@@ -158,9 +160,9 @@ def _(contact, approach):
 
 @whole_load.body(LineContactOnBar)
 def _(contact, approach):
-    # With y^9 the indentation, K y^10/k_bar + y^9 = approach needs no powers. Of what a try leaves, rho, the next takes
-    # y (1 + rho)^-a as a series, a = dln(y)/dln(approach), and how a changes on the way: the start is right for a stiff
-    # bar and 1 % off for a soft one, the first step leaves 4e-6, the second 1e-15.
+    # With y^9 as the indentation, K y^10/k_bar + y^9 = approach needs no powers. A step with the relative residual rho
+    # multiplies y by the series of (1 + rho)^-a, a = dln(y)/dln(approach), with the change of a. The start is exact for a
+    # stiff bar and 1 % off for a soft one; the first step leaves 4e-6, the second 1e-15.
     ratio, inverse = contact.stiffness / contact.bar_stiffness, 1.0 / approach
     alone = rough_power(approach, 1.0 / 9.0)
     y = alone * rough_power(1.0 + 10.0 / 9.0 * ratio * alone, -1.0 / 10.0)
@@ -223,7 +225,7 @@ def _(contact, overlap, nx, ny):
 
 @law
 def slice_drop(contact, k, nx, ny):
-    """How much less than the roller's middle slice ``k`` overlaps [m]."""
+    """Overlap of slice ``k`` less than that of the roller's middle [m]."""
 
 
 @slice_drop.body(SlicedLineContact)
@@ -238,7 +240,7 @@ def _(contact, k, nx, ny):
 
 @law
 def slice_rise(contact, k):
-    """How much more slice ``k`` overlaps where the tilt is largest [m]."""
+    """Additional overlap of slice ``k`` where the tilt is largest [m]."""
 
 
 @slice_rise.body(SlicedLineContact)

@@ -35,7 +35,7 @@ def crowned_relief(position: Array, crown_radius: float) -> Array:
     position = np.asarray(position, dtype=np.float64)
     if not crown_radius > 0.0 or np.any(np.abs(position) > crown_radius):
         raise ValueError(f"a crown of radius {crown_radius:g} m does not span the roller; make it larger")
-    # The difference R - sqrt(R^2 - x^2) would lose all digits where the drop is small against the radius.
+    # The difference R - sqrt(R^2 - x^2) would lose all digits where the drop is small compared with the radius.
     squared = position**2
     return np.asarray(squared / (crown_radius + np.sqrt(crown_radius**2 - squared)))
 
@@ -44,8 +44,8 @@ def lundberg_relief(position: Array, length: float, design_load: float, equivale
     """Drop that presses uniformly along the contact at ``design_load`` [N] (Lundberg 1939).
 
     P(x) = 2Q/(pi l E') ln[1/(1 - (2x/l)^2)] with E' of ``rbdyn.properties.materials.equivalent_modulus`` [Pa]: the surface
-    displacement of both half-spaces under a line load Q/l of length l, less that at its middle. It serves one
-    contact of the roller; infinite at the very ends. Raises ValueError when a position lies off the contact.
+    displacement of both half-spaces under a line load Q/l of length l, less that at its middle. It suits one contact of the
+    roller and is infinite at the very ends. Raises ValueError for a position off the contact.
     """
     inside = 2.0 * np.asarray(position, dtype=np.float64) / length
     if np.any(np.abs(inside) > 1.0):
@@ -58,9 +58,8 @@ def lundberg_relief(position: Array, length: float, design_load: float, equivale
 def table_relief(position: Array, points: Sequence[tuple[float, float]]) -> Array:
     """Drop by straight lines between measured ``points`` = ((x, drop), ...) [m].
 
-    Points with all x >= 0 describe one half and are mirrored about the middle; others stand as given.
-    Raises ValueError for less than two points, x that do not rise, drops that are not finite and >= 0, and
-    positions beyond the table.
+    Points with all x >= 0 describe one half and are mirrored about the middle. Raises ValueError for less than two points, x that
+    do not rise, drops that are not finite and >= 0, and positions beyond the table.
     """
     table = np.asarray(points, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
@@ -75,6 +74,7 @@ def table_relief(position: Array, points: Sequence[tuple[float, float]]) -> Arra
     else:
         covered = (position >= table[0, 0]) & (position <= table[-1, 0])
     if not np.all(covered):
-        what = f"the profile is given from {table[0, 0]:g} to {table[-1, 0]:g} m, short of the contact"
-        raise ValueError(f"{what}; add points")
+        raise ValueError(
+            f"the profile reaches from {table[0, 0]:g} to {table[-1, 0]:g} m, short of the contact; add points"
+        )
     return np.asarray(np.interp(position, table[:, 0], table[:, 1]))

@@ -1,7 +1,7 @@
 """Traction of an elastohydrodynamic film from the rheology of its oil: shear stress over the Hertz pressure.
 
-A rheology gives the shear stress at a pressure, for a slip across a film. Everything here is numpy on arrays of any
-shape that broadcast, and runs while a scene is set up; ``contact.traction`` holds what the simulation reads.
+A rheology gives the shear stress at a pressure, for a slip across a film. Plain functions of floats or arrays that broadcast, for
+the construction of laws; the simulation itself uses ``contact.traction``.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rbdyn.contact.film_thickness import RollingContact, half_width, hertz_pressure
-from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C
+from rbdyn.properties.materials import ABSOLUTE_ZERO_C
 
 # Gauss-Legendre in the angle theta, x = b sin(theta). Relative error up to 4 GPa, against adaptive quadrature: below
 # 3e-7 for aircraft oils at 100 C, 3e-6 for ten times their pressure coefficient; with limiting shear below 2e-5,
@@ -19,7 +19,7 @@ from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 _COSINES = np.cos(0.25 * math.pi * (_NODES + 1.0))
 _SHARES = _WEIGHTS * _COSINES  # (2/(pi p_H)) 2 (pi/4) sum(w cos(theta) tau) = sum(share tau)/p_H
-# Beyond, the exponential of pressure would overflow; such an oil is a solid long before.
+# Largest exponent of the pressure, against overflow; such an oil is solid at far lower pressure.
 LARGEST_EXPONENT = 300.0
 
 
@@ -44,8 +44,8 @@ class OilConstants(NamedTuple):
     power: float  # [-]
 
 
-# As tabulated with ADORE-style oil data. Santotrac 50 stands out by a factor of 25 in its viscosity and by its power
-# of temperature: it is kept as found, and not to be trusted without the original paper.
+# Tabulated with ADORE-style oil data. Santotrac 50 differs by a factor of 25 in viscosity and in its power of temperature:
+# the values are unchanged, but unreliable without the original paper.
 OIL_CONSTANTS: dict[str, OilConstants] = {
     "MIL-L-7808": OilConstants(0.11431, 0.033723, 5.2214e-9, 0.041745, 0.60873),
     "MIL-L-23699": OilConstants(0.26529, 0.036358, 5.8015e-9, 0.033398, 1.3075),
@@ -61,7 +61,7 @@ def _barus(viscosity: float, coefficient: float, pressure: Any) -> Any:
 
 
 def _capped(stress: Any, cap: Any) -> Any:
-    """The smaller of two stresses, rounded off where they meet: by 0.05 % at half the cap, 2 % at 0.8, 8 % at one."""
+    """The smaller of two stresses with a smooth transition: 0.05 % less at half the cap, 2 % at 0.8, 8 % at one."""
     small, large = np.minimum(stress, cap), np.maximum(stress, cap)
     eighth = np.square(np.square(np.square(small / large)))
     return small / np.sqrt(np.sqrt(np.sqrt(1.0 + eighth)))
@@ -71,8 +71,8 @@ def _capped(stress: Any, cap: Any) -> Any:
 class ThermalNewtonian:
     """Newtonian oil that heats up in its midplane (Crook; Gupta et al. 1981).
 
-    tau = eta_p (u/h) asinh(y)/(y sqrt(1 + y^2)), y = u sqrt(eta_p beta/(8 k)), eta_p = eta exp(alpha p). As its peak
-    grows with the root of eta_p without bound, the stress may be capped at ``largest_ratio`` of the pressure.
+    tau = eta_p (u/h) asinh(y)/(y sqrt(1 + y^2)), y = u sqrt(eta_p beta/(8 k)), eta_p = eta exp(alpha p). Its peak is unbounded,
+    proportional to the root of eta_p, so the stress may be capped at ``largest_ratio`` of the pressure.
     """
 
     viscosity: float  # eta [Pa s]
@@ -144,7 +144,7 @@ def traction_coefficient(rheology: Rheology, contact: RollingContact, slip: Any,
 
     mu = (l/Q) times the integral of the stress over the Hertz pressure p_H sqrt(1 - (x/b)^2).
     """
-    # Left apart, so that what depends on the load alone is computed once for all slips.
+    # Separate axes, so that functions of the load alone are computed once for all slips.
     slip, load, film = (np.asarray(value, float)[..., np.newaxis] for value in (slip, load, film))
     peak = hertz_pressure(contact, load)
     stress = rheology.stress(peak * _COSINES, slip, film)
@@ -154,9 +154,9 @@ def traction_coefficient(rheology: Rheology, contact: RollingContact, slip: Any,
 def with_body_creep(coefficient: Any, contact: RollingContact, slip: Any, load: Any) -> Any:
     """Traction coefficient of a film between elastic bodies, from that of the film alone at a slip [m/s] > 0.
 
-    Rolling bodies creep: even a solid film gives no more than mu = 2 R u/(b u_e) at small slip u (Carter 1926), b the
-    half-width and u_e the entrainment speed. This bounds the slope where pressure makes a film all but solid; film
-    and bodies are joined as the root of a sum of squares, 1/mu^2 = 1/mu_film^2 + 1/mu_creep^2.
+    Rolling bodies creep: even a solid film gives at most mu = 2 R u/(b u_e) at small slip u (Carter 1926), with b the half-width
+    and u_e the entrainment speed. This bounds the slope where pressure makes a film nearly solid. Film and bodies combine by
+    1/mu^2 = 1/mu_film^2 + 1/mu_creep^2.
     """
     creep = 2.0 * contact.radius * slip / (half_width(contact, load) * contact.entrainment_speed)
     return coefficient / np.sqrt(1.0 + np.square(coefficient / creep))

@@ -1,18 +1,16 @@
-"""Rolling resistance of a lubricated roller: of a loaded line contact, flooded or starved, and of the film where race and roller
-do not touch.
+"""Rolling resistance of a lubricated roller: of a loaded line contact, flooded or starved, and of the film of an open contact.
 
-The oil is squeezed into the inlet of a loaded contact; what drives it shears both surfaces with F_R each, and the power lost is
-2 F_R u.
+The flow into the inlet of a loaded contact shears both surfaces with F_R each; the power loss is 2 F_R u.
 
-A contact that is open has a rigid cylinder pair at the gap that is left.
-Reynolds' equation over the gap h + x^2/(2 R), with pressure that begins at the meniscus and ends with its slope. In
-X = x/sqrt(2 R h), with the meniscus at -M and the film's end at X_e, I_n(X) being the integral of (1 + X^2)^-n:
+An open contact is a pair of rigid cylinders at the remaining gap, with Reynolds' equation over h + x^2/(2 R). Its pressure begins
+at the meniscus; at the end of the film pressure and slope vanish. In X = x/sqrt(2 R h), with the meniscus at -M, the film's end at
+X_e and I_n(X) the integral of (1 + X^2)^-n:
 
     I_2 - (1 + X_e^2) I_3 = 0 between -M and X_e,    F = I_1 - (1 + X_e^2) I_2.
 
-Each surface rolls against 6 sqrt(2) eta l sqrt(R/h) u F, which flooded is 4.601 eta l u sqrt(R/h). Behind its end the oil
-runs on in streamers that carry what passes there. Sliding shears film and streamers by sqrt(2) eta U l sqrt(R/h) S.
-The push of the film is left out: it is a few newtons, well below what loads a roller anywhere.
+The rolling force on each surface is 6 sqrt(2) eta l sqrt(R/h) u F, for a flooded film 4.601 eta l u sqrt(R/h). Behind its end
+the oil continues in streamers, which carry the flow there. Sliding shears film and streamers by sqrt(2) eta U l sqrt(R/h) S.
+The push of the film is left out: it is a few newtons, well below the loads of a roller.
 """
 
 import math
@@ -22,14 +20,14 @@ from rbdyn.compiled.elementary import tenth_root
 from rbdyn.compiled.kernel import kernel, law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the root finite
-# Of Biboulet and Houpert 2010: the rigid branch 1.42 sqrt(U W), and where the elastic one, 1.47 U^0.75, takes over.
+# Biboulet and Houpert 2010: the rigid branch 1.42 sqrt(U W), and its transition to the elastic one, 1.47 U^0.75.
 RIGID_FORCE = 1.42
 REGIME = 1.4 / 1.45
 ELASTIC_FORCE = RIGID_FORCE / REGIME
 # Load of flooded rigid cylinders, 4.894 eta u R l/h_0 (Martin 1916).
 RIGID_LOAD = 4.894
-# Of flooded rigid cylinders: the force beyond a far meniscus times its distance, 12/sqrt(2)/4.600, and the limit of
-# distance over share for a near one, both in half-widths of their pressure; between them the distance that joins the two.
+# Flooded rigid cylinders, in half-widths of their pressure: the force beyond a far meniscus times its distance, 12/sqrt(2)/4.600;
+# the limit of distance over share for a near meniscus; the distance of the transition between both.
 FAR_MENISCUS, NEAR_MENISCUS, JOINT = 1.845, 3.325, 2.2
 
 
@@ -45,11 +43,11 @@ class RollingResistance(NamedTuple):
 
 
 class StarvedRollingResistance(NamedTuple):
-    """The same with a meniscus: each branch keeps a share of its force, the elastic one 1/(1 + beyond + short)."""
+    """The same with a meniscus, which reduces each branch to a share, the elastic one to 1/(1 + beyond + short)."""
 
     force_scale: float  # of the starved rigid branch [N/sqrt(N m/s)]
     regime_scale: float  # of the flooded contact [(N/sqrt(m/s))^-5]
-    rigid_share: float  # what the meniscus leaves of the rigid branch [-]
+    rigid_share: float  # share of the rigid branch with the meniscus [-]
     beyond_scale: float  # beyond = beyond_scale u^0.25/sqrt(Q), shear beyond the meniscus [N^0.5 (m/s)^-0.25]
     short_scale: float  # short = short_scale u^0.75/Q, flooded force over that of a short inlet [N (m/s)^-0.75]
     rigid_load: float  # Q^2/u where Hertz's width is that of rigid cylinders [N^2 s/m]
@@ -61,9 +59,9 @@ def biboulet_houpert(
     """Rolling resistance of a line contact of reduced radius and length [m] in oil of viscosity [Pa s].
 
     F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1 with U = 2 eta u/(E' R), W = Q/(l E' R),
-    r = (1.4/1.45) sqrt(W/sqrt(U)), times ``reduction`` (heating, a factor of one's own). F_R is a force per surface, so
-    the power lost is 2 F_R u: the rigid-cylinder Reynolds solution gives 1.47 for the same coefficient, an isothermal
-    elastohydrodynamic one 1.42 to 1.69 U^0.75 with compressible oil (both in the tests).
+    r = (1.4/1.45) sqrt(W/sqrt(U)), times ``reduction`` (heating, a factor of the user). F_R is the force on one surface, so the
+    power loss is 2 F_R u. The Reynolds solution of rigid cylinders gives 1.47 for the same coefficient. Isothermal
+    elastohydrodynamic solutions with compressible oil give 1.42 to 1.69 U^0.75 (both in the tests).
     """
     speed_part = 2.0 * viscosity / (equivalent_modulus * radius)
     load_part = 1.0 / (length * equivalent_modulus * radius)
@@ -89,10 +87,10 @@ def gap_ahead(distance: float) -> float:
 
 
 def rigid_inlet_share(distance: float) -> float:
-    """Share of the flooded rolling force that rigid cylinders keep under the same load.
+    """Rolling force of starved rigid cylinders over the flooded one at the same load.
 
-    ``distance``: of the meniscus from the centre in sqrt(2 R h_0), the half-width of their pressure, h_0 flooded. A closed
-    form through both limits of the Reynolds solution, within 0.006 of it.
+    ``distance``: of the meniscus from the centre in sqrt(2 R h_0), the half-width of their pressure, with h_0 flooded. A closed
+    form through both limits of the Reynolds solution, with an error of 0.006.
     """
     slope = FAR_MENISCUS + (NEAR_MENISCUS - FAR_MENISCUS) / (1.0 + distance / JOINT)
     return distance / (distance + slope)
@@ -107,17 +105,19 @@ def starved(
     length: float,
     inlet_distance: float,
 ) -> StarvedRollingResistance:
-    """The law where the oil begins ``inlet_distance`` half-widths ahead of the edge of the contact; SI units as above.
+    """The law for oil that begins ``inlet_distance`` half-widths ahead of the edge of the contact; SI units as above.
 
-    The flooded force is the smooth lesser of a rigid and an elastic branch; each keeps its own share, with the distance
-    in the half-width of its own pressure: Hertz's b or the sqrt(2 R h_0) of rigid cylinders, so that a light contact,
-    whose b vanishes, does not lose its oil. Elastic share: 1/(1 + F_beyond/F + F/F_short), where
-    F_beyond = 12 eta u R l/(b sqrt(g)) is the shear of the oil beyond the meniscus in a gap g b^2/(2 R) = ``gap_ahead``,
-    and F_short = (10/(3 pi)) g Q/(alpha E') the limit of a short inlet with viscosity exp(alpha p). It is exact in both
-    limits and, from a distance of 0.1 on, within 0.032 of the quadrature over the Hertz gap (Grubin; Wolveridge, Baglin
-    and Archard 1971, whose film is that of ``film_thickness.starvation_factor``). The fit of Goksem and Hargreaves 1978
-    lies within 0.1 of that quadrature, full elastohydrodynamic solutions within 0.045 of the law at 5 half-widths and more.
-    A load at which b is the smaller width counts in the shares as one at which both are alike.
+    The flooded force is the smooth minimum of a rigid and an elastic branch. Each branch has its own share, with the distance in
+    the half-width of its own pressure: Hertz's b, or the sqrt(2 R h_0) of rigid cylinders. So a light contact, whose b vanishes,
+    still has oil. The elastic share is 1/(1 + F_beyond/F + F/F_short):
+
+    - F_beyond = 12 eta u R l/(b sqrt(g)), the shear of the oil beyond the meniscus in a gap g b^2/(2 R) = ``gap_ahead``
+    - F_short = (10/(3 pi)) g Q/(alpha E'), the limit of a short inlet with viscosity exp(alpha p)
+
+    It is exact in both limits. From a distance of 0.1 its error is 0.032 compared with the quadrature over the Hertz gap (Grubin;
+    Wolveridge, Baglin and Archard 1971, whose film is that of ``film_thickness.starvation_factor``). The fit of Goksem and Hargreaves 1978
+    agrees with that quadrature within 0.1. Full elastohydrodynamic solutions agree with the law within 0.045 from 5 half-widths.
+    Where b is the smaller width, the shares use the load at which both widths are equal.
     """
     gap = gap_ahead(inlet_distance)
     stiffness = equivalent_modulus * radius * length  # [N]
@@ -164,22 +164,22 @@ def _(film, load, entrainment_speed):
     u25 = entrainment_speed * entrainment_speed * root
     u75 = u25 * u25 * u25
     wide = math.sqrt(q * q + film.rigid_load * entrainment_speed)
-    kept = 1.0 + film.beyond_scale * fourth / math.sqrt(wide) + film.short_scale * root * fourth / wide
+    losses = 1.0 + film.beyond_scale * fourth / math.sqrt(wide) + film.short_scale * root * fourth / wide
     # Rigid over elastic share: r^10 changes with its tenth power.
-    ratio = film.rigid_share * kept
+    ratio = film.rigid_share * losses
     ratio2 = ratio * ratio
     ratio5 = ratio2 * ratio2 * ratio
     return film.force_scale * tenth_root(q5 * u75 / (u25 + film.regime_scale * ratio5 * ratio5 * q5))
 
 
-# No film ends farther out: that of a flooded pair ends at 0.47513.
+# Upper bound of the end of a film: that of a flooded pair is at 0.47513.
 FLOODED_END = 0.4754
 MARTIN = 4.895
 BISECTIONS = 60
 
 
 class OpenFilm(NamedTuple):
-    """Film at gaps well above ``touching_gap``; below it 1/sqrt(h) fades as h/(h^2 + touching_gap^2)^0.75."""
+    """Film at gaps well above ``touching_gap``; near that gap h/(h^2 + touching_gap^2)^0.75 replaces 1/sqrt(h)."""
 
     rolling_scale: float  # rolling force per surface is rolling_scale u/sqrt(h) [N s m^-0.5]
     shear_scale: float  # sliding force is shear_scale U/sqrt(h) [N s m^-0.5]
@@ -203,7 +203,7 @@ def _integrals(x: float) -> tuple[float, float, float]:
 
 
 def inlet(distance: float) -> Inlet:
-    """Film that begins at ``distance`` > 0 ahead of the middle, in sqrt(2 R h); ``math.inf`` is flooded."""
+    """Film that begins at a ``distance`` > 0 ahead of the middle, in sqrt(2 R h); ``math.inf`` is flooded."""
     ahead = (0.5 * math.pi, 0.25 * math.pi, 0.1875 * math.pi) if math.isinf(distance) else _integrals(distance)
     low, high = 0.0, min(distance, FLOODED_END)
     for _ in range(BISECTIONS):
@@ -223,8 +223,8 @@ def open_film(
 ) -> OpenFilm:
     """Film of a pair of reduced ``radius`` and ``length`` [m] in oil of ``viscosity`` [Pa s].
 
-    ``inlet_distance``: where the oil begins ahead of the middle in half-widths sqrt(2 R h), None flooded; ``reduction``:
-    what heating leaves of the rolling force, times a factor of one's own; ``touching_gap`` [m].
+    ``inlet_distance``: distance of the start of the oil from the middle in half-widths sqrt(2 R h); None for flooded.
+    ``reduction``: factor of heating on the rolling force, times a factor of the user. ``touching_gap`` [m].
     """
     shape = inlet(math.inf if inlet_distance is None else inlet_distance)
     scale = math.sqrt(2.0 * radius) * viscosity * length
@@ -234,10 +234,10 @@ def open_film(
 def touching_gap(
     viscosity: float, radius: float, length: float, entrainment_speed: float, stiffness: float, roughness: float
 ) -> float:
-    """Gap [m] at which oil holds surfaces apart that would just touch, at least ``roughness`` [m].
+    """Oil gap [m] between surfaces that would just touch when dry, at least ``roughness`` [m].
 
-    There the rigid pair bears as much, 4.895 eta u R l/h (Martin 1916), as a contact of ``stiffness`` [N/m^(10/9)] at an
-    approach of that size.
+    There the load of the rigid pair, 4.895 eta u R l/h (Martin 1916), equals that of a contact of ``stiffness`` [N/m^(10/9)] at an
+    equal approach.
     """
     gap = (MARTIN * viscosity * entrainment_speed * radius * length / stiffness) ** (9.0 / 19.0)
     return max(gap, roughness)
@@ -245,7 +245,7 @@ def touching_gap(
 
 @kernel
 def film_forces(film, overlap, entrainment_speed, slip):
-    """(rolling force on each surface, sliding force on the roller) [N], signed as the speeds [m/s]; 0 in contact.
+    """Rolling force on each surface and sliding force on the roller [N], with the signs of the speeds [m/s]; 0 in contact.
 
     ``overlap`` [m]: minus the gap.
     """

@@ -1,4 +1,18 @@
-"""Traction coefficient against sliding speed and load."""
+"""Traction coefficient against slip and load: steady laws, tables of them, and the tangential elasticity of the contact.
+
+A steady law responds to a change of slip at once, as if the bodies were rigid. Elastic bodies act as a spring in series with the
+steady contact: the traction T grows by k (s - s_c(T)), where s_c is the slip of the steady law at T. The tangential stiffness k
+is, for plane contact of equal materials, the normal one, dQ/dx (Johnson 1985, Contact Mechanics, 7 and 8; Kalker 1990). With
+s_c = s T/T_steady(s), which is exact on the linear part of the law, the traction coefficient is
+
+    (tau + beta) d mu/dt = mu_steady - mu,    tau = T_steady(s)/(s k) + 1/omega.
+
+On the linear part tau is the creep slope over k, the rolling time over about the contact's width. A fast slip, as in an impact,
+acts on the spring alone and reaches the limit of traction in the time T/(k s). ``omega``, the frequency of a roller between its
+races, bounds the rate where the curve is flat. With material damping c parallel to the spring, the share beta/(tau + beta) of the
+steady traction acts at once, beta = c/k. The acting coefficient stays within those of the steady law, and traction vanishes with
+the load. The work on the slip counts as loss, including the elastic energy of the contact (some microjoules).
+"""
 
 import math
 from collections.abc import Callable
@@ -16,7 +30,7 @@ LARGEST_SPEED_RATIO = 1e12  # slip over the speed scale of a surface; mu has lon
 Coefficient = Callable[[Array, Array], Any]
 
 FEWEST_CELLS, MOST_CELLS = 12, 192
-# Step of the difference quotients, in cells: their error stays below 1e-6 of a derivative.
+# Step of the difference quotients in cells, with an error below 1e-6 of a derivative.
 DIFFERENCE = 1e-3
 
 
@@ -51,21 +65,21 @@ class CoulombTraction(NamedTuple):
 
 
 class SurfaceAxes(NamedTuple):
-    """Where a slip and a load stand in the table of a ``TractionSurface``."""
+    """Axes of the table of a ``TractionSurface``."""
 
     speed_density: float  # 1/u_0 [s/m]
     slip_density: float  # cells along ln(1 + x) [-]
-    last_slip: float  # where the cells end [cells]
-    load_origin: float  # sqrt(load) where they begin [sqrt(N)]
+    last_slip: float  # end of the cells [cells]
+    load_origin: float  # sqrt(load) of the first cell [sqrt(N)]
     load_density: float  # cells along sqrt(load) [1/sqrt(N)]
-    last_load: float  # where the cells end [cells]
+    last_load: float  # end of the cells [cells]
 
 
 class TractionSurface(NamedTuple):
     """mu over slip u and load Q from a table: mu = x/(1 + x) exp(L), x = u/u_0.
 
-    L is bicubic (Hermite) and C1 over ln(1 + x) and sqrt(Q), in which it is smooth: it follows the pressure, which
-    goes as sqrt(Q). Cells are uniform. Past the table L lands on a constant within one cell, without a kink.
+    L is bicubic (Hermite) and C1 over ln(1 + x) and sqrt(Q), in which it is smooth: it follows the pressure, which is
+    proportional to sqrt(Q). Cells are uniform. Beyond the table L becomes constant within one cell, without a kink.
     """
 
     axes: SurfaceAxes
@@ -74,7 +88,7 @@ class TractionSurface(NamedTuple):
 
 
 class MixedTraction(NamedTuple):
-    """Asperities carry a share of the load and rub dry: f mu_b tanh(u/u_r) + (1 - f) mu_fluid.
+    """Asperities carry a share of the load in dry friction: f mu_b tanh(u/u_r) + (1 - f) mu_fluid.
 
     f = exp(-b Lambda^c) with a film that thins as Q^-0.1, that is exp(-share_scale Q^-share_exponent).
     """
@@ -104,7 +118,7 @@ def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple
     def excess(x: float) -> float:
         return x * math.exp(-(x - a) / x) - peak
 
-    # The left side rises from below the peak at the lower end, without bound: bisection cannot fail.
+    # The function rises without bound from below the peak at the lower end: bisection cannot fail.
     low = max(a, 0.0) if a > 0.0 else 1e-300
     high = max(4.0 * peak, 2.0 * abs(a), 1e-12)
     while excess(high) < 0.0:
@@ -166,7 +180,7 @@ def mixed(model, slip, load, film):
 
 @law
 def without_table(model):
-    """A law as numbers alone: with ``SurfaceAxes`` where it has a table, for ``table_place`` and ``traction_by_table``."""
+    """A law as scalars: ``SurfaceAxes`` replace its table, for ``table_place`` and ``traction_by_table``."""
 
 
 @without_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
@@ -188,7 +202,7 @@ def _(model):
 
 @law
 def table_place(model, slip, load):
-    """Where a slip [m/s] and a load [N] stand in the table of a law [cells]: along the slip, and across by the load."""
+    """Position of a slip [m/s] and a load [N] in the table of a law [cells]: along the slip and along the load."""
 
 
 @table_place.body(SurfaceAxes)
@@ -208,19 +222,19 @@ def _(model, slip, load):
 
 @kernel
 def slip_ratio(axes, slip):
-    """Slip over the speed scale of a surface, bounded; NaN comes through."""
+    """Bounded slip over the speed scale of a surface; NaN stays NaN."""
     ratio = abs(slip) * axes.speed_density
     return LARGEST_SPEED_RATIO if ratio > LARGEST_SPEED_RATIO else ratio
 
 
 @law
 def table_value(model, along, across):
-    """What the table of a law holds at a ``table_place``."""
+    """Value of the table of a law at a ``table_place``."""
 
 
 @table_value.body(TractionSurface)
 def _(model, along, across):
-    # Both positions are within the table whatever slip and load are, NaN too.
+    # Both positions are within the table for any slip and load, NaN included.
     i, j = int(along), int(across)
     return bicubic(model.cells[i * model.columns + j], along - i, across - j)
 
@@ -232,7 +246,7 @@ def _(model, along, across):
 
 @law
 def traction_by_table(model, slip, load, value):
-    """``traction`` of a law without its table, for which ``table_value`` is known."""
+    """``traction`` of a law without its table, from its ``table_value``."""
 
 
 @traction_by_table.body(SurfaceAxes)
@@ -258,9 +272,9 @@ def bicubic(c, x, y):
 
 @kernel
 def asperity_load_share(scale, exponent, load):
-    """Share of a load [N] that asperities carry, exp(-scale load^-exponent): nil at rest, growing towards one."""
-    held = load if load > SMALLEST_LOAD else SMALLEST_LOAD
-    return fast_exp(-scale * fast_exp(-exponent * fast_log(held)))
+    """Share of a load [N] on asperities, exp(-scale load^-exponent): zero without load, increasing towards one."""
+    positive = load if load > SMALLEST_LOAD else SMALLEST_LOAD
+    return fast_exp(-scale * fast_exp(-exponent * fast_log(positive)))
 
 
 class SurfaceFit(NamedTuple):
@@ -276,12 +290,12 @@ def traction_surface(
     """Table of ``coefficient(slip, load)``, refined until its error is below ``tolerance`` of the largest value.
 
     ``coefficient`` takes arrays of slip [m/s] > 0 and load [N] that broadcast, and is positive, linear in the slip
-    near rest. Below ``smallest_load`` and beyond the largest load and slip the coefficient soon stays constant. A
-    kink of the coefficient may keep the error above the tolerance: read it. Raises ValueError where the coefficient
-    is not positive and finite or the loads are not in order.
+    near rest. Below ``smallest_load`` and above the largest load and slip the coefficient soon becomes constant. A kink of the
+    coefficient may keep the error above the tolerance, so check it. Raises ValueError for a coefficient that is not positive and
+    finite, and for loads in the wrong order.
     """
     if not 0.0 < smallest_load < largest_load < math.inf:
-        raise ValueError(f"loads from {smallest_load:g} to {largest_load:g} N make no table")
+        raise ValueError(f"loads from {smallest_load:g} to {largest_load:g} N must be positive and rise")
     scale = _speed_scale(coefficient, largest_load, largest_slip)
     slips, loads = FEWEST_CELLS, FEWEST_CELLS
     while True:
@@ -296,7 +310,7 @@ def traction_surface(
 
 
 def _refined(cells: int, error: float, tolerance: float) -> int:
-    """Cells of a direction whose error, which falls as their fourth power, is to come below half the tolerance."""
+    """Cells of a direction for half the tolerance; the error decreases as their fourth power."""
     growth = (2.0 * error / tolerance) ** 0.25
     return min(math.ceil(cells * min(max(growth, 1.1), 3.0)), MOST_CELLS)
 
@@ -392,3 +406,119 @@ def _polynomials(nodes: Array) -> Array:
         edges[..., row, column], edges[..., 2 + row, column] = value[corner], along[corner]
         edges[..., row, 2 + column], edges[..., 2 + row, 2 + column] = across[corner], twist[corner]
     return np.ascontiguousarray((cubic @ edges @ cubic.T).reshape(-1, 16))
+
+
+SMALLEST_SLIP = 1e-12  # [m/s], keeps the slope of the law finite
+
+
+class RigidContact(NamedTuple):
+    """Traction follows the steady law at once."""
+
+
+class ElasticContact(NamedTuple):
+    """The traction coefficient of each roller at a race is a state."""
+
+    start: int  # where those of this race begin
+    shortest_time: float  # 1/omega [s]
+    damping_time: float  # beta [s]
+
+
+@law
+def coefficient_of(tangential, y, j):
+    """Traction coefficient of roller ``j`` in the state ``y``; 0 where it is no state."""
+
+
+@coefficient_of.body(RigidContact)
+def _(tangential, y, j):
+    return 0.0
+
+
+@coefficient_of.body(ElasticContact)
+def _(tangential, y, j):
+    return y[tangential.start + j]
+
+
+@kernel
+def relaxation_time(tangential, steady, load, slip, stiffness):
+    """tau [s] of a steady coefficient at a load [N] and a slip [m/s], with the contact's stiffness [N/m]; shortest without load."""
+    creep = abs(steady) * load / (max(abs(slip), SMALLEST_SLIP) * stiffness) if load > 0.0 else 0.0
+    return creep + tangential.shortest_time
+
+
+@law
+def acting_coefficient(tangential, steady, coefficient, load, slip, stiffness):
+    """Traction coefficient that acts, of the steady law's and the state's; the rest as in ``relaxation_time``."""
+
+
+@acting_coefficient.body(RigidContact)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    return steady
+
+
+@acting_coefficient.body(ElasticContact)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    damped = tangential.damping_time / relaxation_time(tangential, steady, load, slip, stiffness)
+    return coefficient + (steady - coefficient) * damped / (1.0 + damped)
+
+
+@law
+def coefficient_rate(tangential, steady, coefficient, load, slip, stiffness):
+    """Rate at which the state follows the steady coefficient [1/s]; arguments as above. Without load it dies away."""
+
+
+@coefficient_rate.body(RigidContact)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    return 0.0
+
+
+@coefficient_rate.body(ElasticContact)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    target = steady if load > 0.0 else 0.0
+    whole = relaxation_time(tangential, steady, load, slip, stiffness) + tangential.damping_time
+    return (target - coefficient) / whole
+
+
+@law
+def keep_coefficient_rate(tangential, rate, lanes, place):
+    """Write the rate of a contact to a work space."""
+
+
+@keep_coefficient_rate.body(RigidContact)
+def _(tangential, rate, lanes, place):
+    pass
+
+
+@keep_coefficient_rate.body(ElasticContact)
+def _(tangential, rate, lanes, place):
+    lanes[place] = rate
+
+
+@law
+def add_coefficient_rate(tangential, rate, j, row, dy):
+    """Put the rate of roller ``j`` into row ``row`` of ``dy``."""
+
+
+@add_coefficient_rate.body(RigidContact)
+def _(tangential, rate, j, row, dy):
+    pass
+
+
+@add_coefficient_rate.body(ElasticContact)
+def _(tangential, rate, j, row, dy):
+    dy[row, tangential.start + j] = rate
+
+
+@law
+def relax_coefficients(tangential, rollers, y, row, dy):
+    """Let the coefficients of all rollers die away, as where they do not touch, in row ``row`` of ``dy``."""
+
+
+@relax_coefficients.body(RigidContact)
+def _(tangential, rollers, y, row, dy):
+    pass
+
+
+@relax_coefficients.body(ElasticContact)
+def _(tangential, rollers, y, row, dy):
+    for j in range(rollers):
+        dy[row, tangential.start + j] = coefficient_rate(tangential, 0.0, y[tangential.start + j], 0.0, 0.0, 1.0)

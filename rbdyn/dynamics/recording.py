@@ -1,11 +1,9 @@
-"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes.
+"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes; and how slow motions decay.
 
-How long the slow motions of a bearing take to relax, from its linearised equations of motion.
-
-Contacts ring in microseconds, but the cage's spin, the velocity of its centre and the spins of the rollers lose a
-disturbance only as fast as braking and driving moments change with them: in the time inertia over slope of the moments.
-Most moments act in passing contacts, so the slope is the mean over states of the running bearing. A run that counts fewer
-turns than a few such times shows the start of the bearing, not its steady figures, and no test of drift can see that.
+Contacts ring in microseconds. The spin of the cage, the velocity of its centre and the spins of the rollers lose a
+disturbance more slowly: in the time inertia over slope of the moments that brake and drive them. Most moments act in passing
+contacts, so the slope is the mean over states of the running bearing, from linearised equations of motion. A run over a few
+such times only shows the start of the bearing, not its steady figures, and no test of drift reveals that.
 """
 
 import math
@@ -20,12 +18,10 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.forecast import Notice
-from rbdyn.dynamics.companions import Companions
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
+from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X
-from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.records import (
+from rbdyn.dynamics.integrators.advance import (
     ACCEPTED,
     DERIVATIVES,
     PLACE_SQUARES,
@@ -35,98 +31,27 @@ from rbdyn.dynamics.integrators.records import (
     SAMPLES,
     SPEEDS,
     SQUARES,
+    advance,
     carry_from,
     empty_tally,
 )
 from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales
-from rbdyn.dynamics.run import Pace, Run, with_numerics
-from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.run import Run, with_numerics
+from rbdyn.dynamics.statistics.metrics import Companions, Replicate, filtered_speed, speed_sums
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 
-MOTIONS = ("the spin of the cage", "the motion of the cage's centre", "the spin of the rollers")
-# Change of a speed by which slopes are taken, over the speed that a contact can make.
-INCREMENT = 1e-4
-# Time after which accelerations are read, over that of a contact: short of any change.
-READING = 1e-6
-
-
-class Linearised:
-    """Reads decay rates in states along the way of a run."""
-
-    def __init__(self, run: Run) -> None:
-        scene = run.scene
-        state, z, scale = layout_of(scene), scene.bearing.rollers, scales(scene)
-        cage = state.first_body
-        self.run, self.reading_s = run, READING * scale.length / scale.speed
-        self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
-        self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
-        first = state.coefficients
-        self.coefficients = [] if first is None else list(range(first, state.size))
-        self.book = empty_tally()
-
-    def decay_rates(self) -> Array:
-        """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which stays as it is."""
-        at_rest, following, rates = self._accelerations([]), self.coefficients, []
-        if following:
-            # Each coefficient follows its steady value at a rate of its own.
-            alone = (at_rest - self._accelerations(following))[following] / self.increments[following]
-        for places in self.motions:
-            change = self._accelerations(places) - at_rest
-            if following:
-                change = self._accelerations(places, change[following] / alone) - at_rest
-            rates.append(-float(np.mean(change[places] / self.increments[places])))
-        return np.array(rates)
-
-    def _accelerations(self, places: Sequence[int], coefficients: Array | None = None) -> Array:
-        """Rates of change of the state where the speeds at some places are larger by their increments, and the traction
-        coefficients, where they are states, by ``coefficients``.
-        """
-        run, y = self.run, self.run.carry.y.copy()
-        y[places] += self.increments[places]
-        if coefficients is not None:
-            y[self.coefficients] += coefficients
-        probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
-        advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
-        return probe.k[0]
-
-
-class Relaxation(NamedTuple):
-    """The slowest motion and the time [s] in which it relaxes."""
-
-    motion: str
-    time_s: float
-
-
-def slowest(rates: Array) -> Relaxation | None:
-    """Slowest motion by decay rates (states, motions) [1/s]; None where no state was looked at or none of them decays.
-
-    Few states give a rate roughly: it counts as one standard error larger, so that no run is lengthened for noise. A motion
-    that does not decay even so excites itself, and has no relaxation time.
-    """
-    count = len(rates)
-    if count < 2:
-        return None
-    likely = rates.mean(axis=0) + rates.std(axis=0, ddof=1) / math.sqrt(count)
-    times = [Relaxation(name, 1.0 / rate) for name, rate in zip(MOTIONS, likely.tolist(), strict=True) if rate > 0.0]
-    return max(times, key=lambda each: each.time_s, default=None)
-
-
-# Columns of a tally's whirl that make up a replicate's ``whirl`` and its ``orbit``.
+# Columns of the whirl of a tally that become ``whirl`` and ``orbit`` of a replicate.
 SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)
-# Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
+# Long enough that the step cut at the end of a batch costs nothing, short compared with any memory that matters.
 BATCH_TURNS = 1.0
-# Batches after which the decay of slow motions is read: the rollers have been round twice.
+# Batches after which the decay of slow motions is read: the rollers have gone round twice.
 READ_AFTER = (5, 10, 15, 20)
 
 
 @dataclass(frozen=True)
 class Batches:
-    """How a run is cut: ends of the warm-up's batches [shaft turns], length of all others, how many make an impact window.
-
-    A whole number of batches fits an impact window.
-    """
+    """How a run is cut: ends of the batches of the warm-up, length of all others [shaft turns], batches of an impact window."""
 
     warm_up: Array
     length: float
@@ -165,15 +90,15 @@ def batches_of(scene: Scene) -> Batches:
 
 
 class Recording:
-    """A run under way and what is kept of it, batch by batch; it can always go on.
+    """A run under way and its record, batch by batch; it can always go on.
 
-    ``reads_decay``: whether the decay of slow motions is read on the way.
+    ``reads_decay``: whether it reads the decay of slow motions on the way.
     """
 
     def __init__(self, run: Run, reads_decay: bool = False) -> None:
         self.run, self.batches = run, batches_of(run.scene)
         self._begin = run.clock_angles()
-        # Of each batch whirl, work and largest loads in turn, as plain numbers: an array each would weigh twice as much.
+        # Whirl, work and largest loads of each batch in turn, as plain numbers: an array for each would take twice the memory.
         self._ends, self._booked = [0.0], array("d")
         self._looks = [self._look()]
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
@@ -192,9 +117,9 @@ class Recording:
             if self._batches == self.batches.first:
                 run.forget()
             self._go(float(end))
-            for kept in (tally.whirl, tally.work, tally.largest):
-                self._booked.frombytes(kept.tobytes())
-                kept[:] = 0.0
+            for sums in (tally.whirl, tally.work, tally.largest):
+                self._booked.frombytes(sums.tobytes())
+                sums[:] = 0.0
             self._ends.append(float(end))
             self._looks.append(self._look())
             if self._linearised is not None and self._batches in READ_AFTER:
@@ -208,7 +133,7 @@ class Recording:
 
     @property
     def replicate(self) -> Replicate:
-        """What is kept so far, counted from the end of the warm-up."""
+        """The record so far, counted from the end of the warm-up."""
         run, scale, tally = self.run, scales(self.run.scene), self.run.tally
         booked = np.array(self._booked).reshape(self._batches, -1)
         parts = np.split(booked, np.cumsum((tally.whirl.size, tally.work.size)), axis=1)
@@ -238,7 +163,7 @@ class Recording:
         )
 
     def _go(self, end: float) -> None:
-        """Go on to the end of a batch [shaft turns]. Where whirl is filtered steps end at its samples."""
+        """Go on to the end of a batch [shaft turns]. Steps end at the samples of a filtered whirl."""
         run, per_turn = self.run, self.run.scene.whirl_samples_per_turn
         if per_turn:
             first = run.layout.first_body + CAGE_X
@@ -256,7 +181,7 @@ class Recording:
         return speed_sums(filtered_speed(places, rate, cutoff, notches), self._sampled)
 
     def _look(self) -> tuple[float, float, float]:
-        """Cage angle, kinematic cage angle [rad] and mechanical energy [J] as they stand."""
+        """Present cage angle, kinematic cage angle [rad] and mechanical energy [J]."""
         run = self.run
         return (
             float(run.carry.y[run.layout.first_body + CAGE_ANGLE]),
@@ -268,8 +193,10 @@ class Recording:
 def recording_of(
     scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
 ) -> Recording:
-    """The recording of a replicate, which reads decay rates where it may be lengthened, or of the companion of it that is
-    integrated so."""
+    """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated.
+
+    A replicate that may be lengthened reads decay rates.
+    """
     return Recording(_run_of(scene, bearing, pace, replicate, companions, stop), scene.extends and companions is None)
 
 
@@ -278,7 +205,7 @@ def _run_of(
 ) -> Run:
     if companions is None:
         return Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace)
-    # Where the longest step asks for more steps than the scene allows a turn, they are allowed twice what it asks for.
+    # The budget covers twice the steps of the longest step.
     needed = math.ceil(2.0 * scene.turn_s / companions.longest_step)
     budget = max(scene.numerics.step_budget_per_turn, needed)
     companion = with_numerics(scene, method=companions.method, step_budget_per_turn=budget)
@@ -298,14 +225,14 @@ def run_one(
     stop: Stop,
     pace: Pace | None = None,
 ) -> Replicate:
-    """Run a replicate, or the companion of it, the transient included. Raises RunError or CancelledError."""
+    """Run a replicate, or a companion of it, from the start on. Raises RunError or CancelledError."""
     return record(_run_of(scene, bearing, pace, replicate, companions, stop))
 
 
 def run_replicate(
     scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop, pace: Pace | None = None
 ) -> Replicate:
-    """Run one replicate, the transient included. Raises RunError or CancelledError."""
+    """Run one replicate at a tolerance, from the start on. Raises RunError or CancelledError."""
     return record(Run(scene, bearing, replicate, rtol, stop, pace))
 
 
@@ -325,12 +252,12 @@ def run_series(
     tasks = [partial(run_replicate, scene, bearing, index, rtol, stop, pace) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 
-    def ended(one: Ended[Replicate]) -> None:
-        runs[one.place] = one.result()
+    def collect(outcome: Outcome[Replicate]) -> None:
+        runs[outcome.place] = outcome.result()
         if progress is not None:
             progress(len(runs), len(tasks))
 
-    run_all(tasks, workers, stop, ended)
+    run_all(tasks, workers, stop, collect)
     return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(rtols))]
 
 
@@ -339,3 +266,72 @@ def kinematic_cage_angle(scene: Scene, before: Array, after: Array) -> float:
     outer, inner = scene.geometry.raceways
     turned = after - before
     return float((turned[0] * inner + turned[1] * outer) / (inner + outer))
+
+
+MOTIONS = ("the spin of the cage", "the motion of the cage's centre", "the spin of the rollers")
+# Change of a speed for slopes, over the speed that a contact can make.
+INCREMENT = 1e-4
+# Time after which accelerations are read, over that of a contact: before anything changes.
+READING = 1e-6
+
+
+class Linearised:
+    """Linearised equations of motion of a run: reads decay rates in its states."""
+
+    def __init__(self, run: Run) -> None:
+        scene = run.scene
+        state, z, scale = layout_of(scene), scene.bearing.rollers, scales(scene)
+        cage = state.first_body
+        self.run, self.reading_s = run, READING * scale.length / scale.speed
+        self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
+        self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
+        first = state.coefficients
+        self.coefficients = [] if first is None else list(range(first, state.size))
+        self.book = empty_tally()
+
+    def decay_rates(self) -> Array:
+        """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which does not change."""
+        at_rest, following, rates = self._accelerations([]), self.coefficients, []
+        if following:
+            # Each coefficient follows its steady value at a rate of its own.
+            alone = (at_rest - self._accelerations(following))[following] / self.increments[following]
+        for places in self.motions:
+            change = self._accelerations(places) - at_rest
+            if following:
+                change = self._accelerations(places, change[following] / alone) - at_rest
+            rates.append(-float(np.mean(change[places] / self.increments[places])))
+        return np.array(rates)
+
+    def _accelerations(self, places: Sequence[int], coefficients: Array | None = None) -> Array:
+        """Rates of change of the state with the speeds at some places larger by their increments.
+
+        Traction coefficients that are states are larger by ``coefficients``.
+        """
+        run, y = self.run, self.run.carry.y.copy()
+        y[places] += self.increments[places]
+        if coefficients is not None:
+            y[self.coefficients] += coefficients
+        probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
+        advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
+        return probe.k[0]
+
+
+class Relaxation(NamedTuple):
+    """The slowest motion and the time [s] in which it relaxes."""
+
+    motion: str
+    time_s: float
+
+
+def slowest(rates: Array) -> Relaxation | None:
+    """Slowest motion by decay rates (states, motions) [1/s]; None for fewer than two states, or where no motion decays.
+
+    Few states give a rough rate. It counts as one standard error larger, so that noise lengthens no run. A motion that does
+    not decay even so excites itself, and has no relaxation time.
+    """
+    count = len(rates)
+    if count < 2:
+        return None
+    likely = rates.mean(axis=0) + rates.std(axis=0, ddof=1) / math.sqrt(count)
+    times = [Relaxation(name, 1.0 / rate) for name, rate in zip(MOTIONS, likely.tolist(), strict=True) if rate > 0.0]
+    return max(times, key=lambda relaxation: relaxation.time_s, default=None)

@@ -1,143 +1,60 @@
-"""One replicate under way: integrator, memory, where it stands, and at which pace it goes on."""
+"""One replicate under way: its integrator, its memory and where it is; and the choice of its method.
 
-import itertools
-import logging
+An explicit pair integrates a run, or the linearly implicit method where stability limits the steps. A step of that method
+costs about nine explicit ones, so it pays only where it can be much longer. "auto" tries both on a copy of the run over
+the same stretch and counts right-hand sides. It reads no clock, so equal scenes choose alike.
+"""
+
 import math
-import threading
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RunError
-from rbdyn.base.forecast import LONG_S, Forecast, Measured, Notice, duration
-from rbdyn.dynamics.ensemble import Stop
+from rbdyn.base.faults import MethodError, RunError
+from rbdyn.dynamics.ensemble import Pace, Stop
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
-from rbdyn.dynamics.integrators import records as at
-from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.method import EXPLICIT, cheaper_method, explicit_method, method_of
-from rbdyn.dynamics.integrators.records import Control, Status, carry_from, empty_tally
-from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales, start_state
+from rbdyn.dynamics.integrators.advance import (
+    ACCEPTED,
+    DERIVATIVES,
+    EIGENVALUES,
+    FINISHED,
+    LIMITED,
+    NOW,
+    REJECTED,
+    SAMPLE,
+    STEP,
+    STEP_BUDGET,
+    STIFFNESS,
+    TESTED,
+    WORST,
+    Carry,
+    Control,
+    Status,
+    Tally,
+    advance,
+    carry_from,
+    empty_tally,
+)
+from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
+from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state
+from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
 
-# Runs are looked at once they have been under way for this time [s], then at every doubling of it; the budget of steps of
-# one run after this time of its own [s].
-FIRST_LOOK_S, BUDGET_LOOK_S = 1.0, 10.0
-# Scatter of the time of a shaft turn between runs of one scene, and between scenes of other speeds and loads.
-ALIKE, UNLIKE = 0.1, 0.4
-# A companion takes from so many to so many times the time of a run, by its tolerance and its longest step.
-COMPANION = (0.6, 1.5)
-
-
-def log(sentence: str) -> None:
-    """A sentence as a warning of the logger "rbdyn", which Python writes to standard error unless stated otherwise."""
-    logging.getLogger("rbdyn").warning(sentence)
-
-
-@dataclass
-class Pace:
-    """Time that ``runs`` of so many shaft turns, then ``companions`` of them, take on so many threads, as those under way show it.
-
-    ``growth``: how many times as long they may become; ``scatter``: relative standard deviation of a turn's time between runs.
-    ``predicted``: time of all of it [s], the least and the most, once that was stated.
-    """
-
-    scene: Scene
-    notice: Notice
-    runs: int
-    turns: float
-    threads: int
-    growth: float = 1.0
-    companions: int = 0
-    scatter: float = ALIKE
-    predicted: tuple[float, float] | None = field(default=None, init=False)
-    _under_way: dict[int, tuple[float, float]] = field(default_factory=dict, init=False)
-    _tickets: "itertools.count[int]" = field(default_factory=itertools.count, init=False)
-    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
-
-    def __post_init__(self) -> None:
-        self._look_s, self._spent_s, self._stated_s, self._short_of_steps = FIRST_LOOK_S, 0.0, 0.0, False
-
-    def enter(self) -> int:
-        """A number by which a run that begins is known."""
-        return next(self._tickets)
-
-    def look(self, run: int, spent_s: float, turns: float, steps: int, budget: int) -> None:
-        """Look at a run that took so many seconds for so many shaft turns and steps, of which it has a budget.
-
-        States what is left of all runs once, and again where they prove to take longer than the most that was stated.
-        """
-        if self.notice is None or turns <= 0.0:
-            return
-        sentences = []
-        with self._lock:
-            before_s, _ = self._under_way.get(run, (0.0, 0.0))
-            self._under_way[run] = spent_s, turns
-            self._spent_s += spent_s - before_s
-            elapsed_s = self._spent_s / min(len(self._under_way), self.threads)
-            if elapsed_s >= self._look_s:
-                self._look_s = 2.0 * elapsed_s
-                forecast, low_s = self._forecast(elapsed_s)
-                if forecast.notable and forecast.runs[1] and low_s > self._stated_s:
-                    low, high = (elapsed_s + each for each in forecast.seconds)
-                    self.predicted = self.predicted or (low, max(high, elapsed_s + forecast.longest_s))
-                    self._stated_s = max(high, elapsed_s + forecast.longest_s)
-                    sentences.append(forecast.sentence)
-            budget_s = spent_s / steps * budget
-            short = spent_s >= BUDGET_LOOK_S and budget_s < spent_s / turns * self.turns
-            if short and budget_s >= LONG_S and not self._short_of_steps:
-                self._short_of_steps = True
-                sentences.append(self._budget_sentence(budget_s))
-        for sentence in sentences:
-            self.notice(sentence)
-
-    def _forecast(self, elapsed_s: float) -> tuple[Forecast, float]:
-        """What is left, and the least time of all runs [s], those that have ended included."""
-        counts, each = self.runs + self.companions, self._under_way.values()
-        done = sum(turns for _, turns in each)
-        # What a run was lengthened by is nothing that the others have made.
-        asked = sum(min(turns, self.turns) for _, turns in each)
-        gone_s = elapsed_s * asked / done
-        ended = sum(turns >= self.turns * (1.0 - 1e-9) for _, turns in each)
-        left, measured = max(counts - ended, 0), Measured(len(each), done, self._spent_s)
-        first, rest = (math.ceil(number / self.threads) for number in (self.runs, self.companions))
-        low, high = (
-            factor * (measured.pace or 0.0) * self.turns * (first + companion * rest)
-            for factor, companion in zip(measured.factors(left, self.scatter), COMPANION, strict=True)
-        )
-        seconds = max(low - gone_s, 0.0), max(high - gone_s, 0.0)
-        longest_s = self.growth * high - elapsed_s if self.growth > 1.0 else 0.0
-        turns = max(counts * self.turns - asked, 0.0)
-        return Forecast((left, left), (turns, turns), seconds, self.threads, longest_s, remedy=self._remedy), low
-
-    def _budget_sentence(self, budget_s: float) -> str:
-        per_turn = self.scene.numerics.step_budget_per_turn
-        spent = f"after about {duration(budget_s)} (numerics.step_budget_per_turn = {per_turn})"
-        return f"runs will use up their budget of steps {spent} at this pace; {self._remedy} to shorten them"
-
-    @property
-    def _remedy(self) -> str:
-        numerics = self.scene.numerics
-        shorter = ["model.slices"] if self.scene.slices > 1 else []
-        shorter += ["numerics.turns", *(["numerics.replicates"] if numerics.replicates > 1 else [])]
-        return f"reduce {' or '.join([', '.join(shorter[:-1]), shorter[-1]] if shorter[1:] else shorter)}"
-
-
-# Interruptions are looked for between so many steps: some hundredths of a second, of the implicit method half a one.
+# A run looks for interruptions between so many steps: some hundredths of a second, half a second by the implicit method.
 STEPS_AT_ONCE = 10_000
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
 
 
 class Run:
-    """One replicate under way: parameters, integrator memory and where it stands.
+    """One replicate under way: parameters, integrator memory and where it is.
 
-    ``longest_step`` [s] bounds the steps. ``method``: "auto" until its first step, where the scene
-    leaves it open; ``spent_s``: time that its steps took; ``pace``: what states the time that this and its like take,
-    by whose number, the ``ticket``, it knows the run.
+    ``longest_step`` [s] limits the steps. ``method``: "auto" until its first step, where the scene leaves it open;
+    ``spent_s``: time that its steps took; ``pace``: states the time of all runs and knows this one by its ``ticket``.
     """
 
     def __init__(
@@ -160,21 +77,21 @@ class Run:
         numerics = scene.numerics
         self.method: str = numerics.method
         self.explicit = explicit_method(numerics.method, numerics.rtol)
-        allotted = self.explicit if self.method == "auto" else self.method
+        first_method = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
-        self.carry = carry_from(y, bearing.rollers, first_step, method_of(allotted, scene, bearing))
+        self.carry = carry_from(y, bearing.rollers, first_step, method_of(first_method, scene, bearing))
         self.tally = empty_tally()
         self.sample_step = scene.turn_s / numerics.samples_per_turn
-        self.control = self._control_by(allotted)
+        self.control = self._control_by(first_method)
 
     def choose_method(self) -> None:
-        """Settle "auto" by a trial from where the run stands, which is left as it is."""
+        """Replace "auto" by the cheaper method in a trial from where the run is; the run itself does not change."""
         if self.method != "auto":
             return
         memory = self.carry, self.tally, self.sample_step
         self.method, stiffness = cheaper_method(self.scene, self.bearing, self.explicit, self._control_by, *memory)
         if self.method == "rosenbrock":
-            # The implicit method does not see what it overcomes.
+            # The implicit method shows no stiffness of its own.
             self.carry.stiffness[:] = stiffness
             self.carry = self.carry._replace(method=method_of(self.method, self.scene, self.bearing))
             self.control = self._control_by(self.method)._replace(step_budget=self.control.step_budget)
@@ -190,7 +107,7 @@ class Run:
         )
 
     def allow(self, turns: float) -> None:
-        """Let the budget of steps last for so many shaft turns since the start, at least."""
+        """Raise the budget of steps to that of so many shaft turns since the start."""
         budget = int(min(self.scene.numerics.step_budget_per_turn * math.ceil(turns), 2**62))
         self.control = self.control._replace(step_budget=max(self.control.step_budget, budget))
 
@@ -205,7 +122,7 @@ class Run:
             status = list(Status)[advance(self.bearing, short, self.carry, self.tally, end, self.sample_step)]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
-                turned = float(self.carry.clock[at.NOW]) / self.scene.turn_s
+                turned = float(self.carry.clock[NOW]) / self.scene.turn_s
                 self.pace.look(self.ticket, self.spent_s, turned, self.steps, budget)
             if status is Status.FINISHED:
                 return
@@ -214,31 +131,33 @@ class Run:
 
     @property
     def steps(self) -> int:
-        """Steps made, the refused ones too."""
-        return int(self.carry.counts[at.ACCEPTED] + self.carry.counts[at.REJECTED])
+        """Steps tried, the refused ones included."""
+        return int(self.carry.counts[ACCEPTED] + self.carry.counts[REJECTED])
 
     def forget(self) -> None:
         """Start counting here: empty the tally and sample from now on."""
-        for kept in self.tally:
-            kept[:] = 0.0
-        self.carry.clock[at.SAMPLE] = self.carry.clock[at.NOW]
+        for sums in self.tally:
+            sums[:] = 0.0
+        self.carry.clock[SAMPLE] = self.carry.clock[NOW]
 
     def clock_angles(self) -> Array:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
-            return self.carry.clock[at.NOW] * np.array(self.scene.operation.speeds)
+            return self.carry.clock[NOW] * np.array(self.scene.operation.speeds)
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
     def _why(self, status: Status) -> str:
-        time_s = self.carry.clock[at.NOW]
+        time_s = self.carry.clock[NOW]
         message, remedy = status.value
-        component, step = name(int(self.carry.counts[at.WORST]), self.layout), self.carry.clock[at.STEP]
-        message = message.format(component=component, step=step, spent_s=self.spent_s, **self.control._asdict())
-        explicit = status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT
-        where = f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s"
-        why = f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}"
-        return f"{where}, {why}; {'take numerics.method = auto, ' if explicit else ''}{remedy}"
+        component, step = name(int(self.carry.counts[WORST]), self.layout), self.carry.clock[STEP]
+        reason = message.format(component=component, step=step, spent_s=self.spent_s, **self.control._asdict())
+        if status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT:
+            remedy = f"take numerics.method = auto, {remedy}"
+        return (
+            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, shaft turn "
+            f"{time_s / self.scene.turn_s:.4g}: {reason}; {remedy}"
+        )
 
 
 def with_numerics(scene: Scene, **changes: Any) -> Scene:
@@ -247,9 +166,138 @@ def with_numerics(scene: Scene, **changes: Any) -> Scene:
 
 
 def prepare(scene: Scene, bearing: RollerBearing) -> float:
-    """Compile, or fetch from disk, what the scene needs; returns the seconds it took."""
+    """Compile, or load from disk, what the scene needs; returns the seconds that it took."""
     started = time.perf_counter()
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
     run.to(0.0)
     mechanical_energy(bearing, run.carry.y)
     return time.perf_counter() - started
+
+
+EXPLICIT = ("rk45", "rk43")
+# From this tolerance on the third-order error estimate of Kutta's pair costs fewer right-hand sides than the fifth order saves.
+# There is no trial, which would compile both.
+KUTTA_FROM = 5e-3
+# Length of the trial, after as long a start, and its steps at most.
+TRIAL_TURNS, TRIAL_STEPS = 0.05, 20_000
+# From this share of steps limited by stability on a run counts as stiff.
+STIFF_SHARE = 0.5
+# The implicit method takes 100 to 500 steps a turn, however stiff the bearing: below this number the explicit one is cheaper,
+# and a limit by stability deserves no note.
+FEWEST_STEPS_PER_TURN = 2000
+# Processor time of the implicit method over that of the explicit one, per right-hand side: linear algebra, and
+# right-hand sides of one roller that fill no vectors (10 rollers, measured).
+IMPLICIT_OVERHEAD = 3.0
+
+
+def explicit_method(method: str, rtol: float) -> str:
+    """The explicit pair that a scene of this method and tolerance starts with, "rk45" or "rk43".
+
+    For the bearing of Chen et al. 2022 rk43 at 1e-2 takes 1890 right-hand sides a turn, rk45 2510 at 1e-3, the loosest at
+    which it is free of bias; at 1e-3 rk43 takes 3590.
+    """
+    if method in EXPLICIT:
+        return method
+    return "rk43" if rtol >= KUTTA_FROM else "rk45"
+
+
+def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
+    """The method "rk45", "rk43" or "rosenbrock" for this bearing."""
+    if name == "rosenbrock":
+        if scene.traction.elasticity:
+            raise MethodError(
+                "the implicit method knows no traction coefficients as states; leave out traction.elasticity"
+            )
+        from rbdyn.dynamics.integrators.rosenbrock import rodas
+
+        return rodas(layout_of(scene), bearing, increments(scene, bearing))
+    return Kutta() if name == "rk43" else DormandPrince()
+
+
+def cheaper_method(
+    scene: Scene,
+    bearing: RollerBearing,
+    pair: str,
+    control_by: Callable[[str], Control],
+    carry: Carry,
+    tally: Tally,
+    sample_step: float,
+) -> tuple[str, np.ndarray]:
+    """ "rosenbrock" where ``pair`` is stiff and a trial shows the implicit method cheaper, else ``pair``; and the stiffness.
+
+    ``control_by(method)``: the step control. ``carry`` and ``tally`` are those at the start of the run and do not change.
+    """
+    # Elastic contacts have no stiff traction, and the implicit method has no room for their coefficients.
+    if scene.traction.elasticity:
+        return pair, np.zeros(STIFFNESS)
+    trial_s = TRIAL_TURNS * scene.turn_s
+    short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
+    run, book = _copy(carry), Tally(*(sums.copy() for sums in tally))
+    status = advance(bearing, short, run, book, trial_s, sample_step)
+    start = _copy(run)
+    derivatives = int(run.counts[DERIVATIVES])
+    for counts in (start.counts, run.counts):
+        counts[:] = 0
+        counts[DERIVATIVES] = derivatives
+    run.stiffness[:] = 0.0
+    if status in (FINISHED, STEP_BUDGET):
+        status = advance(bearing, short, run, book, run.clock[NOW] + trial_s, sample_step)
+    if status not in (FINISHED, STEP_BUDGET):
+        return "rosenbrock", run.stiffness
+    turns = (run.clock[NOW] - start.clock[NOW]) / scene.turn_s
+    steps = run.counts[ACCEPTED] + run.counts[REJECTED]
+    if held_by_stability(run.stiffness) < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
+        return pair, run.stiffness
+    start = start._replace(method=method_of("rosenbrock", scene, bearing))
+    short = control_by("rosenbrock")._replace(step_budget=TRIAL_STEPS)
+    if advance(bearing, short, start, book, run.clock[NOW], sample_step) != FINISHED:
+        return pair, run.stiffness
+    cost = IMPLICIT_OVERHEAD * (start.counts[DERIVATIVES] - derivatives)
+    return "rosenbrock" if cost < run.counts[DERIVATIVES] - derivatives else pair, run.stiffness
+
+
+def _copy(carry: Carry) -> Carry:
+    """A copy that shares only the work space."""
+    own: dict[str, Any] = {name: part.copy() for name, part in carry._asdict().items() if isinstance(part, np.ndarray)}
+    return carry._replace(**own)
+
+
+def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
+    """Share of the explicit steps tested that stability limited, not accuracy."""
+    return float(stiffness[LIMITED] / stiffness[TESTED]) if stiffness[TESTED] > 0.0 else 0.0
+
+
+def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:
+    """Mean |eigenvalue| [1/s] of the motion that limited them; zero where none did."""
+    return float(stiffness[EIGENVALUES] / stiffness[LIMITED]) if stiffness[LIMITED] > 0.0 else 0.0
+
+
+def stiffness_cost(runs: Sequence[Replicate]) -> dict[str, float]:
+    """Stiffness in the cost of a result: share of steps limited by stability, |eigenvalue| [1/s], runs by the implicit method."""
+    total = np.sum([run.stiffness for run in runs], axis=0)
+    return {
+        "held_by_stability": held_by_stability(total),
+        "eigenvalue_1_s": largest_eigenvalue(total),
+        "implicit_runs": sum(run.method == "rosenbrock" for run in runs),
+    }
+
+
+def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> tuple[str, ...]:
+    """Notes on stiffness and method."""
+    cost = stiffness_cost(runs)
+    if cost["implicit_runs"] and scene.numerics.method == "auto":
+        return (
+            f"method: {cost['implicit_runs']:g} of {len(runs)} runs by the linearly implicit one, because stability would limit "
+            "explicit steps and a trial showed it to be cheaper",
+        )
+    turns = sum(float(run.durations.sum()) for run in runs) / scene.turn_s
+    steps = sum(run.accepted_steps + run.rejected_steps for run in runs)
+    if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
+        return ()
+    limit = (
+        f"stability, not accuracy, limits {100.0 * cost['held_by_stability']:.0f} % of the steps: the fastest motion takes "
+        f"{1.0 / cost['eigenvalue_1_s']:.2g} s, a shaft turn {scene.turn_s:.2g} s; looser tolerances save nothing"
+    )
+    if scene.numerics.method in EXPLICIT:
+        return (f"{limit}; let numerics.method = 'auto' try the implicit method, or soften the stiffest law",)
+    return (f"{limit}; soften the stiffest law (traction slope, film floor, light cage)",)

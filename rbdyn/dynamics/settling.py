@@ -1,9 +1,9 @@
 """Replicates that run until their figures no longer drift.
 
-A run first counts at least three times the time in which its slowest motion relaxes (``relaxation``). Where a figure then
-drifts over the counted turns (``error_bars``) by more than its error and a hundredth of it, every replicate goes on until it is
-twice as long, and again, at most ``numerics.extend_limit`` times the turns asked for; each time the last half counts.
-Companions run just as far. Nothing depends on the clock or on the number of threads.
+A run first counts at least three times the time in which its slowest motion relaxes (``recording``). A figure may then
+drift over the counted turns by more than its error and a hundredth of it (``error_bars``). In that case every replicate
+goes on until it is twice as long, and again, up to ``numerics.extend_limit`` times the turns asked for; each time the last
+half counts. Companions run just as far. Nothing depends on the clock or on the number of threads.
 """
 
 import math
@@ -15,30 +15,27 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from rbdyn.base.faults import RunError
-from rbdyn.dynamics.companions import Companions, companions_of
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Outcome, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Relaxation, batches_of, slowest
 from rbdyn.dynamics.statistics.error_bars import start_of_counting, worth_lengthening
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
 from rbdyn.scene import Scene
 
 
 class Stage(NamedTuple):
-    """Where replicates stand: from which batch they count, the turns after the warm-up that they ran, and how often they
-    were lengthened because of a drift."""
+    """Length of the replicates: batch from which they count, turns after the warm-up, and how often a drift lengthened them."""
 
     first: int
     turns: float
-    looks: int = 0
+    extensions: int = 0
 
 
 @dataclass(frozen=True)
 class Ensemble:
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
-    ``since``: batch from which they count where nothing drifts; ``fault``: why there are no companions although asked for;
-    ``transient_turns``: shaft turns of the transient (None where it cannot be determined); ``notes``: what a result has to say of
-    its length.
+    ``since``: batch from which they would count without a drift; ``fault``: why companions that were asked for are missing;
+    ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs.
     """
 
     runs: list[Replicate]
@@ -50,9 +47,9 @@ class Ensemble:
     notes: tuple[str, ...]
 
 
-# How many times as long a run gets at every drift.
+# Factor by which every drift lengthens a run.
 GROWTH = 2.0
-# Relaxation times of the slowest motion that are counted at least: what is left of a start after them is 5 %.
+# Relaxation times of the slowest motion that count at least: 5 % of a start remain after them.
 RELAXATIONS = 3.0
 
 
@@ -64,12 +61,12 @@ class Growing(Protocol):
         ...
 
 
-# Makes a replicate, or a companion where it is given how.
+# Begins a replicate, or a companion where a plan says how.
 Start = Callable[[int, Companions | None, Stop], Growing]
 
 
 def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
-    """Run the replicates of a scene, as far as it takes, then their companions just as far.
+    """Run the replicates of a scene until nothing drifts, then their companions just as far.
 
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
     """
@@ -92,7 +89,7 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
     plan = companions_of(scene, runs)
     if not numerics.companions:
         return Ensemble(runs, [], plan, begin.first, None, begin.turns, notes)
-    others = Team(start, range(numerics.companions), plan, workers, Stop(outer=stop), progress, 0, team.done)
+    others = Team(start, range(numerics.companions), plan, workers, Stop(outer=stop), progress, 0, team.ended)
     try:
         companions = [run.counted_from(stage.first) for run in others.to(stage.turns)]
     except RunError as error:
@@ -103,8 +100,10 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
 
 @dataclass
 class Team:
-    """Recordings that go on together, in threads; ``done`` of them have ended. ``to_come``: runs of others that the
-    progress counts too."""
+    """Recordings that go on together, in threads.
+
+    The progress has counted ``ended`` runs so far, and counts runs ``to_come`` of other teams.
+    """
 
     start: Start
     replicates: range
@@ -113,12 +112,12 @@ class Team:
     stop: Stop
     progress: Reporter
     to_come: int
-    done: int = 0
+    ended: int = 0
     recordings: dict[int, Growing] = field(default_factory=dict)
 
     def to(self, turns: float) -> list[Replicate]:
         """All of them after so many turns past the warm-up. Raises RunError, KeyboardInterrupt."""
-        total = self.done + len(self.replicates) + self.to_come
+        total = self.ended + len(self.replicates) + self.to_come
         runs: dict[int, Replicate] = {}
 
         def go_on(replicate: int) -> Replicate:
@@ -126,24 +125,24 @@ class Team:
                 self.recordings[replicate] = self.start(replicate, self.plan, self.stop)
             return self.recordings[replicate].to(turns)
 
-        def ended(one: Ended[Replicate]) -> None:
-            runs[one.place] = one.result()
-            self.done += 1
+        def collect(outcome: Outcome[Replicate]) -> None:
+            runs[outcome.place] = outcome.result()
+            self.ended += 1
             if self.progress is not None:
-                self.progress(self.done, total)
+                self.progress(self.ended, total)
 
-        run_all([partial(go_on, replicate) for replicate in self.replicates], self.workers, self.stop, ended)
+        run_all([partial(go_on, replicate) for replicate in self.replicates], self.workers, self.stop, collect)
         return [runs[place] for place in range(len(self.replicates))]
 
 
 def whole_windows(scene: Scene) -> float:
-    """The turns that a scene counts, filled up to whole impact windows."""
+    """The turns that a scene counts, rounded up to whole impact windows."""
     window = scene.impact_window_turns
     return math.ceil(scene.numerics.turns / window - 1e-9) * window
 
 
 def fewest_turns(scene: Scene, relaxation: Relaxation | None) -> float:
-    """Turns that are counted at least: those asked for, or enough for the slowest motion to relax."""
+    """Turns that count at least: those asked for, or enough for the slowest motion to relax."""
     needed = 0.0 if relaxation is None else RELAXATIONS * relaxation.time_s / scene.turn_s
     return max(scene.numerics.turns, needed)
 
@@ -151,9 +150,9 @@ def fewest_turns(scene: Scene, relaxation: Relaxation | None) -> float:
 def next_stage(
     scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
 ) -> Stage | None:
-    """How to go on from counted ``runs``: None where nothing drifts, or where that would pass the scene's limit or memory.
+    """How to go on from counted ``runs``: None where nothing drifts, or beyond the scene's limit or memory.
 
-    Turns are made up first where ``discard_turns = "auto"`` or the slowest motion left too few of them.
+    The runs first make up for turns that ``discard_turns = "auto"`` or the slowest motion takes from those counted.
     """
     numerics, window = scene.numerics, scene.impact_window_turns
     warm_up, batches, fewest = numerics.warm_up_turns, batches_of(scene), fewest_turns(scene, relaxation)
@@ -169,11 +168,11 @@ def next_stage(
     if warm_up + turns > longest or not fits(scene, turns):
         return None
     counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
-    return Stage(batches.count(turns) - counted, turns, stage.looks + 1)
+    return Stage(batches.count(turns) - counted, turns, stage.extensions + 1)
 
 
 def grown(scene: Scene, stage: Stage) -> float:
-    """Turns after the warm-up, in whole windows, of a run that is lengthened once more."""
+    """Turns after the warm-up, in whole windows, of a run lengthened once more."""
     warm_up, window = scene.numerics.warm_up_turns, scene.impact_window_turns
     return math.ceil((GROWTH * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
 
@@ -186,28 +185,34 @@ def fits(scene: Scene, turns: float) -> bool:
 def length_notes(
     scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
 ) -> tuple[str, ...]:
-    """What a reader should know of how long the runs took and what is counted of them."""
+    """Notes on the length of the runs and on the turns that count."""
     numerics, turn_s = scene.numerics, scene.turn_s
     notes = []
     counted, fewest = runs[0].duration / turn_s, fewest_turns(scene, relaxation)
     if scene.extends and relaxation is not None and fewest > numerics.turns:
-        relaxes = f"{relaxation.motion} relaxes in {relaxation.time_s / turn_s:.2g} shaft turns"
+        motion, turns = relaxation.motion, f"{relaxation.time_s / turn_s:.2g} shaft turns"
         if counted < fewest * (1.0 - 1e-6):
             fix = "raise numerics.extend_limit" if fits(scene, grown(scene, stage)) else "take fewer replicates"
-            notes.append(f"transient: {relaxes}, and only {counted:.4g} turns are counted; {fix}")
-        elif not stage.looks:
-            notes.append(f"length: {relaxes}, so {counted:.4g} turns are counted instead of {numerics.turns:.4g}")
-    if stage.looks:
+            notes.append(f"transient: {motion} relaxes in {turns}, and only {counted:.4g} turns are counted; {fix}")
+        elif not stage.extensions:
+            notes.append(
+                f"length: {motion} relaxes in {turns}, so {counted:.4g} turns are counted instead of {numerics.turns:.4g}"
+            )
+    if stage.extensions:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
-        ran = f"{dropped + counted:.4g} shaft turns per replicate instead of {numerics.warm_up_turns + numerics.turns:.4g}"
-        last = f"the last {counted:.4g} are counted (numerics.extend = false forbids it)"
-        notes.append(f"length: figures drifted: {ran}; {last}")
+        notes.append(
+            f"length: figures drifted: {dropped + counted:.4g} shaft turns per replicate instead of "
+            f"{numerics.warm_up_turns + numerics.turns:.4g}; the last {counted:.4g} are counted (numerics.extend = false "
+            "forbids it)"
+        )
     if scene.operation.schedule is None and worth_lengthening(runs, since):
         fix = (
             "raise numerics.extend_limit" if scene.extends else "lengthen numerics.turns or set numerics.extend = true"
         )
         if not fits(scene, grown(scene, stage)):
             fix = "take fewer replicates: there is no memory for longer ones"
-        what = f"transient: figures still drift over the {counted:.4g} turns counted"
-        notes.append(f"{what}; their errors hold what the drift shows, yet it may go farther; {fix}")
+        notes.append(
+            f"transient: figures still drift over the {counted:.4g} turns counted; their errors include this drift, yet it may "
+            f"go farther; {fix}"
+        )
     return tuple(notes)

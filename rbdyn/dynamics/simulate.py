@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from rbdyn.base.forecast import Notice
-from rbdyn.dynamics.companions import TIGHT
-from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
+from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
-from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
     film_drive_notes,
@@ -24,23 +22,23 @@ from rbdyn.dynamics.parameters.validity import (
     race_report,
 )
 from rbdyn.dynamics.recording import recording_of
-from rbdyn.dynamics.run import Pace, log, prepare
+from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import orbit_radius_share, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import TIGHT, orbit_radius_share, whirl_notes, work_done
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
 
-# Beyond this relative gap of the power balance a result warns of its tolerance.
+# Above this relative gap of the power balance a note asks for a tighter tolerance.
 LARGEST_POWER_GAP = 0.005
 
-# What was prepared in this process: method and types of the laws. Scenes of the same need not wait for it again.
+# Method and types of the laws that this process has compiled or loaded, which other scenes with them need not wait for.
 _prepared: set[Any] = set()
 
 
 def _types(parameters: Any) -> Any:
-    """Types of parameters and of those inside, which decide what is compiled."""
+    """Types of parameters and of those inside, by which laws are compiled."""
     if isinstance(parameters, tuple):
         return type(parameters), *map(_types, parameters)
     return type(parameters)
@@ -56,11 +54,14 @@ def simulate(
 ) -> SimulationResult:
     """Simulate all replicates of a scene, which may be the path of its file.
 
-    ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
-    called after every run. ``target``: relative error to reach, for which tolerance, turns and replicates are chosen
-    (``rbdyn.dynamics.target``). ``notice(sentence)`` is called early with what the runs still take; a warning of the logger
-    "rbdyn" unless given, None for silence. Raises RunError when a replicate cannot go on, InputError for what is
-    no roller bearing and for an impossible target or number of workers, KeyboardInterrupt on Ctrl-C.
+    - ``workers``: threads, all processors by default; the result does not depend on it
+    - ``progress(done, total)`` is called after every run
+    - ``target``: relative error to reach, which chooses tolerance, turns and replicates (``rbdyn.dynamics.target``)
+    - ``notice(sentence)`` is called early with the time that the runs still take; by default it is a warning of the logger
+      "rbdyn", None for silence
+
+    Raises InputError for another kind of bearing and for an impossible target or number of workers. Raises RunError when a
+    replicate cannot go on, KeyboardInterrupt on Ctrl-C.
     """
     scene = rollers_only(scene)
     if target is not None:
@@ -82,13 +83,12 @@ def simulate(
 
     ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_predicted(pace)})
+    return _gather(scene, ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)})
 
 
-def _predicted(pace: Pace) -> dict[str, float]:
-    """What was stated of the wall time while the runs went on, if anything."""
-    low, high = pace.predicted or (None, None)
-    return {} if low is None or high is None else {"predicted_least_s": low, "predicted_most_s": high}
+def _prediction(pace: Pace) -> dict[str, float]:
+    """Least and most wall time that were stated while the runs went on; nothing where none was."""
+    return dict(zip(("predicted_least_s", "predicted_most_s"), pace.prediction or (), strict=False))
 
 
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:
@@ -157,20 +157,21 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
 
 
 def clearance_report(scene: Scene) -> dict[str, Any]:
-    """Diametral clearances as drawn and in operation, and what changed them [um].
+    """Diametral clearances as drawn and in operation, and their changes [um].
 
-    The radial one by itself; under "radial", "guide" and "pocket" each with drawn, fit, temperature, rotation and operating,
+    The radial one by its own parts; "radial", "guide" and "pocket" each with drawn, fit, temperature, rotation and operating.
     None for the guide of a cage that no ring guides.
     """
-    drawn = scene.bearing.radial_clearance_mm * 1e3
-    flat, mounted = {"operating": drawn}, scene.mounted_clearance
+    drawing = scene.bearing.radial_clearance_mm * 1e3
+    flat, mounted = {"operating": drawing}, scene.mounted_clearance
     if mounted is not None:
         parts = ("inner_fit", "outer_fit", "temperature", "rotation", "operating")
         flat = {part: getattr(mounted, part) * 1e6 for part in parts}
-    return {"drawn": drawn, **flat, **{name: _shares(each) for name, each in scene.clearances.items()}}
+    parts_of = {name: _parts(clearance) for name, clearance in scene.clearances.items()}
+    return {"drawn": drawing, **flat, **parts_of}
 
 
-def _shares(clearance: OperatingClearance | None) -> dict[str, float] | None:
+def _parts(clearance: OperatingClearance | None) -> dict[str, float] | None:
     if clearance is None:
         return None
     # A sum with 0 has no negative zero.
@@ -182,15 +183,20 @@ def _shares(clearance: OperatingClearance | None) -> dict[str, float] | None:
 def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     notes = []
     if power_gap > LARGEST_POWER_GAP:
-        loose = f"numerics.rtol = {scene.numerics.rtol:g} is too loose for this scene"
-        why = "loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
-        notes.append(f"power balance closes only to {100.0 * power_gap:.2g} %: {loose}; {why}")
+        notes.append(
+            f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
+            "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
+        )
     if cutoff := scene.numerics.whirl_cutoff_hz:
         notes.append(f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)")
     if scene.traction.model == "four_constant":
-        what = "traction: one load-independent set of constants"
-        notes.append(f"{what}; lightly loaded rollers are driven too hard and skidding is under-predicted")
+        notes.append(
+            "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and skidding is "
+            "under-predicted"
+        )
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
-        what = "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use"
-        notes.append(f"{what}; choose traction.rheology_oil to suit it")
+        notes.append(
+            "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
+            "traction.rheology_oil to suit it"
+        )
     return tuple(notes)

@@ -1,7 +1,7 @@
 """Cage slip, loss, whirl and impact over speed and load: where a bearing skids.
 
-Every point is the same scene at another inner speed and radial load. A point that cannot go on is kept as a record of
-its cause, and the others go on. Finished points may be kept in a file, so that an interrupted map goes on there.
+Every point is the same scene at another inner speed and radial load. A point that cannot go on becomes a record of the
+cause, and the others go on. A file may keep finished points, so that an interrupted map goes on there.
 """
 
 import time
@@ -12,20 +12,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import MOST_VALUES, InputError
 from rbdyn.base.forecast import Notice
-from rbdyn.base.ranges import MOST_VALUES
 from rbdyn.base.records import Record, derived, keyed, spread
-from rbdyn.base.storage import Kept, code_version, run_key
+from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.words import counted
-from rbdyn.dynamics.companions import Companions, companions_of
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
+from rbdyn.dynamics.ensemble import UNLIKE, Outcome, Pace, Reporter, Stop, log, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import UNLIKE, Pace, log, prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 
@@ -49,7 +47,7 @@ class Point(Record):
 
 
 class SlipMap(Record):
-    """Points in rows of rising load, speeds rising within; ``wall_s`` is what they took."""
+    """Points in rows of rising load, speeds rising in each row; ``wall_s``: their wall time."""
 
     format: str = derived(lambda self: FORMAT)
     status: str = derived(
@@ -104,14 +102,14 @@ class Job:
 
 
 class Series:
-    """Runs of the point at ``place``: its replicates, then companions by the steps that these took; none where a replicate failed.
+    """Runs of the point at ``place``: its replicates, then companions by their steps; no companions where a replicate failed.
 
-    ``waiting``: how many of those begun have not ended; ``left_out``: companions that were not begun.
+    ``waiting``: runs begun that have not ended; ``remaining``: companions that have not begun.
     """
 
     def __init__(self, place: int, scene: Scene, bearing: RollerBearing, stop: Stop, pace: Pace) -> None:
         self.place, self.scene, self.bearing, self.stop, self.pace = place, scene, bearing, stop, pace
-        self.waiting, self.left_out = scene.numerics.replicates, scene.numerics.companions
+        self.waiting, self.remaining = scene.numerics.replicates, scene.numerics.companions
         self.plan: Companions | None = None
         self.runs: dict[tuple[Companions | None, int], Replicate] = {}
         self.faults: list[str] = []
@@ -120,22 +118,22 @@ class Series:
         """The runs to begin with."""
         return [Job(self, replicate, None) for replicate in range(self.scene.numerics.replicates)]
 
-    def take(self, one: Ended[Replicate]) -> list[Job]:
-        """Take a run that has ended; returns those to make next."""
-        job = cast(Job, one.run)
-        if one.fault is None:
-            self.runs[job.companions, job.replicate] = one.result()
+    def take(self, outcome: Outcome[Replicate]) -> list[Job]:
+        """Take the outcome of a run; returns the runs to make next."""
+        job = cast(Job, outcome.run)
+        if outcome.fault is None:
+            self.runs[job.companions, job.replicate] = outcome.result()
         else:
-            self.faults.append(str(one.fault))
+            self.faults.append(str(outcome.fault))
         self.waiting -= 1
-        if self.waiting or self.faults or not self.left_out:
+        if self.waiting or self.faults or not self.remaining:
             return []
         self.plan = companions_of(self.scene, self._ended(None))
-        self.waiting, self.left_out = self.left_out, 0
+        self.waiting, self.remaining = self.remaining, 0
         return [Job(self, replicate, self.plan) for replicate in range(self.waiting)]
 
     def point(self) -> Point:
-        """What the runs show."""
+        """Figures from the runs, or why there are none."""
         speed, load = self.scene.operation.inner_speed_rpm, self.scene.operation.radial_load_N
         if self.faults:
             return Point(speed, load, f"failed: {min(self.faults)}", {}, None)
@@ -160,49 +158,49 @@ def slip_map(
     kept_in: Path | None = None,
     notice: Notice = log,
 ) -> SlipMap:
-    """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.
+    """Run the scene at every pair of inner speed and radial load, except for points in the file ``kept_in``.
 
-    ``notice``: what to do with a sentence on long runs, as in ``simulate``.
+    ``notice``: called with a sentence on long runs, as in ``simulate``.
     Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
     if scene.operation.schedule is not None:
         raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
     if (count := len(speeds_rpm) * len(loads_N)) > MOST_VALUES:
         raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
-    scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
-    kept, version = Kept(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
+    scenes = [_scene_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
+    store, version = Checkpoint(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
     keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
-    points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := kept.get(key))}
+    points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := store.get(key))}
     bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}
     for place in list(bearings)[:1]:
         prepare(scenes[place], bearings[place])
     numerics, stop = scene.numerics, Stop()
-    total, done = len(bearings) * (numerics.replicates + numerics.companions), 0
+    total, ended = len(bearings) * (numerics.replicates + numerics.companions), 0
     turns, runs = numerics.warm_up_turns + numerics.turns, len(bearings) * numerics.replicates
     pace = Pace(scene, notice, runs, turns, threads_of(workers), companions=total - runs, scatter=UNLIKE)
     series = [Series(place, scenes[place], bearings[place], stop, pace) for place in bearings]
 
-    def ended(one: Ended[Replicate]) -> list[Job]:
-        nonlocal done
-        ran = cast(Job, one.run).series
-        more = ran.take(one)
-        done += 1
-        if not ran.waiting:
-            done += ran.left_out
-            points[ran.place] = ran.point()
-            kept.put(keys[ran.place], points[ran.place].as_dict())
+    def collect(outcome: Outcome[Replicate]) -> list[Job]:
+        nonlocal ended
+        point = cast(Job, outcome.run).series
+        more = point.take(outcome)
+        ended += 1
+        if not point.waiting:
+            ended += point.remaining
+            points[point.place] = point.point()
+            store.put(keys[point.place], points[point.place].as_dict())
         if progress is not None:
-            progress(done, total)
+            progress(ended, total)
         return more
 
     started = time.perf_counter()
-    run_all((job for one in series for job in one.replicates()), workers, stop, ended)
+    run_all((job for one in series for job in one.replicates()), workers, stop, collect)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
 
 
-def _at(scene: Scene, speed: float, load: float) -> Scene:
+def _scene_at(scene: Scene, speed: float, load: float) -> Scene:
     data = scene.model_dump(mode="json", exclude_none=True)
     data["operation"] |= {"inner_speed_rpm": speed, "radial_load_N": load}
     return Scene.from_dict(data, f"--speed {speed:g} --load {load:g}")

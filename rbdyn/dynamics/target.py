@@ -1,11 +1,10 @@
 """A run to a target accuracy: tolerance, turns and replicates at least cost for a total error asked of three figures.
 
-Pilots over a ladder of tolerances measure the scatter of a turn, the bias over the tolerance, the power gap and the
-right-hand sides a turn takes. From these follow, for each tolerance, the turns that bring numerical plus statistical
-error of each figure below the target, and what they cost; the cheapest is run and judged by its own error bars. If
-they are too wide, what it measured goes into the model and a longer or tighter run follows. What to choose is weighed
-in right-hand sides, not seconds: equal scenes choose equally on any machine. The cost of the result is that of all this
-together, pilots and earlier runs included.
+Pilots over a ladder of tolerances measure scatter of a turn, bias over tolerance, power gap and right-hand sides of a turn.
+For each tolerance these give the turns that bring numerical plus statistical error of each figure below the target, and
+their cost. The cheapest choice is run and judged by its own error bars. If they are too wide, its measurements update the
+model, and a longer or tighter run follows. The choice counts right-hand sides, not seconds, so equal scenes choose equally on
+any machine. The cost of the result includes pilots and earlier runs.
 """
 
 import math
@@ -37,12 +36,12 @@ LARGEST_TARGET = 0.5
 LADDER = (0.1, 0.03, 0.01, 0.003)
 PILOT_REPLICATES, PILOT_WINDOWS, PILOT_TURNS = 8, 2, 40.0
 TOLERANCES = (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 1e-5, 1e-6)
-# Replicates of the example differ for as long as they were watched, so more of them show more than longer ones: they are
-# as short as lets transients take no more than a sixth of the turns.
+# Replicates of the example differ however long they run, so more of them show more than longer ones. They are as short as
+# possible with at most a sixth of the turns in transients.
 FEWEST_REPLICATES, WARM_UPS = 4, 5.0
-# A first short run may misjudge the scatter; the next is no more than so many times as long.
+# A first short run may misjudge the scatter: the least and the largest factor of the length of the next run.
 GROWTH = (1.2, 4.0)
-# The plan aims lower than it was asked, as pilots know the scatter to a tenth or two.
+# The plan aims below the target, since pilots give the scatter to a tenth or two.
 MARGIN = 0.9
 MOST_RUNS = 3
 # Counted turns of one run at most: minutes.
@@ -50,7 +49,7 @@ MOST_TURNS = 100_000.0
 NORMAL = 1.96
 # A difference that is all scatter and its 95 % half-width together, over that half-width: sqrt(1 + 1 / 1.96^2).
 NOISY_DIFFERENCE = 1.123
-# What adds up over runs in the cost of a result; the rest of it is that of the run that is reported.
+# Costs that add up over runs; the others are those of the reported run.
 ADDED = ("wall_s", "compile_s", "cpu_s", "steps", "rejected_steps", "rhs_evaluations", "turns")
 
 
@@ -58,23 +57,25 @@ def target_of(text: str) -> float:
     """``2%`` or ``0.02`` as a fraction. Raises InputError for anything else."""
     number, percent = (text.strip()[:-1], 0.01) if text.strip().endswith("%") else (text, 1.0)
     try:
-        return checked(float(number) * percent, text)
+        return valid_target(float(number) * percent, text)
     except ValueError:
         raise InputError([f"--target {text}: not a number; write it as 2% or 0.02"]) from None
 
 
-def checked(target: float, shown: str | None = None) -> float:
-    """The target. Raises InputError unless it is a fraction above 0 and at most a half."""
+def valid_target(target: float, text: str | None = None) -> float:
+    """The target. Raises InputError unless it is a fraction above 0 and at most a half; ``text``: as it was written."""
     if isinstance(target, bool) or not isinstance(target, int | float):
         raise InputError([f"target = {one_line(repr(target), LONGEST_NAME)}: must be a number such as 0.02"])
     if not 0.0 < target <= LARGEST_TARGET:
-        what = f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %"
-        raise InputError([f"{what}; write it as 2% or 0.02"])
+        limit = f"{100.0 * LARGEST_TARGET:g} %"
+        raise InputError(
+            [f"--target {text or f'{target:g}'}: must be above 0 and at most {limit}; write it as 2% or 0.02"]
+        )
     return target
 
 
 class Choice(NamedTuple):
-    """How a run is to be made, and the right-hand sides that it should take."""
+    """Tolerance, turns and replicates of a run, and the right-hand sides that it should take."""
 
     rtol: float
     turns: float
@@ -88,9 +89,9 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """What is known of a scene. Relative to the figures, by name: ``scatter``: standard error of the mean of one turn;
-    ``bias``: bound of the bias over rtol. ``ladder``: tolerances, falling, with their power gaps and right-hand sides a
-    turn."""
+    """Errors and costs of a scene. Relative to the figures, by name: ``scatter``, standard error of the mean of one turn, and
+    ``bias``, bound of the bias over rtol. ``ladder``: tolerances, falling, with their power gaps and right-hand sides a turn.
+    """
 
     scatter: dict[str, float]
     bias: dict[str, float]
@@ -103,7 +104,7 @@ class Model:
         return _along(rtol, self.ladder, self.rhs_per_turn)
 
     def systematic(self, name: str, rtol: float) -> float:
-        """Part of the numerical error that no longer run lessens."""
+        """Part of the numerical error that a longer run does not reduce."""
         if name in SCATTERED:
             return self.bias[name] * rtol
         return _along(rtol, self.ladder, np.maximum(self.gaps, 1e-12))
@@ -120,11 +121,10 @@ def reach(
 ) -> SimulationResult:
     """``simulate`` until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
 
-    Tolerance, turns and replicates of the scene are replaced. What was chosen, reached and spent stands under
-    ``target`` of the result, and in its notes where the target was not met; ``cost`` sums pilots and all runs. Raises
-    InputError, RunError, KeyboardInterrupt.
+    It replaces tolerance, turns and replicates of the scene. ``target`` of the result states choice, errors and cost, and a
+    note says where the target was not met; ``cost`` sums pilots and all runs. Raises InputError, RunError, KeyboardInterrupt.
     """
-    checked(target)
+    valid_target(target)
     model, pilots = measure(scene, workers, progress, stop, notice)
     spent = Counter(pilots)
     shortest, longest = 0.0, MOST_TURNS
@@ -150,13 +150,13 @@ def reach(
         },
     }
     notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
-    # What was predicted was the last run alone.
+    # The prediction is that of the last run alone.
     cost = {key: value for key, value in result.cost.items() if not key.startswith("predicted_")}
     return replace(result, cost=cost | dict(spent), target=record, notes=notes)
 
 
 def total_error(figure: Quantity) -> float | None:
-    """Stated error over the value; None where a part of it is unknown, 0 where both parts are nothing."""
+    """Stated error over the value; None where a part of it is unknown, 0 where both parts are zero."""
     if figure.statistical_error is None or figure.numerical_error is None:
         return None
     error = figure.error or 0.0
@@ -166,7 +166,7 @@ def total_error(figure: Quantity) -> float | None:
 
 
 def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
-    """The figures that a target is asked of, by name."""
+    """Figures that a target limits, by name."""
     figures = (result.impact_force, result.whirl_deviation_ratio, result.power_loss)
     return dict(zip(AIMED, figures, strict=True))
 
@@ -174,7 +174,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
 def measure(
     scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None, notice: Notice = None
 ) -> tuple[Model, dict[str, float]]:
-    """Pilots over the ladder of tolerances: what they show, and what they cost (``ADDED``). Raises RunError."""
+    """Pilots over the ladder of tolerances: their model and their cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
     bearing = roller_bearing(pilot)
@@ -203,15 +203,17 @@ def measure(
 
 
 def choose(model: Model, scene: Scene, target: float, shortest: float = 0.0, longest: float = MOST_TURNS) -> Choice:
-    """The cheapest choice that meets the target with counted turns, in all, between ``shortest`` and ``longest``; where
-    none does, the one that comes closest."""
-    able = []
+    """The cheapest choice that meets the target with counted turns, in all, between ``shortest`` and ``longest``.
+
+    Where none does, the choice with the smallest error.
+    """
+    candidates = []
     for rtol in TOLERANCES:
         needed = max(turns_needed(model, scene, rtol, target), shortest)
         if needed <= longest:
-            able.append(_choice(model, scene, rtol, needed))
-    if able:
-        return min(able, key=lambda choice: choice.rhs_evaluations)
+            candidates.append(_choice(model, scene, rtol, needed))
+    if candidates:
+        return min(candidates, key=lambda choice: choice.rhs_evaluations)
 
     def worst(rtol: float) -> float:
         return max(predicted_error(model, scene, name, rtol, longest) for name in AIMED)
@@ -236,7 +238,7 @@ def predicted_error(model: Model, scene: Scene, name: str, rtol: float, turns: f
 
 
 def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult) -> Model:
-    """The model after a run: its scatter for the one of the pilots, and its bias where it stands out of the scatter."""
+    """The model after a run: scatter of the run instead of the pilots, and its bias where that exceeds the scatter."""
     turns = choice.turns * choice.replicates
     scatter, bias, gaps = dict(model.scatter), dict(model.bias), model.gaps
     for name, figure in quantities_of(result).items():
@@ -257,8 +259,8 @@ def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult
 def _choice(model: Model, scene: Scene, rtol: float, needed: float) -> Choice:
     """At least the counted turns needed, in whole impact windows of as many replicates as are worth their transients."""
     numerics, window = scene.numerics, scene.numerics.impact_window_turns
-    each = max(WARM_UPS * numerics.warm_up_turns, PILOT_WINDOWS * window, PILOT_TURNS)
-    replicates = max(math.ceil(needed / each), FEWEST_REPLICATES)
+    shortest = max(WARM_UPS * numerics.warm_up_turns, PILOT_WINDOWS * window, PILOT_TURNS)
+    replicates = max(math.ceil(needed / shortest), FEWEST_REPLICATES)
     fewest = max(PILOT_WINDOWS, math.ceil(PILOT_TURNS / window))
     turns = max(math.ceil(needed / replicates / window), fewest) * window
     companions = math.ceil(numerics.companion_share * replicates - 1e-9)
@@ -267,7 +269,7 @@ def _choice(model: Model, scene: Scene, rtol: float, needed: float) -> Choice:
 
 
 def _noise_factor(scene: Scene, rtol: float) -> float:
-    """Total over statistical error where there is no bias: the difference from companions is noise then."""
+    """Total over statistical error without a bias, where the difference from companions is noise."""
     return math.hypot(1.0, NOISY_DIFFERENCE * _companion_noise(scene, rtol))
 
 
@@ -281,16 +283,18 @@ def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> 
     figure = FIGURES[name][0]
     squares = []
     for runs in series:
-        found = estimate([figure.moments(run) for run in runs], figure.of_sums)
+        mean = estimate([figure.moments(run) for run in runs], figure.of_sums)
         turns = sum(run.duration for run in runs) / scene.turn_s
-        if found.half_width is not None and found.value != 0.0:
-            squares.append((found.half_width / found.value) ** 2 * turns)
+        if mean.half_width is not None and mean.value != 0.0:
+            squares.append((mean.half_width / mean.value) ** 2 * turns)
     return math.sqrt(float(np.mean(squares))) / NORMAL if squares else 0.0
 
 
 def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turns: float) -> float:
-    """Relative bias over rtol: the slope of the figure over the tolerance, where that stands
-    out of its scatter; none otherwise, as the run itself will show. ``turns``: of all replicates of one pilot."""
+    """Relative bias over rtol: slope of the figure over the tolerance where that exceeds its scatter, else 0.
+
+    ``turns``: of all replicates of one pilot.
+    """
     figure = FIGURES[name][0]
     values = [estimate([figure.moments(run) for run in runs], figure.of_sums).value for runs in series]
     if values[-1] == 0.0:
@@ -302,7 +306,7 @@ def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turn
 
 
 def _along(rtol: float, ladder: Array, values: Array) -> float:
-    """Between tolerances, and beyond them as between the last two, by powers of the tolerance."""
+    """Values over the tolerance by powers of it: interpolated, and extrapolated from the two nearest."""
     x, y = np.log(ladder[::-1]), np.log(values[::-1])
     place = math.log(rtol)
     if x[0] <= place <= x[-1]:
@@ -313,7 +317,7 @@ def _along(rtol: float, ladder: Array, values: Array) -> float:
 
 
 def _shortfall(target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice) -> str:
-    """Which figure missed the target, by how much, and what limits it."""
+    """Note on the figure that missed the target most, and on what limits it."""
     unknown = [name for name, error in errors.items() if error is None]
     if unknown:
         return f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
@@ -324,5 +328,7 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
         limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"
     else:
         limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
-    what = f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %"
-    return f"{what}, and {limit}; ask for less, or run longer by numerics.turns and numerics.replicates"
+    return (
+        f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; ask "
+        "for less, or run longer by numerics.turns and numerics.replicates"
+    )

@@ -1,13 +1,12 @@
 """Ratings and fatigue life of a row of balls: Lundberg and Palmgren, ISO 281, ISO 76 and ISO/TS 16281.
 
-The factors follow the standards as they are commonly restated, not their text. f_c = 0.41 * 98.0665 * 0.95 times
-Lundberg and Palmgren's terms gives the printed table of ISO 281 within 0.1 % with both grooves at 0.52; the static
-rating is worked out from its definition (4200 MPa) instead of read from f_0.
-Lengths in m, angles in rad.
+The factors follow common restatements of the standards, not their text. f_c = 0.41 * 98.0665 * 0.95 times Lundberg and
+Palmgren's terms gives the printed table of ISO 281 within 0.1 % with both grooves at 0.52. The static rating follows from its
+definition (4200 MPa) instead of f_0. Lengths are in m, angles in rad.
 
-A race lives (Q_c/Q_e)^3 million turns, Q_c being the ball load it bears for one million, from the catalogue's C_r, and Q_e
-the equivalent of its loads; races combine by a Weibull slope of 10/9 (Sensors 2023 paper on preload, eqs 9-10).
-Lubrication, cleanliness and the fatigue limit (a_ISO) are left out.
+The life of a race is (Q_c/Q_e)^3 million turns. Q_c is the ball load for one million turns, from the catalogue's C_r; Q_e is the
+equivalent of its loads. Races combine by a Weibull slope of 10/9 (Sensors 2023 paper on preload, eqs 9-10). Lubrication,
+cleanliness and the fatigue limit (a_ISO) are left out.
 """
 
 import math
@@ -16,10 +15,10 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
-from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning
 
-# lambda of a single row: what practice falls short of the theory (ISO/TR 1281-1), and the theory's constant [N, mm].
+# lambda of a single row, the reduction of practice against theory (ISO/TR 1281-1), and the theory's constant [N, mm].
 REDUCTION = 0.95
 CAPACITY_CONSTANT = 0.41 * 98.0665
 RATING_FACTOR = 1.3  # b_m of ball bearings of contemporary steel
@@ -29,7 +28,7 @@ MOST_LOADED = 5.0  # Stribeck's Q_max Z cos(alpha)/F_r
 
 
 def groove_ratio(inner_groove_factor: float, outer_groove_factor: float) -> float:
-    """[r_i (2 r_e - D)/(r_e (2 r_i - D))]^0.41: how much the grooves favour the inner race over the outer."""
+    """[r_i (2 r_e - D)/(r_e (2 r_i - D))]^0.41: effect of the grooves on the capacity of the inner race over the outer."""
     closeness = inner_groove_factor / (2.0 * inner_groove_factor - 1.0)
     return float((closeness * (2.0 * outer_groove_factor - 1.0) / outer_groove_factor) ** 0.41)
 
@@ -53,8 +52,8 @@ def refuse_impossible(gamma: float, inner_groove_factor: float, outer_groove_fac
 def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
     """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
 
-    The standard's own table holds for 0.52; it grants a closer groove no more. Raises MethodError unless
-    0 < gamma < 1 and both factors exceed 0.5.
+    The standard's own table holds for 0.52, also for closer grooves. Raises MethodError unless 0 < gamma < 1 and both factors
+    exceed 0.5.
     """
     refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
     inner_to_outer = 1.04 * ((1.0 - gamma) / (1.0 + gamma)) ** 1.72
@@ -87,8 +86,8 @@ def dynamic_capacity(
 def static_capacity(balls: int, contact_angle: float, races: tuple[PointContact, PointContact]) -> float:
     """Basic static radial load rating C_0 [N] of a row by its definition in ISO 76, from the contacts with its ``races``.
 
-    The load that makes 4200 MPa on the most loaded ball, which bears 5 F_r/(Z cos alpha), at the race that has it first: the
-    outer one up to some D cos(alpha)/d_m = 0.09, the inner one beyond.
+    The most loaded ball bears 5 F_r/(Z cos alpha) and has 4200 MPa at the race with the higher pressure: the outer race up to
+    about D cos(alpha)/d_m = 0.09, the inner race above.
     """
     sharpest = max(float(peak_pressure(contact, 1.0)) for contact in races)
     return balls * math.cos(contact_angle) * (STATIC_PRESSURE / sharpest) ** 3 / MOST_LOADED
@@ -97,7 +96,7 @@ def static_capacity(balls: int, contact_angle: float, races: tuple[PointContact,
 LOAD_LIFE = 3.0
 WEIBULL = 10.0 / 9.0
 RACE_EXPONENT = LOAD_LIFE * WEIBULL
-# Parts of Z cos(alpha) Q_max that make the rating, when half of the balls are loaded (ISO/TS 16281).
+# Parts of Z cos(alpha) Q_max in the rating with half of the balls loaded (ISO/TS 16281).
 INNER_SHARE, OUTER_SHARE = 0.407, 0.389
 
 
@@ -112,36 +111,36 @@ def rated_capacities(
 ) -> tuple[float, float]:
     """Ball load [N] that the inner and the outer race bear for 1e6 turns: Q_ci, Q_ce of ISO/TS 16281.
 
-    From C_r [N], of a catalogue or ``dynamic_capacity``. The standard divides by cos(alpha)^0.7; Lundberg and
-    Palmgren's statics would have cos(alpha), which lets an angular contact bearing live cos(alpha)^-0.9 as long.
+    From C_r [N], of a catalogue or ``dynamic_capacity``. The standard divides by cos(alpha)^0.7. Lundberg and Palmgren's statics
+    would have cos(alpha), which multiplies the life of an angular contact bearing by cos(alpha)^-0.9.
     """
     inner_to_outer = 1.044 * ((1.0 - gamma) / (1.0 + gamma)) ** 1.72
     inner_to_outer *= groove_ratio(inner_groove_factor, outer_groove_factor)
-    each = capacity / (balls * (math.cos(contact_angle) * rows) ** 0.7)
-    inner = each / INNER_SHARE * (1.0 + inner_to_outer**RACE_EXPONENT) ** (1.0 / RACE_EXPONENT)
-    outer = each / OUTER_SHARE * (1.0 + inner_to_outer**-RACE_EXPONENT) ** (1.0 / RACE_EXPONENT)
+    ball_capacity = capacity / (balls * (math.cos(contact_angle) * rows) ** 0.7)
+    inner = ball_capacity / INNER_SHARE * (1.0 + inner_to_outer**RACE_EXPONENT) ** (1.0 / RACE_EXPONENT)
+    outer = ball_capacity / OUTER_SHARE * (1.0 + inner_to_outer**-RACE_EXPONENT) ** (1.0 / RACE_EXPONENT)
     return inner, outer
 
 
 def turning_race_load(loads: Array) -> float:
-    """Equivalent ball load [N] of the race that turns against the load, from loads (samples, Z): the cube mean."""
+    """Equivalent ball load [N] of a race that rotates relative to the load, from loads (samples, Z): the cubic mean."""
     return float(np.mean(loads**LOAD_LIFE) ** (1.0 / LOAD_LIFE))
 
 
 def standing_race_load(loads: Array) -> float:
-    """Equivalent ball load [N] of the race that stands against the load, from loads (samples, Z) at fixed places.
+    """Equivalent ball load [N] of a race at rest relative to the load, from loads (samples, Z) at fixed places.
 
-    A cube mean over the samples at each place, then a mean of the power 10/3 over the places.
+    A cubic mean over the samples at each place, then a mean of the power 10/3 over the places.
     """
     damage = np.mean(loads**LOAD_LIFE, axis=0)
     return float(np.mean(damage**WEIBULL) ** (1.0 / RACE_EXPONENT))
 
 
 def row_life(inner_load: Array, outer_load: Array, capacities: tuple[float, float], turning: Turning = "inner") -> Life:
-    """Life of a row from the loads on its balls, (Z,) or (samples, Z), on the inner and on the outer race [N].
+    """Life of a row from the loads [N] of its balls, (Z,) or (samples, Z), on the inner and the outer race.
 
-    ``capacities``: of the inner and the outer race [N], by one of the functions above. ``turning``: the rings that
-    turn against the load. Raises MethodError for arrays that do not match, or hold negative loads or NaN.
+    ``capacities``: of the inner and the outer race [N], by ``rated_capacities``. ``turning``: the rings that rotate relative to
+    the load. Raises MethodError for arrays of different shape, negative loads and NaN.
     """
     inner, outer = _loads(inner_load, "inner"), _loads(outer_load, "outer")
     if inner.shape != outer.shape:

@@ -1,6 +1,6 @@
-"""What mounting, heat and rotation do to clearances.
+"""Effect of mounting, temperature and rotation on clearances.
 
-- ``rings``: growth of a ring by fit, rotation and temperature, and of the grooves of balls
+- ``rings``: growth of rings and of the grooves of balls by fits, rotation and temperature
 - ``cage``: clearances of a cage between growing parts
 - ``fits``: both from a scene, for rollers and for balls
 """

@@ -1,8 +1,8 @@
-"""From the mounting table of a scene to rings, fits, clearances in operation, and the growth of the races of balls."""
+"""Rings, fits, operating clearances and growth of ball races from the mounting table of a scene."""
 
 from typing import Any, NamedTuple
 
-from rbdyn.base.fields import RPM
+from rbdyn.base.faults import RPM
 from rbdyn.base.records import finite
 from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
 from rbdyn.mounting.rings import (
@@ -18,7 +18,7 @@ from rbdyn.mounting.rings import (
 from rbdyn.properties.materials import Material
 from rbdyn.scene.ball import BallRow, BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials, material_of
-from rbdyn.scene.mounting import Mounting, Raceways, raceway_radii
+from rbdyn.scene.operation import Mounting, Raceways, raceway_radii
 
 
 class RunningSpeeds(NamedTuple):
@@ -39,7 +39,7 @@ def mounted_rings(
 ) -> MountedRings:
     """Rings of a scene's bearing, of rollers or balls, as mounted, at speeds [rad/s] of shaft and housing.
 
-    Raises ValueError where ``rbdyn.scene.mounting.faults`` finds any.
+    Raises ValueError where ``rbdyn.scene.operation.faults`` finds any.
     """
     reference = mounting.reference_temperature_C
     inner_rise = _rise(mounting.inner_ring_temperature_C, reference, 0.0)
@@ -76,10 +76,10 @@ def operating_clearance(
 
 
 def cage_temperature_rise(mounting: Mounting, guidance: str, rings: MountedRings) -> float:
-    """Rise of a cage above the drawing [K]: as given, else the mean of the rollers and of the ring that guides it."""
+    """Rise of a cage above the drawing [K]: stated, else the mean of the rollers and the guiding ring."""
     rollers = rings.element_temperature_rise
-    by = {"outer": rings.outer_ring.temperature_rise, "inner": rings.inner_ring.temperature_rise, "roller": rollers}
-    return _rise(mounting.cage_temperature_C, mounting.reference_temperature_C, 0.5 * (rollers + by[guidance]))
+    guides = {"outer": rings.outer_ring.temperature_rise, "inner": rings.inner_ring.temperature_rise, "roller": rollers}
+    return _rise(mounting.cage_temperature_C, mounting.reference_temperature_C, 0.5 * (rollers + guides[guidance]))
 
 
 def cage_clearances(
@@ -111,10 +111,7 @@ def _rise(temperature: float | None, reference: float, otherwise: float) -> floa
 
 
 class RingPair(NamedTuple):
-    """The rings on the shaft and in the housing, with the pressures of their fits [Pa] and the balls' rise [K].
-
-    None for a ring that does not change.
-    """
+    """The rings on the shaft and in the housing (None without growth), the pressures of their fits [Pa] and the balls' rise [K]."""
 
     inner: Ring | None
     outer: Ring | None
@@ -132,7 +129,7 @@ def mounted_of(scene: BallScene) -> MountedRings | None:
 
 
 def row_change(scene: SingleRowScene) -> GrooveChange:
-    """What growth does to a single row."""
+    """Changes of a single row by growth."""
     if not changes(scene):
         return UNCHANGED
     if printed(scene):
@@ -142,9 +139,9 @@ def row_change(scene: SingleRowScene) -> GrooveChange:
 
 
 def layer_changes(scene: DoubleDeckerScene, middle_speed: float) -> tuple[GrooveChange, GrooveChange]:
-    """What growth does to the inner and to the outer row of a double-decker, its middle ring at a speed [rad/s].
+    """Changes of the inner and the outer row of a double-decker bearing by growth, its middle ring at a speed [rad/s].
 
-    The printed form knows inner ring and middle ring, each at the pitch circle of the row outside it, and no growth of the
+    The printed form has inner ring and middle ring only, each at the pitch circle of the row outside it. It has no growth of the
     middle ring's bore. A mounted middle ring has the mean temperature of the other two.
     """
     if not changes(scene):
@@ -164,7 +161,7 @@ def layer_changes(scene: DoubleDeckerScene, middle_speed: float) -> tuple[Groove
 
 
 def changes(scene: BallScene) -> bool:
-    """Whether the scene asks for any growth."""
+    """Whether the scene includes growth."""
     return scene.model.ring_expansion or scene.mounting is not None
 
 
@@ -174,7 +171,7 @@ def printed(scene: BallScene) -> bool:
 
 
 def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str, Any]:
-    """What is reported of growth and fits; empty where the scene asks for none."""
+    """Growth and fits as reported; empty for a scene without growth."""
     if not changes(scene):
         return {}
     record: dict[str, Any] = {"ring_growth_um": {name: 1e6 * change.radial for name, change in names.items()}}
@@ -198,7 +195,7 @@ def _pair(scene: BallScene) -> RingPair:
     (below, above), (inner_speed, outer_speed) = scene.outermost_rows, scene.operation.speeds
     inner_race, outer_race = raceway_radii(scene.bearing)
     inner = outer = None
-    # A standing ring does not grow, and its bore or outside need not be known.
+    # A ring at rest does not grow, so its bore or outside diameter may be missing.
     if inner_speed != 0.0:
         assert below.bore is not None
         inner = Ring(0.5 * below.bore, inner_race, scene.material("inner_ring"), speed=inner_speed)

@@ -1,12 +1,14 @@
-"""Growth of bearing rings by fits, rotation and temperature, and what it leaves of a clearance or makes of the grooves of balls.
+"""Growth of rings by fits, rotation and temperature, and its effect on clearances and on the grooves of balls.
 
-Rings are thick cylinders of one length in plane stress, shaft and housing too: flanges, grooves and shoulders are left out.
-Radii are of the drawing; growths are radial, clearances and interferences diametral [m]. The ring of a ball bearing lies between
-its bore and the circle on which balls touch its race at the nominal angle; a middle ring lies between two such circles.
+Radii are those of the drawing; growths are radial, clearances and interferences diametral [m].
 
-Hu et al. (paper on the contact angle of a double-decker bearing, eq 4) take a free annulus at its outer radius, with the
-*pitch* diameter in place of the race's; the factor 1/(32 E) is missing in print. ``printed_growth`` keeps that form for
-comparison. It overstates the growth, as pitch circles lie outside inner races, and it knows no growth of a bore: their
+Rings, shaft and housing are thick cylinders of one length in plane stress; flanges, grooves and shoulders are left out. The
+ring of a ball bearing lies between its bore and the circle of contact on its race at the nominal angle. A middle ring lies
+between two such circles.
+
+Hu et al. (paper on the contact angle of a double-decker bearing, eq 4) use a free annulus at its outer radius. They put the
+*pitch* diameter for that of the race, and the factor 1/(32 E) is missing in print. ``printed_growth`` keeps that form for
+comparison. It overestimates the growth, since pitch circles lie outside inner races. It has no growth of a bore either: their
 eq 18 lacks that of the middle ring's inner race.
 """
 
@@ -46,7 +48,7 @@ class Ring:
         return radius * (uniform + sheared) / (self.material.elastic_modulus * (b**2 - a**2))
 
     def rotation_growth(self, radius: float) -> float:
-        """Growth at ``radius`` [m] of the ring turning free (Timoshenko and Goodier, rotating disk).
+        """Growth at ``radius`` [m] of the free rotating ring (Timoshenko and Goodier, rotating disk).
 
         u = rho w^2 r/(8E) [(3+nu)(1-nu)(a^2+b^2) + (1+nu)(3+nu) a^2 b^2/r^2 - (1-nu^2) r^2].
         """
@@ -74,16 +76,16 @@ class Ring:
 
 
 def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
-    """Pressure [Pa] between two fitted rings at their temperature and speed; 0 where the fit has come loose.
+    """Pressure [Pa] between two fitted rings at their temperature and speed; 0 for a loose fit.
 
-    ``interference``: diametral, at the temperature of the drawing and at rest [m], positive tight. From
-    compatibility: growth of the outer bore less growth of the inner outside is half the interference.
-    Raises MethodError when the rings do not share the nominal radius.
+    ``interference``: diametral, at rest and at the temperature of the drawing [m], positive for a tight fit. Compatibility: the
+    growth of the outer bore less that of the inner outside diameter is half the interference. Raises MethodError where the rings
+    do not share the nominal radius.
     """
     if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
         raise MethodError(
-            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit; give the "
-            "nominal radius to both and the rest as interference"
+            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit; give both "
+            "the nominal radius, and the difference as interference"
         )
     radius = outer.inner_radius
     overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
@@ -92,11 +94,10 @@ def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
 
 
 def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
-    """Speed [rad/s] of both rings together at which their fit comes loose, whatever speeds they have themselves.
+    """Common speed [rad/s] of both rings at which their fit becomes loose, whatever their own speeds.
 
-    Rotation widens the outer more: overlap at rest = (difference of the growths at 1 rad/s) times speed^2. 0 where the
-    fit is loose at rest, infinite where the inner ring grows as much as the outer. Raises MethodError as
-    ``interface_pressure``.
+    The outer ring grows more: overlap at rest = (difference of the growths at 1 rad/s) times speed^2. 0 for a fit that is loose
+    at rest; infinite where the inner ring grows as much. Raises MethodError as ``interface_pressure``.
     """
     if interface_pressure(replace(inner, speed=0.0), replace(outer, speed=0.0), interference) == 0.0:
         return 0.0
@@ -108,9 +109,10 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
 
 @dataclass(frozen=True)
 class MountedRings:
-    """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive tight.
+    """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive for a tight fit.
 
-    ``inner_ring`` ends at its raceway outside, ``outer_ring`` at its raceway inside; each turns at its own speed. ``element_temperature_rise``: of balls or rollers above the drawing [K].
+    The outer radius of ``inner_ring`` and the inner radius of ``outer_ring`` are those of the raceways. Each ring has its own
+    speed. ``element_temperature_rise``: of balls or rollers above the drawing [K].
     """
 
     shaft: Ring
@@ -123,7 +125,7 @@ class MountedRings:
 
     @property
     def inner_pressure(self) -> float:
-        """Pressure between shaft and inner ring [Pa]; 0 where rotation or heat has loosened the fit."""
+        """Pressure between shaft and inner ring [Pa]; 0 where rotation or temperature loosens the fit."""
         return interface_pressure(self.shaft, self.inner_ring, self.inner_interference)
 
     @property
@@ -139,10 +141,10 @@ class MountedRings:
 
 @dataclass(frozen=True)
 class MountedClearance:
-    """Where the clearance goes. Changes of the diametral clearance [m], negative where they take some.
+    """Diametral clearance and its changes [m], negative for a reduction.
 
-    ``operating`` is the sum of ``initial`` and the four changes. The fits count with the pressures [Pa] that
-    temperature and rotation leave them; temperature and rotation count as if the rings were free.
+    ``operating`` is the sum of ``initial`` and the four changes. Fits have the pressures [Pa] after temperature and rotation.
+    The changes by temperature and rotation are those of free rings.
     """
 
     initial: float
@@ -158,14 +160,14 @@ class MountedClearance:
 def mounted_clearance(
     initial: float, rings: MountedRings, roller_diameter: float, roller_material: Material
 ) -> MountedClearance:
-    """Diametral clearance of a mounted roller bearing as it runs, from ``initial`` of the loose parts [m].
+    """Operating diametral clearance of a mounted roller bearing, from the ``initial`` one before mounting [m].
 
     Raises MethodError as ``interface_pressure``.
     """
     inner_pressure, outer_pressure = rings.inner_pressure, rings.outer_pressure
     inner, outer = rings.inner_ring, rings.outer_ring
     inner_race, outer_race = inner.outer_radius, outer.inner_radius
-    # A growth takes its double from a diameter; each roller stands in the gap twice across the bearing.
+    # A radial growth counts twice in a diameter, and two rollers lie across the bearing.
     inner_fit = -2.0 * inner.pressure_growth(inner_race, inside=inner_pressure)
     outer_fit = 2.0 * outer.pressure_growth(outer_race, outside=outer_pressure)
     rollers = 2.0 * roller_material.thermal_expansion * rings.element_temperature_rise * roller_diameter
@@ -179,9 +181,9 @@ def mounted_clearance(
 
 
 class GrooveChange(NamedTuple):
-    """What growth does to a row [m].
+    """Changes of a row by growth [m].
 
-    ``radial``: the inner groove centre moves outward against the outer one. ``inner_reach, outer_reach``: change of
+    ``radial``: outward shift of the inner groove centre relative to the outer one. ``inner_reach, outer_reach``: change of
     groove radius less ball radius.
     """
 
@@ -216,12 +218,12 @@ def groove_change(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> GrooveChange:
-    """What rotation, heat and fits of both rings do to a row of balls between them.
+    """Changes of a row of balls by rotation, temperature and fits of both rings.
 
-    ``inner`` ends at its race outside, ``outer`` at its race inside; None for a ring that stays as it is. ``inner_pressure`` on the bore of the inner ring,
-    ``outer_pressure`` on the outside of the outer one [Pa]. ``groove_factors``: groove radius over ball diameter, inner
-    and outer. The groove centre moves as the circle of contact does, at the unloaded ``contact_angle`` [rad], and by the heat
-    of its groove radius.
+    The outer radius of ``inner`` and the inner radius of ``outer`` are those of the races; None for a ring without changes.
+    ``inner_pressure`` acts on the bore of the inner ring, ``outer_pressure`` on the outside of the outer ring [Pa].
+    ``groove_factors``: groove radius over ball diameter, inner and outer. The groove centre moves with the circle of contact at
+    the unloaded ``contact_angle`` [rad], and by the thermal growth of its groove radius.
     """
     inner_radius, outer_radius = (factor * ball_diameter for factor in groove_factors)
     ball = 0.5 * ball_diameter * ball_material.thermal_expansion * ball_temperature_rise

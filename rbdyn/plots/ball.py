@@ -13,11 +13,11 @@ from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Lin
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import BallResult
-    from rbdyn.quasistatic.sweep.result import SweepResult
+    from rbdyn.quasistatic.sweep import SweepResult
 
 
 Balls = Sequence[Mapping[str, float]]
-# How far the grooves are drawn to either side of the radial line [rad]; shoulders are not part of a scene.
+# Extent of the grooves in the drawing to either side of the radial line [rad]; a scene has no shoulders.
 GROOVE = math.radians(62.0)
 RING_FILL = "#E4E4E4"
 LINE: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2}
@@ -30,8 +30,8 @@ RINGS = {
 
 
 def pictures(result: "BallResult", folder: Path) -> list[str]:
-    """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none where nothing was found."""
-    if not result.found:
+    """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none without an equilibrium."""
+    if not result.is_equilibrium:
         return []
     rows = {f"{name} row" if name else "": row.balls for name, row in result.row_reports.items()}
     loads(rows, folder / "loads.png")
@@ -51,7 +51,7 @@ def closed(values: Array) -> Array:
 
 
 def loads(rows: Mapping[str, Balls], path: Path) -> None:
-    """Contact loads around each row, azimuth 0 (the direction of x) below; what lies between the races' is centrifugal."""
+    """Contact loads around each row, azimuth 0 (the direction of x) below; the difference between the races is centrifugal."""
     figure = plt.figure(figsize=(5.2 * len(rows), 5.2))
     for place, (title, balls) in enumerate(rows.items(), 1):
         axis: Any = figure.add_subplot(1, len(rows), place, projection="polar")
@@ -163,7 +163,7 @@ def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, sid
     axis.text(*place, words, color=colour, fontsize=9, ha=side_of, va="center", zorder=6)
 
 
-# Values of a key that are drawn around the bearing, or as lines of their own.
+# Most values of a key with a line of their own around the bearing.
 MOST_LINES = 5
 STYLES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 # Column of a map, its label, and whether it spans decades.
@@ -188,14 +188,14 @@ def sweep_pictures(result: "SweepResult", folder: Path) -> list[str]:
     shape = result.shape
     if not any(status == "ok" for status in result.statuses) or len(shape) > 2 or shape[-1] < 2:
         return []
-    drawn = {"angles.png": angles_over_key, "pressure_and_life.png": pressure_and_life, "stiffness.png": stiffness}
+    drawings = {"angles.png": angles_over_key, "pressure_and_life.png": pressure_and_life, "stiffness.png": stiffness}
     if len(shape) == 2 and shape[0] > MOST_LINES:
-        drawn = {"map.png": maps}
+        drawings = {"map.png": maps}
     elif len(shape) == 1 and result.figures:
-        drawn["azimuth.png"] = azimuth
-    for name, draw in drawn.items():
+        drawings["azimuth.png"] = azimuth
+    for name, draw in drawings.items():
         draw(result, folder / name)
-    return list(drawn)
+    return list(drawings)
 
 
 def label(key: str) -> str:
@@ -260,14 +260,14 @@ def azimuth(result: "SweepResult", path: Path) -> None:
     """Contact angles of every ball at some values of the key: inner above, outer below."""
     (key, values), solved = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
     places = [place for place, good in enumerate(solved) if good]
-    shown = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, MOST_LINES).round().astype(int))]
-    balls = [result.balls_at(place) for place in shown]
+    sample = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, MOST_LINES).round().astype(int))]
+    balls = [result.balls_at(place) for place in sample]
     rows = _rows(result)
     figure, axes = plt.subplots(2, len(rows), figsize=(5.8 * len(rows), 6.4), squeeze=False, sharex=True)
-    shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, len(shown)))
+    shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, len(sample)))
     for title, name, pair in zip(rows, result.figures, axes.T, strict=True):
         for axis, race in zip(pair, ("inner", "outer"), strict=True):
-            for place, records, shade in zip(shown, balls, shades, strict=True):
+            for place, records, shade in zip(sample, balls, shades, strict=True):
                 angles_on(axis, records[name], {race: shade}, {race: f"{values[place]:.5g}"}, marks=".")
             axis.set_ylabel(f"{race} contact angle [°]")
         pair[0].set_xlabel("")
@@ -308,7 +308,7 @@ def _rows(result: "SweepResult") -> dict[str, str]:
 
 
 def _lines(result: "SweepResult") -> list[tuple[Array, Any, str, Callable[[str], Array]]]:
-    """The last key's values, and for each value of the first of two: style, name, and what picks a column."""
+    """Values of the last key, and for each value of the first of two: style, name, and the selection of a column."""
     keys = list(result.keys.items())
     x = np.array(keys[-1][1], dtype=np.float64)
 

@@ -1,11 +1,11 @@
-"""The bearing at one moment as circles, lines and arrows, its clearances magnified so that they can be seen, and the page that plays it.
+"""The bearing at one moment as circles, lines and arrows, with visible clearances, and the page that plays it.
 
-Clearances are a thousandth of the rollers. So every deviation from the ideal place (roller in the middle of its pocket
-and half-way between the raceways, cage and inner ring in the middle) is drawn ``magnification`` times too large, and
-so is every play; rollers are drawn smaller than they are to make room. Then what touches in the bearing touches in
-the drawing. The outer ring's centre is the origin. Paper coordinates: u to the right, v down, the load points down.
+Clearances are a thousandth of the rollers. So the drawing magnifies every play and every deviation from the ideal place by
+``magnification``. At the ideal place a roller is in the middle of its pocket and half-way between the raceways. Cage and
+inner ring are in the middle. Rollers are smaller than in reality to make room. Bodies that touch in the bearing touch in the
+drawing. The centre of the outer ring is the origin. Paper coordinates: u to the right, v down, the load points down.
 
-The page is HTML: no file next to it, nothing fetched, readable on paper.
+The page is one HTML file that fetches nothing and is readable on paper.
 """
 
 import html
@@ -18,18 +18,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.dynamics.motion.orbit import largest
+from rbdyn.dynamics.motion import largest
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.motion.history import History
+    from rbdyn.dynamics.motion import History
 
 
-# Of the true roller radius, and of the drawn one.
+# Radius of a roller in the drawing over the true one; half-width of the cage and of a ring over that.
 ROLLER_SHARE, CAGE_SHARE, RING_SHARE = 0.62, 0.4, 0.45
 # The longest arrows, in pitch radii.
 RACE_ARROW, CAGE_ARROW = 0.32, 0.32
 TIDY = (1.0, 2.0, 5.0)
-# Of a history, what is drawn as it was sampled.
+# Columns of a history that go into the drawing unchanged.
 AS_SAMPLED = ("time", "inner_angle", "cage_angle", "outer_load", "inner_load", "pocket_load", "land_load")
 
 
@@ -53,7 +53,7 @@ class Reference(NamedTuple):
 
 @dataclass(frozen=True)
 class Drawing:
-    """Sizes [mm] of what is drawn, and its motion: (frames,) or (frames, rollers); deviations in mm, angles in rad."""
+    """Sizes [mm] and motion: (frames,) or (frames, rollers); deviations in mm, angles in rad."""
 
     rollers: int
     pitch: float
@@ -92,14 +92,14 @@ class Drawing:
 
     @property
     def extent(self) -> float:
-        """Half the side of a square that holds all [mm]."""
+        """Half the side of a square around everything [mm]."""
         gap = self.largest_magnification * max(self.outer_gap, 0.0)
         return 1.03 * (self.pitch + (1.0 + RING_SHARE) * self.roller + gap + RACE_ARROW * self.pitch)
 
     @property
     def references(self) -> list[Reference]:
-        """Arrows at the lower left that separate force from length."""
-        left = -0.97 * self.extent
+        """Arrows at the lower left, the scales of forces."""
+        u = -0.97 * self.extent
         arrows = []
         for line, (role, words, longest, scale) in enumerate(
             (
@@ -110,8 +110,8 @@ class Drawing:
         ):
             down = self.extent * (0.83 + 0.07 * line)
             force = tidy(0.8 * longest * self.pitch * scale)
-            arrow = Shape("arrow", role, [(left, down), (left + force / scale, down)])
-            arrows.append(Reference(arrow, f"{words}, {force:g} N", left + 0.3 * self.pitch, down))
+            arrow = Shape("arrow", role, [(u, down), (u + force / scale, down)])
+            arrows.append(Reference(arrow, f"{words}, {force:g} N", u + 0.3 * self.pitch, down))
         return arrows
 
 
@@ -185,14 +185,14 @@ def _sizes(history: "History") -> dict[str, Any]:
 
 
 def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
-    """What is to be drawn, back to front."""
+    """Shapes of one frame, back to front."""
     m = magnification
     outer = d.pitch + d.roller + m * d.outer_gap
     inner = d.pitch - d.roller - m * d.inner_gap
     thick = RING_SHARE * d.roller
     cage = (m * float(d.cage_x[frame]), m * float(d.cage_y[frame]))
     ring = (m * float(d.ring_x[frame]), m * float(d.ring_y[frame]))
-    drawn = [
+    items = [
         Shape("circle", "ring", [(0.0, 0.0)], outer + thick),
         Shape("circle", "space", [(0.0, 0.0)], outer),
         Shape("circle", "ring", [_paper(ring)], inner),
@@ -202,20 +202,20 @@ def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
         ((0.0, 0.0), outer + 0.5 * thick, d.outer_angle[frame]),
         (ring, inner - 0.8 * thick, d.inner_angle[frame]),
     ):
-        drawn.append(Shape("circle", "mark", [_paper(_polar(middle, radius, float(angle)))], 0.3 * thick))
+        items.append(Shape("circle", "mark", [_paper(_polar(middle, radius, float(angle)))], 0.3 * thick))
     land = d.pitch + d.guide_side * (d.cage_half + m * d.guide_gap)
     if d.guide_side:
-        drawn.append(Shape("circle", "land", [_paper((0.0, 0.0) if d.guide_side > 0.0 else ring)], land))
-    drawn += [Shape("polygon", "cage", bar) for bar in _bars(d, frame, m, cage)]
+        items.append(Shape("circle", "land", [_paper((0.0, 0.0) if d.guide_side > 0.0 else ring)], land))
+    items += [Shape("polygon", "cage", bar) for bar in _bars(d, frame, m, cage)]
     for side in (-1.0, 1.0):
-        drawn.append(Shape("circle", "rim", [_paper(cage)], d.pitch + side * d.cage_half))
+        items.append(Shape("circle", "rim", [_paper(cage)], d.pitch + side * d.cage_half))
     arrows = []
     for j in range(d.rollers):
         angle = float(d.cage_angle[frame] + 2.0 * np.pi * j / d.rollers + m * d.ahead[frame, j] / d.pitch)
         centre = _polar((0.0, 0.0), d.pitch + m * float(d.out[frame, j]), angle)
         spoke = _polar(centre, 0.8 * d.roller, float(d.spin[frame, j]))
-        drawn.append(Shape("circle", "roller", [_paper(centre)], d.roller))
-        drawn.append(Shape("line", "spoke", [_paper(centre), _paper(spoke)]))
+        items.append(Shape("circle", "roller", [_paper(centre)], d.roller))
+        items.append(Shape("line", "spoke", [_paper(centre), _paper(spoke)]))
         for role, load, touch, away in (
             ("outer_force", d.outer_load, d.roller, 1.0),
             ("inner_force", d.inner_load, -d.roller, -1.0),
@@ -230,13 +230,13 @@ def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
             arrows.append(Shape("arrow", "cage_force", [_paper(centre), _paper(tip)]))
     if d.land_load[frame] > 0.0:
         arrows.append(_land_arrow(d, frame, cage, ring))
-    return drawn + arrows
+    return items + arrows
 
 
 def _land_arrow(d: Drawing, frame: int, cage: tuple[float, float], ring: tuple[float, float]) -> Shape:
     """Force of the land on the cage, where they touch."""
     middle = (0.0, 0.0) if d.guide_side > 0.0 else ring
-    # Away from the guide's centre the cage meets an outer land; an inner one it meets on the other side.
+    # The cage touches an outer land away from the centre of the guide, an inner land on the other side.
     angle = math.atan2(cage[1] - middle[1], cage[0] - middle[0]) + (math.pi if d.guide_side < 0.0 else 0.0)
     touch = d.pitch + d.guide_side * d.cage_half
     tail = touch + d.guide_side * float(d.land_load[frame]) / d.cage_scale
@@ -283,7 +283,7 @@ def player_html(history: "History") -> str:
     picture = drawing(history, TURNS, FRAMES_PER_TURN, most_frames)
     record = json.dumps(motion_record(history, picture), separators=(",", ":"), allow_nan=False)
     page = TEMPLATE.read_text(encoding="utf-8").replace("{{BEARING}}", BEARING.read_text(encoding="utf-8"))
-    # Data last, so that nothing in it can be taken for a mark to be replaced.
+    # Data last, so that no mark inside it is replaced.
     return page.replace("{{FIRST_FRAME}}", _svg(picture)).replace("{{DATA}}", record.replace("<", "\\u003c"))
 
 
@@ -304,10 +304,10 @@ def motion_record(history: "History", d: Drawing) -> dict[str, Any]:
             )
         },
         "references": [
-            [*(round(x, 3) for place in each.arrow.points for x in place), each.words, round(each.u, 3)]
-            for each in d.references
+            [*(round(x, 3) for place in reference.arrow.points for x in place), reference.words, round(reference.u, 3)]
+            for reference in d.references
         ],
-        # Rounded down, so that at its upper end all still fits.
+        # Rounded down, so that everything still fits at its upper end.
         "largest_magnification": float(np.floor(d.largest_magnification * 10.0) / 10.0),
         "time_us": _numbers(d.time * 1e6, 1),
         "inner_angle": _numbers(d.inner_angle % turn, 3),
@@ -335,9 +335,9 @@ def _svg(d: Drawing) -> str:
     """The first frame as an inline picture: shown without scripts and on paper."""
     side = d.extent
     body = "".join(_element(shape) for shape in shapes(d, 0, d.magnification))
-    for each in d.references:
-        body += _element(each.arrow)
-        body += f'<text x="{each.u:.2f}" y="{each.v + 0.018 * side:.2f}">{html.escape(each.words)}</text>'
+    for reference in d.references:
+        u, v, words = reference.u, reference.v + 0.018 * side, html.escape(reference.words)
+        body += f'{_element(reference.arrow)}<text x="{u:.2f}" y="{v:.2f}">{words}</text>'
     words = html.escape(f"First frame; clearances magnified {d.magnification:g} times, rollers drawn smaller.")
     return (
         f'<svg viewBox="{-side:.2f} {-side:.2f} {2 * side:.2f} {2 * side:.2f}" style="--unit:{side / 33:.4f}px" role="img" aria-label="{words}">'

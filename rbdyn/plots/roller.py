@@ -1,5 +1,6 @@
-"""Pictures of a roller bearing: how the cage moves and what hits it; load, sliding and heat around the bearing; where the power goes; cage
-slip over speed and load; and a moving picture of the bearing with its forces (GIF, or MP4 where ffmpeg is installed).
+"""Pictures of a roller bearing: motion of the cage and its impacts; load, sliding and heat around the bearing; power by loss.
+
+Also cage slip over speed and load, and a moving picture of the bearing with its forces (GIF, or MP4 with ffmpeg).
 """
 
 from collections.abc import Mapping
@@ -10,19 +11,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
-from rbdyn.dynamics.motion import orbit
+from rbdyn.dynamics import motion
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.motion.history import History
+    from rbdyn.dynamics.motion import History
     from rbdyn.dynamics.slip_map import SlipMap
 
 SHOWN_POCKETS = 3
 POCKET_COLOURS = (BLUE, ORANGE, GREEN)
-# Above this many times the cage speed a whirl spectrum holds only noise.
+# Above this many times the cage speed a whirl spectrum has only noise.
 SHOWN_ORDERS = 30.0
-# Losses below this share of the whole are left out of the bars.
+# Losses below this share of the whole get no bar.
 SMALLEST_SHARE = 1e-4
 
 
@@ -95,7 +96,7 @@ def forces(history: "History", path: Path) -> None:
     figure, axes = plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
     pockets = axes[0, 0]
     _draw_pockets(pockets, history)
-    hit = orbit.largest(history, history.pocket_load)
+    hit = motion.largest(history, history.pocket_load)
     sample = int(np.argmin(np.abs(history.time - hit.time)))
     sign = -1.0 if hit.roller is not None and history.pocket_load[sample, hit.roller] < 0.0 else 1.0
     _mark(pockets, history, hit, sign, f"{hit.force:.4g} N, pocket {(hit.roller or 0) + 1}")
@@ -105,7 +106,7 @@ def forces(history: "History", path: Path) -> None:
         land.plot(history.time * 1e3, history.land_load, linewidth=0.8, color=BLUE)
         land.set_ylabel("dry load of the\nguide land [N]")
         plain(land)
-        hit = orbit.largest(history, history.land_load)
+        hit = motion.largest(history, history.land_load)
         _mark(land, history, hit, 1.0, f"{hit.force:.4g} N")
     elif history.scene.guide_clearance_m is not None:
         pockets.set_title("the guide land is never touched", fontsize=9, color=GREY, loc="left")
@@ -113,7 +114,7 @@ def forces(history: "History", path: Path) -> None:
     save(figure, path)
 
 
-def _mark(axis: Axes, history: "History", hit: orbit.Largest, sign: float, words: str) -> None:
+def _mark(axis: Axes, history: "History", hit: motion.Largest, sign: float, words: str) -> None:
     axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=VERMILION, markersize=7)
     late = hit.time > 0.75 * history.time[-1]
     axis.annotate(f"largest: {words}", (hit.time * 1e3, sign * hit.force), xytext=(-10 if late else 10, -3),
@@ -124,13 +125,13 @@ def _mark(axis: Axes, history: "History", hit: orbit.Largest, sign: float, words
 
 def whirl(history: "History", path: Path) -> None:
     """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
-    edges, density = orbit.whirl_histogram(history)
-    quantiles = orbit.whirl_quantiles(history)
+    edges, density = motion.whirl_histogram(history)
+    quantiles = motion.whirl_quantiles(history)
     figure, axis = plt.subplots(figsize=(6.4, 4.0))
     axis.stairs(density, edges, fill=True, color=SKY)
     axis.axvspan(quantiles[0.25], quantiles[0.75], color=GREY, alpha=0.15, linewidth=0, label="middle half")
     axis.axvline(quantiles[0.5], color=BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
-    mean = orbit.whirl_ratio(history)
+    mean = motion.whirl_ratio(history)
     axis.axvline(mean, color=VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
     axis.set(xlabel="whirl speed of the cage centre over mean cage speed [-]", ylabel="probability density [-]")
     plain(axis)
@@ -144,7 +145,7 @@ def section(history: "History", path: Path) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9.6, 5.4))
     turns: tuple[Literal["shaft", "cage"], ...] = ("shaft", "cage")
     for axis, turn_of in zip(axes, turns, strict=True):
-        place_x, place_y = orbit.poincare(history, turn_of)
+        place_x, place_y = motion.poincare(history, turn_of)
         axis.plot(x, y, linewidth=0.4, color=SKY, alpha=0.7, label="orbit")
         marks = axis.scatter(place_x * 1e6, place_y * 1e6, c=np.arange(len(place_x)), cmap="viridis", s=22, zorder=3)
         _plane(axis)
@@ -155,19 +156,19 @@ def section(history: "History", path: Path) -> None:
 
 def spectra(history: "History", path: Path) -> None:
     """Amplitude spectra of cage eccentricity and cage speed; cage, shaft and roller-passing frequency marked."""
-    cage = abs(orbit.mean_cage_speed(history)) / (2.0 * np.pi)
+    cage = abs(motion.mean_cage_speed(history)) / (2.0 * np.pi)
     passing = cage * history.scene.bearing.rollers
     lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
     signals = (
-        (orbit.spectrum(history, orbit.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
-        (orbit.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
+        (motion.spectrum(history, motion.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
+        (motion.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
     )
     reach = min(SHOWN_ORDERS * cage, float(signals[0][0].frequency[-1]))
     for axis, (spectrum, factor, name, unit) in zip(axes, signals, strict=True):
-        shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= reach)
-        amplitude = factor * spectrum.amplitude[shown]
-        axis.semilogy(spectrum.frequency[shown] * 1e-3, amplitude, color=BLUE, linewidth=1.0)
+        visible = (spectrum.frequency > 0.0) & (spectrum.frequency <= reach)
+        amplitude = factor * spectrum.amplitude[visible]
+        axis.semilogy(spectrum.frequency[visible] * 1e-3, amplitude, color=BLUE, linewidth=1.0)
         for colour, (_, frequency) in zip((GREEN, ORANGE, VERMILION), lines.items(), strict=True):
             axis.axvline(frequency * 1e-3, color=colour, linewidth=0.9, linestyle="--", zorder=1)
         axis.set_ylabel(f"amplitude of the\n{name} [{unit}]")
@@ -180,7 +181,7 @@ def spectra(history: "History", path: Path) -> None:
 
 
 def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, colour: str, label: str) -> None:
-    profile = orbit.against_azimuth(history, values)
+    profile = motion.against_azimuth(history, values)
     degrees = np.degrees(profile.azimuth)
     axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
     axis.plot(degrees, factor * profile.mean, color=colour, linewidth=1.4, label=label)
@@ -189,7 +190,7 @@ def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, c
 
 
 def roller_loads(history: "History", path: Path) -> None:
-    """Load of a roller on both races against azimuth: mean, and the band that holds nine tenths."""
+    """Load of a roller on both races against azimuth: mean, and the band of nine tenths."""
     figure, axis = plt.subplots(figsize=(7.0, 4.2))
     _around(axis, history, history.outer_load, 1.0, OUTER, "outer race")
     _around(axis, history, history.inner_load, 1.0, INNER, "inner race")
@@ -202,7 +203,7 @@ def roller_loads(history: "History", path: Path) -> None:
 def sliding(history: "History", path: Path) -> None:
     """Slip, pressure times sliding speed, and heat at both races against azimuth."""
     figure, axes = plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
-    pressed = orbit.pressure_velocity(history, "outer"), orbit.pressure_velocity(history, "inner")
+    pressed = motion.pressure_velocity(history, "outer"), motion.pressure_velocity(history, "inner")
     panels = (
         ("slip: ring less\nroller surface [m/s]", 1.0, history.outer_slip, history.inner_slip),
         ("Hertz pressure ×\nsliding speed [MPa·m/s]", 1e-6, pressed[0], pressed[1]),
@@ -219,12 +220,12 @@ def sliding(history: "History", path: Path) -> None:
 
 
 def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
-    """Mean power [W] of each loss, largest on top; what is less than a ten-thousandth of all is left out."""
+    """Mean power [W] of each loss, largest on top, without those below a ten-thousandth of all."""
     whole = sum(abs(power) for power in terms.values())
-    shown = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * whole}
-    names = sorted(shown, key=lambda term: shown[term])
+    largest = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * whole}
+    names = sorted(largest, key=lambda term: largest[term])
     figure, axis = plt.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
-    bars = axis.barh([name.replace("_", " ") for name in names], [shown[name] for name in names], color=BLUE)
+    bars = axis.barh([name.replace("_", " ") for name in names], [largest[name] for name in names], color=BLUE)
     axis.bar_label(bars, fmt="%.3g", padding=3, fontsize=9)
     axis.set_xlabel(f"mean power lost [W], {sum(terms.values()):.4g} W in all")
     axis.margins(x=0.12)

@@ -1,11 +1,12 @@
-"""Properties by name.
+"""Properties of materials, oils, tolerances and catalogue bearings by name.
 
-- ``materials``: elastic constants, density, expansion
-- ``lubricants``: an oil, and jet oils over temperature; ``oils``: grades and data sheets
+- ``materials``: elastic constants, density and expansion of solids; jet oils over temperature
+- ``oils``: grades and data sheets
 - ``tolerances``: limits of shafts, housings and rings (ISO 286, ISO 492), and the interference of a ring on its seat
-- ``catalogue``: what a designation says of a bearing, and what is inside it
+- ``catalogue``: designations, boundary dimensions, and the estimated interior of a bearing
+- ``drawing``: what a drawing of one's own leaves open
 
-Tables of numbers stand as CSV and TOML in this folder; ``table`` reads the former.
+Tables of numbers are CSV and TOML files in this folder; ``table`` reads the CSV files.
 """
 
 import csv

@@ -1,27 +1,26 @@
-"""From a designation or boundary dimensions to an estimate of what is inside a bearing.
+"""Catalogue bearings: designations, boundary dimensions, and an estimate of the interior.
 
-A designation is kind, series, bore code and suffixes, each of which is read or refused. Suffixes are those of makers' catalogues
-(SKF, Schaeffler, NSK, NTN). What one says of another kind of bearing, or of two features at once, is not guessed: a suffix that no
-rule here describes is refused.
+A designation has kind, series, bore code and suffixes. Suffixes follow makers' catalogues (SKF, Schaeffler, NSK, NTN); a suffix
+without a rule here is refused, never guessed.
 
-Catalogues list boundary dimensions, load ratings and of roller bearings a raceway, not what is inside. Each rule here was
-compared with what is known; its error stands with it, and with the bearing that it makes.
+Catalogues list boundary dimensions, load ratings and a raceway of roller bearings, but not the interior. Each rule here was
+compared with published interiors and states its error.
 
-Cylindrical rollers, over the 46 sizes of ``cylindrical_rollers.csv`` that list both raceways (d, D: bore, outside diameter):
-rollers fill half of what is between the raceways, D_w = 0.547 (D - d)/2; they stand 1.22 D_w apart (18 in a NU 215, as
-published); their effective length gives C0 by ISO 76, 44 (1 - D_w/d_m) Z L D_w. C by ISO 281 is then 1.00 of the classic
-ratings and 0.87 of those that a maker raised by 15 % for cleaner steel; it cannot identify Z, which one more moves by 0.2 %.
+Cylindrical rollers, over the 46 sizes of ``cylindrical_rollers.csv`` with both raceways (d, D: bore, outside diameter): the
+roller diameter is D_w = 0.547 (D - d)/2, and the spacing is 1.22 D_w (18 rollers in a NU 215, as published). The effective
+length gives C0 by ISO 76, 44 (1 - D_w/d_m) Z L D_w. C by ISO 281 is then 1.00 of the classic ratings and 0.87 of those that a
+maker raised by 15 % for cleaner steel. C cannot identify Z: one roller more changes it by 0.2 %.
 
-Balls: read from the orders of the Timken catalogue's table A-9 (series 60, 62 and 63, 21 sizes: Z = BPFO + BPFI, and D_w/d_m
-from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO 281 and ISO 76).
+Balls: from the orders in table A-9 of the Timken catalogue (series 60, 62 and 63, 21 sizes: Z = BPFO + BPFI, and D_w/d_m from
+BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO 281 and ISO 76).
 
-Cages: a window cage that no catalogue draws is one geometry for its mass, its guide lands and the stiffness of its bars.
-It is a ring about the pitch circle, as wide as 0.95 of the bearing, with a pocket a roller. How thick it is comes from the masses
-of 77 NU bearings with brass cages in a maker's catalogue, less rings and rollers; these are scaled by the 90 of the same series
-with polyamide cages, of which they then give the listed mass (they are 1.3 to 4.6 % too heavy otherwise, for chamfers and
-undercuts). The median thickness is 0.42 roller diameters in series 10 (26 bearings; four in five lie within -13 and +21 % of it),
-0.50 in 22 (16; -30 to +33 %), 0.58 in 2, 3 and 23 (35; -19 to +26 %). Cages of polyamide and of pressed steel take the same
-shape, unchecked: their masses are lost in the rounding of the catalogue's.
+Cages: no catalogue draws them. A window cage has one geometry for its mass, its guide lands and the stiffness of its bars: a
+ring about the pitch circle with 0.95 of the bearing's width and a pocket for each roller. Its thickness comes from the masses of
+77 NU bearings with brass cages in a maker's catalogue, less rings and rollers. These are scaled so that 90 bearings of the same
+series with polyamide cages have the listed mass; without chamfers and undercuts they would be 1.3 to 4.6 % too heavy. The median
+thickness is 0.42 roller diameters in series 10 (26 bearings; four in five within -13 and +21 %), 0.50 in 22 (16; -30 to +33 %)
+and 0.58 in 2, 3 and 23 (35; -19 to +26 %). Cages of polyamide and pressed steel have the same shape, unchecked: the catalogue
+rounds too coarsely for their masses.
 """
 
 import math
@@ -34,13 +33,13 @@ from rbdyn.properties import table
 
 SHAPE = re.compile(r"(NUP|NU|NJ|NF|N)?[ -]*(\d{2,5})?(.*)", re.IGNORECASE | re.ASCII)
 LONGEST = 100  # characters of a designation
-# Between suffixes; a class of clearance or tolerance may also follow another suffix at once, as in ZZC3.
+# Separators of suffixes; a class of clearance or tolerance may also follow another suffix directly, as in ZZC3.
 BETWEEN = re.compile(r"[\s/.,-]+")
 GLUED = re.compile(r"(.+)(C[0-9N]|P[0-9])")
 ROLLERS, DEEP, ANGULAR = "cylindrical_roller", "deep_groove_ball", "angular_contact_ball"
 SERIES = {ROLLERS: ("10", "2", "22", "3", "23"), DEEP: ("618", "619", "60", "62", "63"),
           ANGULAR: ("718", "719", "70", "72", "73")}  # fmt: skip
-# Cages of cylindrical roller bearings: what guides them, what they are made of.
+# Cages of cylindrical roller bearings: guidance and material.
 CAGES = {
     "MA": ("outer", "brass"), "MAS": ("outer", "brass"), "ML": ("outer", "brass"), "MB": ("inner", "brass"),
     "M": ("roller", "brass"), "M1": ("roller", "brass"), "J": ("roller", "aisi_4340"), "F": ("roller", "aisi_4340"),
@@ -51,7 +50,7 @@ CAGES = {
 BALL_CAGES = ("M", "MA", "MB", "J", "JP", "F", "Y", "P", "PH", "T", "TN", "TN9", "TNH", "TVP", "TVP2", "TVH", "MP")
 # Contact angles [deg].
 ANGLES = {"AC": 25.0, "A5": 25.0, "A": 30.0, "B": 40.0, "C": 15.0}
-# Groups of suffixes, and why those have no effect in a scene.
+# Groups of suffixes without effect in a scene, and the reason.
 WITHOUT_EFFECT = {
     "design": "internal design",
     "ball_cage": "cage, which an equilibrium does not need",
@@ -92,7 +91,7 @@ KNOWN = {
     DEEP: "a cage (M, J, TN9), seals (2RS, 2Z), C2 to C5, P2 to P6, S0 to S4",
     ANGULAR: f"an angle ({', '.join(ANGLES)}), seals (2RS), P2 to P6, S0 to S4",
 }
-# Suffixes that change what a scene would need, and what to do.
+# Suffixes of bearings that a scene cannot represent, and the remedy.
 REFUSED = (
     (r"C[1-9N][HLMP]|C[MT]", "is a clearance range of its own; leave it out and put the clearance into the scene"),
     (r"K|K30", "is a tapered bore, whose clearances are not listed; leave it out and put the clearance into the scene"),
@@ -104,7 +103,7 @@ REFUSED = (
 
 
 class Suffix(NamedTuple):
-    """One feature that a suffix states: its group, of ``GROUPS``, what was written, and the value in it."""
+    """One feature of a suffix: its group of ``GROUPS``, the suffix as written, and the value."""
 
     group: str
     text: str
@@ -112,7 +111,7 @@ class Suffix(NamedTuple):
 
 
 class Designation(NamedTuple):
-    """A designation taken apart: kind of the scene, its letters, series, bore code, suffixes as written, what they state."""
+    """Parts of a designation: kind of the scene, letters, series, bore code, suffixes as written, and their features."""
 
     kind: str
     letters: str
@@ -123,35 +122,37 @@ class Designation(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As catalogues print it."""
+        """The designation as printed in catalogues."""
         return " ".join(filter(None, (self.letters, self.series + self.code, *self.words)))
 
     @property
     def diameter_series(self) -> str:
-        """Of ISO 15: "8", "9", "0", "2" or "3"."""
+        """Diameter series of ISO 15: "8", "9", "0", "2" or "3"."""
         return self.series[-1]
 
     @property
     def without_effect(self) -> str:
-        """Suffixes that change nothing in a scene, and why; empty where there is none."""
-        idle = [each for each in self.suffixes if each.group in WITHOUT_EFFECT]
-        return "; ".join(f"{each.value}, {WITHOUT_EFFECT[each.group]}" for each in idle)
+        """Suffixes without effect in a scene, with reasons; empty without any."""
+        idle = [suffix for suffix in self.suffixes if suffix.group in WITHOUT_EFFECT]
+        return "; ".join(f"{suffix.value}, {WITHOUT_EFFECT[suffix.group]}" for suffix in idle)
 
-    def stated(self, group: str) -> str | None:
-        """The value of a group of suffixes: "C3" of clearance; None where the designation leaves it open."""
-        return next((each.value for each in self.suffixes if each.group == group), None)
+    def value_of(self, group: str) -> str | None:
+        """The value of a group of suffixes, such as "C3" for clearance; None without such a suffix."""
+        return next((suffix.value for suffix in self.suffixes if suffix.group == group), None)
 
 
 def read_designation(text: str) -> Designation:
-    """Take a designation apart. Raises MethodError for what is none of the kinds known here, and for a suffix that is unknown,
-    changes what is not modelled, or contradicts another.
+    """Parse a designation.
+
+    Raises MethodError for another kind of bearing, and for a suffix that is unknown, contradicts another or describes a bearing
+    that a scene cannot represent.
     """
     plain = " ".join(text.split())
     shape = SHAPE.fullmatch(plain) if len(plain) <= LONGEST else None
     letters, digits, rest = ((shape.group(k) or "").upper() for k in (1, 2, 3)) if shape else ("", "", "")
     series, code = digits[:-2], digits[-2:]
-    for kind, known in SERIES.items():
-        if bool(letters) == (kind == ROLLERS) and series in known:
+    for kind, series_of_kind in SERIES.items():
+        if bool(letters) == (kind == ROLLERS) and series in series_of_kind:
             words = tuple(part for word in BETWEEN.split(rest) if word for part in _parts(word, kind))
             suffixes = tuple(suffix for word in words for suffix in _read(word, kind))
             _check(suffixes)
@@ -164,7 +165,7 @@ def read_designation(text: str) -> Designation:
 
 
 def _parts(word: str, kind: str) -> list[str]:
-    """A suffix, and classes that follow it without a mark between."""
+    """A suffix, and classes that follow it without a separator."""
     rules = (*FORMS[kind], *(pattern for pattern, _ in REFUSED))
     if (glued := GLUED.fullmatch(word)) is None or any(re.fullmatch(rule, word) for rule in rules):
         return [word]
@@ -172,7 +173,7 @@ def _parts(word: str, kind: str) -> list[str]:
 
 
 def _read(word: str, kind: str) -> Iterator[Suffix]:
-    """What a suffix states of a kind of bearing. Raises MethodError."""
+    """Features of a suffix for a kind of bearing. Raises MethodError."""
     for form in FORMS[kind]:
         if match := re.fullmatch(form, word):
             for group, value in match.groupdict().items():
@@ -180,46 +181,44 @@ def _read(word: str, kind: str) -> Iterator[Suffix]:
                     numbered = group == "clearance_number"
                     yield Suffix("clearance" if numbered else group, word, f"C{value}" if numbered else value)
             return
-    for pattern, why in REFUSED:
+    for pattern, reason in REFUSED:
         if re.fullmatch(pattern, word):
-            raise MethodError(f"suffix {word} {why}")
+            raise MethodError(f"suffix {word} {reason}")
     raise MethodError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
 
 
 def _check(suffixes: tuple[Suffix, ...]) -> None:
     """Raises MethodError for two suffixes of one group."""
     first: dict[str, Suffix] = {}
-    for each in suffixes:
-        if (other := first.setdefault(each.group, each)) is not each:
-            raise MethodError(
-                f"suffixes {other.text} and {each.text} both state the {GROUPS[each.group].partition(',')[0]}; leave "
-                "one out"
-            )
+    for suffix in suffixes:
+        if (other := first.setdefault(suffix.group, suffix)) is not suffix:
+            feature = GROUPS[suffix.group].partition(",")[0]
+            raise MethodError(f"suffixes {other.text} and {suffix.text} both state the {feature}; leave one out")
 
 
 CLEARANCE_CLASSES = ("C2", "CN", "C3", "C4", "C5")
 BORES = {"00": 10.0, "01": 12.0, "02": 15.0, "03": 17.0}
-SPACING = 1.22  # of rollers, in diameters
+SPACING = 1.22  # of rollers, in roller diameters
 # D_w over (D - d)/2; the effective length over the width, series 10 and the others.
 ROLLER_SHARE, NARROW_ROLLER_SHARE = 0.547, 0.5
 LENGTH_SHARE, NARROW_LENGTH_SHARE = 0.62, 0.43
 # Pitch diameter over the mean of bore and outside diameter.
 PITCH_SHARE = 1.01
-LARGEST_HALF_MILLIMETRE = 20.0  # rollers up to here are made in steps of half a millimetre, above of whole ones
-# D_w over D - d of balls, by diameter series; of deep groove bearings below and above 40 mm of it.
+LARGEST_HALF_MILLIMETRE = 20.0  # largest roller in steps of half a millimetre; larger ones are in whole millimetres
+# D_w over D - d of balls, by diameter series; another share for deep groove bearings with D - d from 40 mm.
 DEEP_GROOVE_SHARES = {"8": 0.27, "9": 0.28, "0": 0.29, "2": 0.295, "3": 0.295}
 LARGE_DEEP_GROOVE_SHARE, LARGE_HEIGHT = 0.31, 40.0
 ANGULAR_SHARES = {"8": 0.27, "9": 0.29, "0": 0.30, "2": 0.32, "3": 0.32}
 BALL_STEP = 25.4 / 64.0
-# Balls of a deep groove bearing fill so much of the circle when they are put in between eccentric rings [rad].
+# Angle that the balls of a deep groove bearing fill during assembly between eccentric rings [rad].
 FILLING_ANGLE = math.radians(201.0)
-# Share of a full circle of balls in angular contact bearings: of 40 degrees, and of spindles.
+# Balls of an angular contact bearing as a share of a full circle: bearings of 40 degrees, and spindle bearings.
 GENERAL_FILLING, SPINDLE_FILLING = 0.87, 0.80
 
 
 class Envelope(NamedTuple):
-    """Boundary dimensions [mm] with what a catalogue adds: ratings [N], raceways of inner and outer ring [mm], and the
-    thermal reference speed [rpm].
+    """Boundary dimensions [mm] and further entries of a catalogue: ratings [N], raceways of inner and outer ring [mm], thermal
+    reference speed [rpm].
     """
 
     bore: float
@@ -233,7 +232,7 @@ class Envelope(NamedTuple):
 
 
 class RollerInterior(NamedTuple):
-    """Estimated interior of a roller bearing [mm], and where each size comes from, with its error."""
+    """Estimated interior of a roller bearing [mm], with the source and the error of each size."""
 
     rollers: int
     roller_diameter: float
@@ -243,10 +242,13 @@ class RollerInterior(NamedTuple):
     roller_diameter_by: str
     pitch_diameter_by: str
     effective_length_by: str
+    rollers_by: str = "estimated: 1.22 roller diameters apart, +-1"
+    roller_length_by: str = "estimated: 0.1 diameters longer, +-5 %"
+    bar_width_by: str = "what the pockets leave at the pitch circle; rollers +-1 make it +-40 %"
 
 
 class BallInterior(NamedTuple):
-    """Estimated interior of a ball bearing [mm, deg]; no contact angle for a deep groove bearing, whose clearance gives it."""
+    """Estimated interior of a ball bearing [mm, deg], with sources; the clearance of a deep groove bearing gives its angle."""
 
     balls: int
     ball_diameter: float
@@ -255,10 +257,11 @@ class BallInterior(NamedTuple):
     balls_by: str
     ball_diameter_by: str
     contact_angle_by: str
+    pitch_diameter_by: str = "estimated: (d + D)/2, +-1 %"
 
 
 def envelope(named: Designation, remedy: str = "add --bore, --outside and --width in mm") -> Envelope:
-    """What the catalogue lists of a designation. Raises MethodError, with the remedy in it, where it does not."""
+    """Catalogue entry of a designation. Raises MethodError with the remedy for a size that is not listed."""
     size, bore = named.series + named.code, BORES.get(named.code, 5.0 * int(named.code))
     rollers = named.kind == "cylindrical_roller"
     for row in table("cylindrical_rollers" if rollers else "ball_bearings"):
@@ -281,8 +284,8 @@ def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
         if bore <= float(row["bore"]):
             return float(row[f"{name}_min"]), float(row[f"{name}_max"])
     raise MethodError(
-        f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm; take a smaller bearing or "
-        "another class"
+        f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm; take a smaller bearing, "
+        "another class, or give the clearance in mm"
     )
 
 
@@ -295,17 +298,17 @@ class ClearanceClass(NamedTuple):
 
 
 def classes_at(bore: float, clearance: float, kind: str) -> list[ClearanceClass]:
-    """Classes of ISO 5753-1 that hold a radial clearance [um] at a bore [mm], the one whose middle is nearest first.
+    """Classes of ISO 5753-1 that contain a radial clearance [um] at a bore [mm], sorted by distance from their middle.
 
-    Neighbours overlap; beyond C2 and C5 there is none. Raises MethodError where the table does not reach the bore.
+    Neighbours overlap; beyond C2 and C5 the list is empty. Raises MethodError for a bore beyond the table.
     """
     classes = [ClearanceClass(name, *radial_clearance(bore, name, kind)) for name in CLEARANCE_CLASSES]
-    around = [each for each in classes if each.lower <= clearance <= each.upper]
-    return sorted(around, key=lambda each: abs(clearance - 0.5 * (each.lower + each.upper)))
+    matches = [limits for limits in classes if limits.lower <= clearance <= limits.upper]
+    return sorted(matches, key=lambda limits: abs(clearance - 0.5 * (limits.lower + limits.upper)))
 
 
 def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
-    """Interior of a cylindrical roller bearing; ``narrow``: of series 10. Raises MethodError for impossible dimensions."""
+    """Interior of a cylindrical roller bearing; ``narrow``: series 10. Raises MethodError for impossible dimensions."""
     height = 0.5 * (sizes.outside - sizes.bore)
     if sizes.inner_raceway is not None and sizes.outer_raceway is not None:
         diameter = 0.5 * (sizes.outer_raceway - sizes.inner_raceway)
@@ -350,7 +353,7 @@ def ball_interior(sizes: Envelope, named: Designation) -> BallInterior:
     if deep:
         many = "estimated: what can be filled in between eccentric rings, over 201 degrees, +-1"
         return BallInterior(1 + int(FILLING_ANGLE / apart), diameter, pitch, None, many, by, "")
-    suffix = named.stated("angle")
+    suffix = named.value_of("angle")
     lead = suffix or ("B" if usual else "C")
     filling = GENERAL_FILLING if usual else SPINDLE_FILLING
     many = f"estimated: {filling:g} of a full circle, {'+-1' if usual else '+-2, and fewer where it is made for speed'}"
@@ -362,15 +365,18 @@ def _rounded(value: float, step: float) -> float:
     return round(round(value / step) * step, 4)
 
 
-# Share of the bearing's width; pocket clearance and end play of a roller in its pocket in roller diameters.
+# Width of a cage as a share of the bearing's width; pocket clearance and end play of a roller in roller diameters.
 CAGE_WIDTH, POCKET_CLEARANCE, END_PLAY = 0.95, 0.03, 0.02
 SMALLEST_CLEARANCE_MM, SMALLEST_PLAY_MM, NARROWEST_RING_MM = 0.05, 0.1, 0.5
-# Radial thickness in roller diameters, by series, and its error by the catalogue [%].
-THICKNESS, USUAL_THICKNESS = {"10": (0.42, 20), "22": (0.50, 35)}, (0.58, 25)
+# A side ring has at least this share of a bar's length; what is wider than a bar of so many roller diameters is a block.
+NARROWEST_RING_SHARE, WIDEST_BAR = 0.03, 2.0
+# Radial thickness in roller diameters, by series, and its error by the catalogue [%]; of a bearing of no series that of them all.
+NO_SERIES = ""
+THICKNESS, USUAL_THICKNESS = {"10": (0.42, 20), "22": (0.50, 35), NO_SERIES: (0.58, 40)}, (0.58, 25)
 
 
 class CageEstimate(NamedTuple):
-    """Dimensions of a cage [mm] and its volume [mm^3]; thickness in roller diameters, error of thickness and volume [%]."""
+    """Estimated dimensions of a cage [mm], volume [mm^3], thickness in roller diameters, error of thickness and volume [%]."""
 
     pocket_clearance: float
     bar_width: float
@@ -385,13 +391,15 @@ class CageEstimate(NamedTuple):
 def cage_estimate(
     series: str, width: float, rollers: int, roller_diameter: float, roller_length: float, pitch_diameter: float
 ) -> CageEstimate:
-    """Cage of a bearing of these dimensions [mm]; ``series``: "10", "2", "22", "3" or "23"."""
+    """Cage of a bearing of these dimensions [mm]; ``series``: "10", "2", "22", "3", "23" or ``NO_SERIES``."""
     clearance = max(round(POCKET_CLEARANCE * roller_diameter, 2), SMALLEST_CLEARANCE_MM)
     share, error = THICKNESS.get(series, USUAL_THICKNESS)
     thickness = round(share * roller_diameter, 3)
     circumference = math.pi * pitch_diameter
-    bar = round(circumference / rollers - roller_diameter - clearance, 3)
+    gap = round(circumference / rollers - roller_diameter - clearance, 3)
+    bar = min(gap, round(WIDEST_BAR * roller_diameter, 3))
     length = round(roller_length + max(END_PLAY * roller_diameter, SMALLEST_PLAY_MM), 3)
-    ring = max(round(0.5 * (CAGE_WIDTH * width - length), 3), NARROWEST_RING_MM)
-    volume = thickness * (2.0 * ring * circumference + rollers * bar * length)
+    narrowest = max(NARROWEST_RING_MM, round(NARROWEST_RING_SHARE * length, 3))
+    ring = max(round(0.5 * (CAGE_WIDTH * width - length), 3), narrowest)
+    volume = thickness * (2.0 * ring * circumference + rollers * gap * length)
     return CageEstimate(clearance, bar, thickness, length, ring, volume, share, error)

@@ -1,8 +1,7 @@
-"""Oils by grade or data sheet: viscosity through two points, and by base oil what data sheets leave out.
+"""Oils by grade or data sheet: viscosity through two points, and estimates by base oil for all other properties.
 
-Viscosity: ASTM D341 (Walther) through two points, the second from the viscosity index by ASTM D2270 where a grade gives
-one. Pressure coefficient: Gold et al. 2001, alpha = s nu^t. What a base oil has by default is an estimate; ``BaseOil``
-shows how far off it may be.
+Viscosity: ASTM D341 (Walther) through two points; for a grade the second point follows from the viscosity index by ASTM D2270.
+Pressure coefficient: Gold et al. 2001, alpha = s nu^t. ``BaseOil`` states the error of each estimate.
 """
 
 import functools
@@ -12,22 +11,23 @@ from typing import NamedTuple, Self
 
 from rbdyn.base.faults import MethodError
 from rbdyn.properties import table
-from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
+from rbdyn.properties.materials import ABSOLUTE_ZERO_C, Oil
 
-# ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 % of it.
+# ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 %.
 GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460)
-# Of all pressure coefficients of ``BaseOil`` next to those measured at 40 to 100 C [-].
+# Relative error of the pressure coefficients of ``BaseOil`` compared with measurements at 40 to 100 C [-].
 GOLD_SPREAD = 0.25
-DENSITY_C = 15.0  # of data sheets
+DENSITY_C = 15.0  # temperature of densities in data sheets
 
 
 class BaseOil(NamedTuple):
-    """What an oil has by its base where its grade or data sheet does not give it.
+    """Estimates of the properties of an oil by its base oil, where its grade or data sheet states none.
 
     ``gold``: s [1e-8/Pa] and t of alpha = s nu^t, nu [mm^2/s] at temperature, within 25 % (31 % for naphthenic oils).
-    ``density`` at 15 C [kg/m^3], within 3 %; it falls by ``expansion`` a kelvin, within 20 % of that. ``conductivity`` [W/(m K)], within
-    10 %; None: that of mineral oils, 0.12 (1 - 1.67e-4 C) over the specific gravity. ``heat_capacity`` [J/(kg K)], within
-    10 %; None: that of mineral oils, (1630 + 3.4 C) over its root. ``shear_ratio``: limiting shear stress over pressure.
+    ``density`` at 15 C [kg/m^3], within 3 %. ``expansion``: its relative decrease a kelvin, within 20 %. ``conductivity``
+    [W/(m K)], within 10 %; None for the 0.12 (1 - 1.67e-4 C) over the specific gravity of mineral oils. ``heat_capacity``
+    [J/(kg K)], within 10 %; None for the (1630 + 3.4 C) over the root of the specific gravity. ``shear_ratio``: limiting shear
+    stress over pressure.
     """
 
     viscosity_index: float
@@ -39,9 +39,9 @@ class BaseOil(NamedTuple):
     heat_capacity: float | None = None
 
 
-# Gold's constants and expansions as gear programs quote them, limits of shear as traction was measured (naphthenic 0.053,
-# paraffinic 0.047, PAO 0.035; ester and PAG taken as PAO: their films in gears rub alike). Indices, densities, the expansion of
-# PAG and the last two columns are usual values of data sheets.
+# Gold's constants and expansions as quoted by gear programs. Limits of shear from measured traction (naphthenic 0.053,
+# paraffinic 0.047, PAO 0.035; ester and PAG as PAO, since their films have similar friction in gears). Indices, densities, the
+# expansion of PAG and the last two columns are usual values of data sheets.
 BASE_OILS = {
     "mineral": BaseOil(95.0, (0.9904, 0.1390), 875.0, 5.7e-4, 0.047),
     "naphthenic": BaseOil(50.0, (0.9904, 0.1390), 900.0, 5.7e-4, 0.053),
@@ -50,14 +50,14 @@ BASE_OILS = {
     "PAG": BaseOil(200.0, (0.5489, 0.1485), 1020.0, 7.0e-4, 0.035, 0.16, 2000.0),
 }
 
-THINNEST, THICKEST = 2.0, 1000.0  # at 100 C [mm^2/s]; no viscosity index is defined below the first
+THINNEST, THICKEST = 2.0, 1000.0  # at 100 C [mm^2/s]; the viscosity index is undefined below the first
 BISECTIONS = 60
 
 
 class Walther(NamedTuple):
     """Kinematic viscosity over temperature: lg lg(nu + 0.7) = a - b lg T, nu in mm^2/s above 2, T in K (ASTM D341).
 
-    From 40 and 100 C down to -40 C it puts synthetic oils 1.7 to 2.2 times too high: give a point nearby.
+    Extrapolated from 40 and 100 C to -40 C it is 1.7 to 2.2 times too high for synthetic oils: use a point nearby.
     """
 
     a: float
@@ -91,7 +91,7 @@ class Fluid(NamedTuple):
     base: BaseOil
     density: float
 
-    def at(self, celsius: float) -> Oil:
+    def at_temperature(self, celsius: float) -> Oil:
         """The oil at a temperature [C]."""
         base, gravity = self.base, self.density * 1e-3
         density = self.density * (1.0 - base.expansion * (celsius - DENSITY_C))
@@ -142,13 +142,13 @@ def viscosity_at_100(at_40: float, index: float) -> float:
 
 @functools.cache
 def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
-    """An oil of an ISO viscosity grade; its index is the base oil's unless given. Raises MethodError."""
+    """An oil of an ISO viscosity grade; its index defaults to that of the base oil. Raises MethodError."""
     at_100 = viscosity_at_100(grade, base.viscosity_index if index is None else index)
     return Fluid(Walther.through((40.0, grade), (100.0, at_100)), base, base.density)
 
 
 class NamedOil(NamedTuple):
-    """An oil as it is asked for: what the scene calls it, its base oil if given, and whether it is the oil of a grease."""
+    """A requested oil: its name in a scene, its base oil if stated, and whether it is the oil of a grease."""
 
     oil: str
     base_oil: str | None = None

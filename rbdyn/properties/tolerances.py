@@ -1,15 +1,15 @@
 """Limits and fits: ISO 286 for shafts and housings up to 500 mm, ISO 492 for rings, and the interference between them.
 
-ISO 286-1:2010, Tables 1 to 5 (the same values in BS 4500:1969), and the rule of a delta of one grade for the holes K to S. The
-tables, in ``iso286.toml``, take the formulas of the standard at the geometric mean of a range of sizes and round them. The
+ISO 286-1:2010, Tables 1 to 5 (the same values are in BS 4500:1969), with the rule of a delta of one grade for the holes K to S.
+The tables in ``iso286.toml`` are rounded values of the standard's formulas at the geometric mean of a range of sizes. The
 deviations of mean bores and outside diameters of purchased rings are in ``iso492.toml``.
 
-The ring's mean bore or outside diameter lies below its nominal by up to the tolerance of ISO 492, the seat about its own by the
-class of ISO 286. Both are taken as normal, centred, six standard deviations wide: the mean interference is that of the middles,
-and the deviations add as squares.
+The mean bore or outside diameter of a ring lies below its nominal by up to the tolerance of ISO 492. The seat has the limits of
+its class in ISO 286. Both are taken as normal, centred and six standard deviations wide. So the mean interference is that of
+the middles, and the variances add.
 
-Mounting smooths the surfaces: NTN (Ball and Roller Bearings) subtracts 1 to 2.5 um from the interference of a ground shaft,
-5 to 7 um from that of a machined one, as a bore of a housing is too. A loose fit is not smoothed.
+Mounting smooths the surfaces. NTN (Ball and Roller Bearings) subtracts 1 to 2.5 um from the interference of a ground shaft, and
+5 to 7 um from that of a machined shaft. The bore of a housing is machined too. A loose fit is not smoothed.
 """
 
 import math
@@ -64,7 +64,7 @@ def fit_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     return (1e-3 * near, 1e-3 * near + width) if grows else (1e-3 * near - width, 1e-3 * near)
 
 
-def positioned(nominal_mm: float, letter: str, width_mm: float) -> tuple[float, float]:
+def position_limits(nominal_mm: float, letter: str, width_mm: float) -> tuple[float, float]:
     """Lower and upper deviation in mm of a tolerance of any width at the position of a letter.
 
     Only for letters whose fundamental deviation does not depend on the grade. Raises MethodError as ``fit_limits``.
@@ -115,11 +115,11 @@ def _hole(nominal_mm: float, letter: str, grade: int) -> float:
 
 
 def _delta(column: int, grade: int) -> float:
-    """What a hole gives back so that it fits as the shaft of the next finer grade does (sizes above 3 mm)."""
+    """Delta of a hole, by which it fits like the shaft of the next finer grade (sizes above 3 mm)."""
     if grade < 3:
         raise MethodError("is not in the standard: holes K to S begin at grade 3")
-    here, finer = (STANDARD_TOLERANCES[f"IT{each}"][column] for each in (grade, grade - 1))
-    return here - finer if column > 0 else 0.0
+    width, finer = (STANDARD_TOLERANCES[f"IT{number}"][column] for number in (grade, grade - 1))
+    return width - finer if column > 0 else 0.0
 
 
 def _listed(table: str, grade: int) -> list[float]:
@@ -134,11 +134,11 @@ CLASSES = [name for name in SURFACES["bore"] if name != "sizes_mm"]
 
 
 def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
-    """Lower and upper deviation in mm of "P5 bore", "Normal outside" and their like, of purchased bearing rings.
+    """Lower and upper deviation in mm of purchased bearing rings, such as "P5 bore" or "Normal outside".
 
-    ISO 492, mean diameter in a plane, radial bearings but tapered roller bearings; classes Normal, 6, 5 and 4. The upper
-    deviation is 0, the lower one is in ``iso492.toml``; sizes that could not be checked against several published catalogue
-    tables are left out.
+    ISO 492, mean diameter in a plane, radial bearings except tapered roller bearings; classes Normal, 6, 5 and 4. The upper
+    deviation is 0, the lower one is in ``iso492.toml``. Sizes without several published catalogue tables for comparison are
+    left out.
 
     Raises MethodError for a class, surface or size that is not listed here.
     """
@@ -156,16 +156,16 @@ def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
 
 SHAFT = re.compile(r"(g|h|js?|k|m|n|p|r)[4-7]")
 HOUSING = re.compile(r"(G|H|JS?|K|M|N|P)[5-8]")
-# Middles of what smoothing takes from ground shafts and machined bores [um].
+# Mean loss of interference by smoothing of ground shafts and machined bores [um].
 SHAFT_SMOOTHING, HOUSING_SMOOTHING = 1.75, 6.0
-# Standard deviations in the width of a tolerance.
+# Width of a tolerance in standard deviations.
 WIDTH = 6.0
 
 
 class Interference(NamedTuple):
-    """Diametral interference of a ring on its seat [um], negative is loose: mean, standard deviation and ends.
+    """Diametral interference of a ring on its seat [um], negative for a loose fit: mean, standard deviation and ends.
 
-    ``smoothing``: what smoothing has taken of each of them.
+    ``smoothing``: the loss by smoothing, already subtracted.
     """
 
     mean: float
@@ -176,7 +176,7 @@ class Interference(NamedTuple):
 
 
 def shaft_interference(bore_mm: float, zone: str) -> Interference:
-    """Of an inner ring on a shaft of a class such as "k5". Raises MethodError for a class or size that is not listed."""
+    """Interference of an inner ring on a shaft of a class such as "k5". Raises MethodError for an unlisted class or size."""
     if not SHAFT.fullmatch(zone):
         raise MethodError(
             'is no tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r, grade 4 to 7'
@@ -185,7 +185,7 @@ def shaft_interference(bore_mm: float, zone: str) -> Interference:
 
 
 def housing_interference(outside_mm: float, zone: str) -> Interference:
-    """Of an outer ring in a housing of a class such as "H7". Raises MethodError as ``shaft_interference``."""
+    """Interference of an outer ring in a housing of a class such as "H7". Raises MethodError as ``shaft_interference``."""
     if not HOUSING.fullmatch(zone):
         raise MethodError(
             'is no tolerance class of a housing such as "H7"; take G, H, J, JS, K, M, N or P, grade 5 to 8'
@@ -194,7 +194,7 @@ def housing_interference(outside_mm: float, zone: str) -> Interference:
 
 
 def _interference(inside: tuple[float, float], around: tuple[float, float], smoothing: float) -> Interference:
-    """From lower and upper deviations [mm] of the part inside and of the part around it."""
+    """Interference from lower and upper deviations [mm] of the inner and of the outer part."""
     low, high = 1e3 * (inside[0] - around[1]), 1e3 * (inside[1] - around[0])
     mean = 0.5 * (low + high)
     sd = 1e3 * math.hypot(inside[1] - inside[0], around[1] - around[0]) / WIDTH

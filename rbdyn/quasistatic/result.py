@@ -1,5 +1,7 @@
-"""What an equilibrium of a ball bearing reports, saves and loads: angles, loads, stress, contacts, film, life, and what to beware of:
-balls clear of a race, dents, steep angles, slip, a ring that tips.
+"""Results of ball bearings in equilibrium: ``BallResult`` with its reports, remarks, and columns of many equilibria.
+
+Reports hold contact angles, loads, stress, contacts, film, stiffness and life. Remarks warn of balls clear of a race, dents,
+steep angles, slip, and a ring that tips. Columns have units in their names.
 """
 
 import math
@@ -12,12 +14,12 @@ from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, outside_json, spread
 from rbdyn.base.words import Brief, Figure, counted
-from rbdyn.contact import point_film
+from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_line import BALLS, dent_sentence
-from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning, turning_rings
-from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
+from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL, dynamic_capacity, rated_capacities, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
@@ -29,12 +31,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# ISO 281 grants grooves closer than its table's no more than the table.
+# Smallest groove factor in the table of ISO 281; closer grooves get no higher rating.
 CLOSEST_RATED = 0.52
 
 
 def capacity_of(drawing: BallRow) -> float:
-    """C_r of a row [N]: the catalogue's where the drawing has it, else by ISO 281 from the dimensions."""
+    """C_r of a row [N], from the catalogue or else by ISO 281 from the dimensions."""
     if drawing.dynamic_capacity_N is not None:
         return drawing.dynamic_capacity_N
     inner, outer = (max(factor, CLOSEST_RATED) for factor in drawing.groove_factors)
@@ -53,18 +55,18 @@ def solution_life(solution: Solution, capacities: tuple[float, float], turning: 
     return row_life(solution.inner_load, solution.outer_load, capacities, turning)
 
 
-# A contact at a steeper angle lies beyond any shoulder [rad].
+# Contact angle above which a contact is beyond any shoulder [rad].
 STEEPEST = math.radians(80.0)
-# Beyond, oiled contacts slip about the axis of the gyroscopic moment.
+# Friction coefficient above which oiled contacts slip about the axis of the gyroscopic moment.
 OILED_FRICTION = 0.07
 # Makers allow angular contact bearings about this misalignment, deep groove ones up to three times as much [rad].
 TIPPED = 1e-3
-# A ball load [N] that is left over from rounding.
+# Ball load [N] below which a ball counts as unloaded.
 NO_LOAD = 1e-9
 
 
 class Rating(NamedTuple):
-    """What pressure, life and remarks need of a row next to its loads: capacities of both races [N], speeds of both rings [rad/s]."""
+    """Data of a row for pressures, life and remarks: capacities of both races [N], speeds of both rings [rad/s]."""
 
     drawing: BallRow
     model: RowModel
@@ -73,7 +75,7 @@ class Rating(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """Something unusual: in a word, at which of n points, and what to say of one of them."""
+    """A warning: its subject in a word, the mask of the points (n,) that it is about, and its sentence for each point."""
 
     word: str
     where: Mask
@@ -81,7 +83,7 @@ class Remark(NamedTuple):
     row: str = ""
 
     def sentence(self, place: int) -> str:
-        """The sentence for a point, with the row of balls that it is about where there are two."""
+        """The sentence for a point, with the row of balls in a bearing of two rows."""
         return self.row + self.say(place)
 
 
@@ -95,7 +97,7 @@ def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
 
 
 def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
-    """Points whose loads no contact can carry, and why: an ellipse as long as its groove is deep."""
+    """Points with a contact ellipse too long for its groove, and a sentence for each."""
     causes: dict[int, str] = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         loads = balls[:, :, place]
@@ -104,17 +106,21 @@ def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
         unit = np.array([getattr(rating.model, f"{race}_contact").semi_major for rating in ratings])
         half = unit * np.cbrt(loads.max(axis=1))
         for k in np.flatnonzero(half > groove).tolist():
-            ball = f"the ball at {360.0 * loads[k].argmax() / loads.shape[1]:.0f} deg would bear {loads[k].max():.4g} N"
-            why = f"over {2e3 * half[k]:.3g} mm across a groove of {1e3 * groove[k]:.3g} mm radius, which no contact can; lessen the load"
-            causes.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
+            azimuth, load = 360.0 * loads[k].argmax() / loads.shape[1], loads[k].max()
+            length, radius = 2e3 * half[k], 1e3 * groove[k]
+            causes.setdefault(
+                k,
+                f"overloaded: the ball at {azimuth:.0f} deg would carry {load:.4g} N on the {race} race over "
+                f"{length:.3g} mm in a groove of {radius:.3g} mm radius; reduce the load",
+            )
     return causes
 
 
 def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
-    """Largest friction coefficient (n,) that a contact needs to hold its part of the gyroscopic moment, 2 s M_g/(D Q)."""
+    """Largest friction coefficient (n,) that a contact needs for its share of the gyroscopic moment, 2 s M_g/(D Q)."""
     inner, outer = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
     controls = [rating.model.control for rating in ratings]
-    # One sweep has one kind of control.
+    # All points of a sweep have the same kind of control.
     if not isinstance(controls[0], FixedShare | FrictionShare):
         return np.zeros(len(ratings))
     share = np.array([[control[0]] for control in controls])
@@ -144,19 +150,19 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
     # fmt: off
     listed = [
         ("unloaded", clear == size, lambda k:
-            "no ball touches the inner race, so nothing shows where the ring is; load it or take away clearance"),
+            "no ball touches the inner race, so the position of the ring is undetermined; load the ring or reduce the clearance"),
         ("clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
         ("inner dent", inner > BALLS, lambda k: dent_sentence(float(inner[k]), BALLS, "inner")),
         ("outer dent", outer > BALLS, lambda k: dent_sentence(float(outer[k]), BALLS, "outer")),
         ("steep angle", steep, lambda k:
-            f"inner angles reach {steepest[k]:.0f} deg, beyond any shoulder: rotation throws the inner ring off its balls; "
-            "preload it axially or slow down"),
+            f"inner angles reach {steepest[k]:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
+            "preload it axially or reduce the speed"),
         ("negative angle", shouldered & (turned > 0) & ~steep, lambda k:
-            f"{turned[k]} balls bear at negative angles, where an angular contact bearing has no shoulder; turn the thrust "
-            "round, or pair the bearing"),
+            f"{turned[k]} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
+            "thrust or pair the bearing"),
         ("gyroscopic slip", needed > OILED_FRICTION, lambda k:
             f"the gyroscopic moment needs a friction coefficient of {needed[k]:.2f}, more than oil gives: the balls slip "
-            "about that axis; raise the load or lower the speed"),
+            "about its axis; raise the load or reduce the speed"),
     ]
     # fmt: on
     return [Remark(row + word, where, say, row) for word, where, say in listed]
@@ -164,25 +170,25 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
 
 def tipping(tilts: Array, scene: BallScene) -> Remark:
     """Remark on a ring that is free to tilt and does, from ``tilts`` (n, 2) [rad]."""
-    held = np.array([value is not None for value in scene.operation.given[3:]])
-    tilt = np.hypot(*np.where(held, 0.0, tilts).T)
+    rigid = np.array([value is not None for value in scene.operation.displacements[3:]])
+    tilt = np.hypot(*np.where(rigid, 0.0, tilts).T)
     # fmt: off
     return Remark("tipped ring", tilt > TIPPED, lambda k:
-        f"the free ring tips by {1e3 * tilt[k]:.2g} mrad ({math.degrees(tilt[k]) * 60.0:.0f} arc minutes), more than a shaft lets a "
-        "mounted one; set operation.tilt = 'fixed' where a shaft holds it")
+        f"the free ring tips by {1e3 * tilt[k]:.2g} mrad ({math.degrees(tilt[k]) * 60.0:.0f} arc minutes), more than a ring can on "
+        "a shaft; set operation.tilt = 'fixed' if a shaft holds the ring")
     # fmt: on
 
 
-def sentences(given: Sequence[Remark]) -> list[str]:
-    """What remarks say of the first equilibrium."""
-    return [remark.sentence(0) for remark in given if remark.where[0]]
+def sentences(entries: Sequence[Remark]) -> list[str]:
+    """Sentences of the remarks on the first equilibrium."""
+    return [remark.sentence(0) for remark in entries if remark.where[0]]
 
 
 class RowReport(Record):
-    """Equilibrium of one row, units in the names: place of its inner ring, a table a ball, and what each race bears.
+    """Equilibrium of one row, units in the names: displacement of its inner ring, figures of each ball and of each race.
 
-    ``life``: None where nothing is loaded, in hours also where nothing turns. ``searches``: starting values tried, of a solver
-    that tries some. ``reaction``: the load that the ring takes, of a bearing of this row alone.
+    ``life``: None without a load; its hours also None where nothing turns. ``searches``: starting values that the finite
+    search tried. ``reaction``: load that the ring takes, of a single-row bearing only.
     """
 
     displacement_mm: dict[str, float]
@@ -200,7 +206,7 @@ class RowReport(Record):
 
 
 class DoubleDeckerReport(Record):
-    """Equilibrium of a double-decker: of its inner ring, its middle ring and both rows."""
+    """Equilibrium of a double-decker bearing: its inner ring, its middle ring and both rows."""
 
     displacement_mm: dict[str, float]
     tilt_mrad: dict[str, float]
@@ -214,13 +220,13 @@ class DoubleDeckerReport(Record):
 
 
 class BallResult(Brief, SavedRecord, kw_only=True):
-    """Equilibrium of a ball bearing, ``scene`` the resolved input; ``status``: "ok", or why there is none.
+    """Equilibrium of a ball bearing.
 
-    ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or gives
-    a mounting. ``other_roots``: more equilibria of the same load, where they are looked for. ``runout``: of the turning ring,
-    where the command has followed it. ``rows``: the solved rows in SI, one, or the inner and the outer one of a
-    double-decker; empty for a result that was loaded or that found no equilibrium. ``ratings``: what their pressures and lives
-    rest on.
+    ``scene``: resolved input. ``status``: "ok", or the cause of the failure. ``report``: figures of the equilibrium, None
+    without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
+    equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
+    computed it. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
+    loaded result or without an equilibrium. ``ratings``: data of their pressures and lives.
     """
 
     FORMAT = "rbdyn.ball/1"
@@ -244,13 +250,13 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
         result = super().from_dict(data)
-        if result.found and result.report is None:
+        if result.is_equilibrium and result.report is None:
             raise KeyError("an equilibrium without its figures")
         return result
 
     @property
-    def found(self) -> bool:
-        """Whether an equilibrium was found."""
+    def is_equilibrium(self) -> bool:
+        """Whether there is an equilibrium."""
         return self.status == "ok"
 
     @property
@@ -262,19 +268,19 @@ class BallResult(Brief, SavedRecord, kw_only=True):
 
     @property
     def reached(self) -> RowReport | DoubleDeckerReport:
-        """What was found. Raises MethodError where nothing was."""
+        """The report. Raises MethodError without an equilibrium."""
         if self.report is None:
             raise MethodError(f"there is no equilibrium: {self.status}")
         return self.report
 
     @property
     def row_reports(self) -> dict[str, RowReport]:
-        """What was found of each row, by its name: "inner" and "outer", or "" for a single one. Raises MethodError as ``reached``."""
+        """Report of each row by name: "inner" and "outer", or "" for a single row. Raises MethodError as ``reached``."""
         report = self.reached
         return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
 
     def brief(self) -> tuple[str, list[Figure]]:
-        """Status and notes; of each row pressures, life and place, and the stiffness: exact figures of the model."""
+        """Status and number of notes; pressures and life of each row, displacement and stiffness, exact in the model."""
         figures = []
         for name, row in self.row_reports.items() if self.report else ():
             of_row = f"{name} row " if name else ""
@@ -301,7 +307,7 @@ def displacement_record(displacement: Array) -> dict[str, Any]:
 
 
 def ball_columns(balls: Array) -> dict[str, Array]:
-    """A value a ball, (n, Z) each, named as ``BallResult.table`` names them."""
+    """Figures of the balls, (n, Z) each, by the column names of ``BallResult.table``."""
     size = balls.shape[1]
     return {
         "azimuth_deg": np.broadcast_to(360.0 * np.arange(size) / size, balls.shape[:2]),
@@ -366,16 +372,16 @@ def contact_record(contact: PointContact, load: float) -> dict[str, float]:
 
 
 def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:
-    """Film of each race at its largest load, the thermal factor included, between ``rings``, the names of the inner and outer one.
+    """Film of each race at its largest load, the thermal factor included; ``rings``: names of the inner and the outer ring.
 
-    Empty where the scene has no oil, and where nothing turns or bears.
+    Empty for a scene without oil, and for races without load or rolling speed.
     """
     if scene.lubricant is None:
         return {}
     lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
     ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
     gamma = drawing.gamma
-    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
+    entrainment = point_contact.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
     oil, films = lubricant.in_service, {}
     for race, contact, ring, side, loads in (
         ("inner", model.inner_contact, inner, gamma, solution.inner_load),
@@ -384,15 +390,74 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         load = float(loads.max())
         if entrainment == 0.0 or load == 0.0:
             continue
-        radius = point_film.rolling_radius(drawing.ball_diameter, side)
-        rolling = point_film.RollingBall(contact, radius, equivalent_modulus(ball, ring), entrainment)
-        heat = float(point_film.thermal_factor(rolling, oil, load))
-        central = float(point_film.central_film(rolling, oil, load)) * heat
+        radius = point_contact.rolling_radius(drawing.ball_diameter, side)
+        rolling = point_contact.RollingBall(contact, radius, equivalent_modulus(ball, ring), entrainment)
+        heat = float(point_contact.thermal_factor(rolling, oil, load))
+        central = float(point_contact.central_film(rolling, oil, load)) * heat
         roughness = lubricant.roller_roughness, lubricant.race_roughness
         films[race] = {
             "central_film_um": 1e6 * central,
-            "minimum_film_um": 1e6 * float(point_film.minimum_film(rolling, oil, load)) * heat,
+            "minimum_film_um": 1e6 * float(point_contact.minimum_film(rolling, oil, load)) * heat,
             "lambda_ratio": float(lambda_ratio(central, *roughness)),
-            "film_stiffness_N_per_um": 1e-6 * float(point_film.film_stiffness(rolling, oil, load)),
+            "film_stiffness_N_per_um": 1e-6 * float(point_contact.film_stiffness(rolling, oil, load)),
         }
     return films
+
+
+Columns = dict[str, Array]
+
+
+def ring_columns(displacement: Array, reaction: Array, stiffness: Array) -> Columns:
+    """Displacement, reaction and diagonal stiffnesses of a ring, from arrays (n, 5), (n, 5), (n, 5, 5) in SI."""
+    columns = {f"{axis}_mm": 1e3 * displacement[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"tilt_{axis}_mrad": 1e3 * displacement[:, 3 + i] for i, axis in enumerate("xy")}
+    columns |= {f"force_{axis}_N": reaction[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"moment_{axis}_Nm": reaction[:, 3 + i] for i, axis in enumerate("xy")}
+    columns |= {f"stiffness_{axis}_N_per_um": 1e-6 * stiffness[:, i, i] for i, axis in enumerate("xyz")}
+    return columns | {
+        f"stiffness_tilt_{axis}_Nm_per_mrad": 1e-3 * stiffness[:, 3 + i, 3 + i] for i, axis in enumerate("xy")
+    }
+
+
+def row_columns(balls: Array, ratings: Sequence[Rating]) -> Columns:
+    """Angles, loads, pressures and life of a row, from ``balls`` (n, Z, FIGURES) and as many ratings.
+
+    A ball on the outer race alone has no inner angle: the extremes leave it out, and its angle as ball 1 is NaN.
+    """
+    inner_load, outer_load = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
+    touching = inner_load > 0.0
+    inner_angle, outer_angle = np.degrees(balls[:, :, INNER_ANGLE]), np.degrees(balls[:, :, OUTER_ANGLE])
+    lowest = np.where(touching, inner_angle, np.inf).min(axis=1)
+    highest = np.where(touching, inner_angle, -np.inf).max(axis=1)
+    columns = {
+        "inner_angle_min_deg": np.where(np.isfinite(lowest), lowest, np.nan),
+        "inner_angle_max_deg": np.where(np.isfinite(highest), highest, np.nan),
+        "inner_angle_ball_1_deg": np.where(touching[:, 0], inner_angle[:, 0], np.nan),
+        "outer_angle_min_deg": outer_angle.min(axis=1),
+        "outer_angle_max_deg": outer_angle.max(axis=1),
+        "outer_angle_ball_1_deg": outer_angle[:, 0],
+        "loaded_balls": touching.sum(axis=1).astype(float),
+        "inner_load_max_N": inner_load.max(axis=1),
+        "outer_load_max_N": outer_load.max(axis=1),
+    }
+    columns |= {f"{race}_pressure_MPa": 1e-6 * pressure for race, pressure in pressures(balls, ratings).items()}
+    millions = lives(inner_load, outer_load, ratings)
+    speed = np.array([abs(rating.speeds[0] - rating.speeds[1]) for rating in ratings])
+    with np.errstate(divide="ignore"):
+        hours = np.where(speed > 0.0, 1e6 * millions * 2.0 * math.pi / (3600.0 * speed), np.inf)
+    return columns | {"L10_Mrev": millions, "L10_h": hours}
+
+
+def lives(inner_load: Array, outer_load: Array, ratings: Sequence[Rating]) -> Array:
+    """L10 [1e6 turns] from loads (n, Z) [N], ``life.row_life`` of many points; infinite without a load."""
+    standing = {"inner": "outer", "outer": "inner", "both": ""}
+    damage = np.zeros(len(ratings))
+    for i, (race, load) in enumerate((("inner", inner_load), ("outer", outer_load))):
+        cubes = load**LOAD_LIFE
+        turning = np.mean(cubes, axis=1) ** (1.0 / LOAD_LIFE)
+        fixed = np.mean(cubes**WEIBULL, axis=1) ** (1.0 / RACE_EXPONENT)
+        stands = np.array([standing[turning_rings(*rating.speeds)] == race for rating in ratings])
+        capacity = np.array([rating.capacities[i] for rating in ratings])
+        damage += (np.where(stands, fixed, turning) / capacity) ** RACE_EXPONENT
+    with np.errstate(divide="ignore"):
+        return np.where(damage > 0.0, damage ** (-1.0 / WEIBULL), math.inf)

@@ -1,7 +1,13 @@
 """One validated scene: bearing, cage, lubricant, operation, laws and numerics.
 
-Keys carry their units; whatever a paper leaves out stands here as a default with its reason. Nothing in this package
-is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI parameters of the kernels.
+Keys carry their units, and each default has a reason. Nothing here is compiled: ``rbdyn.dynamics.parameters.model`` turns a
+scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in this file.
+
+- ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
+- ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
+- ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
+- ``geometry``: radii, masses and speeds; ``notes``: suspicious values
+- ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys
 """
 
 import math
@@ -28,9 +34,8 @@ from rbdyn.scene.bearing import (
 )
 from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
-from rbdyn.scene.mounting import Mounting, misfits
 from rbdyn.scene.notes import catalogue_notes, unit_notes
-from rbdyn.scene.operation import Operation, Support
+from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
@@ -44,16 +49,16 @@ PROFILE_SLICES = 31
 
 
 class Scene(SceneFile):
-    """Everything that decides a simulation of a cylindrical roller bearing, checked, with units in the names of the keys.
+    """Validated input of the simulation of a cylindrical roller bearing, with units in the names of the keys.
 
-    ``Scene.load("SCENE.toml")`` reads a file, ``Scene.from_dict(tables)`` or ``Scene(bearing={...}, cage={...}, ...)`` tables as
-    TOML gives them, ``scene.changed({"cage.mass_g": 50.0})`` is the scene with other values. Of a ball bearing all of them give a
-    BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. What is wrong is an InputError that names every key,
-    value and fix at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
-    its motion, ``rbdyn.equilibrium(scene)`` is for balls; each takes the path of a file too.
+    ``Scene.load("SCENE.toml")`` reads a file; ``Scene.from_dict(tables)`` and ``Scene(bearing={...}, cage={...}, ...)`` take
+    tables in the form of TOML; ``scene.changed({"cage.mass_g": 50.0})`` is a copy with other values. Tables of a ball bearing
+    give a BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. Bad input raises InputError with all faults at
+    once: key, value and fix. ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)``
+    returns its motion, ``rbdyn.equilibrium(scene)`` is for balls; each of them also takes the path of a file.
 
-    bearing, cage, lubricant, operation : drawings, oil, speeds and loads; needed.
-    mounting, support : fits and temperatures, a flexible housing; none unless given.
+    bearing, cage, lubricant, operation : drawings, oil, speeds and loads; required.
+    mounting, support : fits and temperatures, a flexible housing; optional.
     materials, traction, model, numerics : with defaults.
     """
 
@@ -66,11 +71,11 @@ class Scene(SceneFile):
     operation: Operation
     """Speeds and loads."""
     mounting: Mounting | None = None
-    """Fits, temperatures, shaft and housing; without it all clearances are those in operation."""
+    """Fits, temperatures, shaft and housing; without it the stated clearances are those in operation."""
     support: Support | None = None
-    """Flexible, damped support of the outer ring; without it the ring is held."""
+    """Flexible, damped support of the outer ring; without it the ring is fixed."""
     materials: Materials = Materials()
-    """What each part is made of."""
+    """Material of each part."""
     traction: Traction = Traction()
     """Traction of the races."""
     model: Laws = Laws()
@@ -80,13 +85,13 @@ class Scene(SceneFile):
     uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
     """Unknown inputs of the scene; no run depends on them."""
     calibrate: Annotated[Calibrate, Field(exclude=True)] = Calibrate()
-    """How doe calibrate finds that out; no run depends on it."""
+    """Settings of doe calibrate, which estimates the unknown inputs; no run depends on it."""
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
         bearing = data.get("bearing")
         if isinstance(bearing, dict) and bearing.get("kind") in BALL_KINDS:
-            # Scene.load reads any scene; whoever asks for rollers says so by ``rollers_only``.
+            # Scene.load reads any scene; ``rollers_only`` restricts it to rollers.
             return cast(type[Self], BallScene._of_kind(data))
         return cls
 
@@ -102,13 +107,13 @@ class Scene(SceneFile):
         return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(with_traction_of_oil(tables)))
 
     def faults(self) -> list[str]:
-        """What does not go together, each with a slip of the unit that may be its cause."""
+        """Contradictions of the scene, each with a slip of the unit that may be its cause."""
         faults = list(self._misfits())
         faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
         faults += self._overload_faults()
         if not faults and (seizures := list(self._seizures())):
-            warm = [note for note in self.unit_notes if note.startswith("mounting.")]
-            return ["; ".join([seizure, *warm]) for seizure in seizures]
+            temperature_notes = [note for note in self.unit_notes if note.startswith("mounting.")]
+            return ["; ".join([seizure, *temperature_notes]) for seizure in seizures]
         slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if faults else ())}
         return ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in faults]
 
@@ -131,14 +136,14 @@ class Scene(SceneFile):
                 )
         if self.traction.elasticity and self.numerics.method == "rosenbrock":
             yield (
-                "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other: the implicit "
-                "method knows no traction coefficients as states; set the method to 'auto'"
+                "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other: the implicit method has no "
+                "traction coefficients as states; set the method to 'auto'"
             )
-        touching = cage.pocket_contact_length_mm
-        if touching is not None and touching > bearing.roller_length_mm:
+        length = cage.pocket_contact_length_mm
+        if length is not None and length > bearing.roller_length_mm:
             yield (
-                f"cage.pocket_contact_length_mm = {touching:g}: a wall touches no more than the roller of "
-                f"{bearing.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
+                f"cage.pocket_contact_length_mm = {length:g}: longer than the roller of {bearing.roller_length_mm:g} mm; shorten it "
+                "or lengthen bearing.roller_length_mm"
             )
         floor, half_pocket_um = laws.pocket_film_floor_um, 500.0 * cage.pocket_clearance_mm
         if laws.pocket_film and floor >= half_pocket_um:
@@ -154,8 +159,8 @@ class Scene(SceneFile):
         rheology = self.traction.rheology_oil or self.lubricant.oil
         if self.traction.model == "thermal_newtonian" and rheology not in RHEOLOGY_OILS:
             yield (
-                f"traction.model = 'thermal_newtonian': no constants of {rheology} are known; add traction.rheology_oil of an oil "
-                "alike, or take 'limiting_shear'"
+                f"traction.model = 'thermal_newtonian': has no constants of {rheology}; set traction.rheology_oil to a similar oil, "
+                "or take 'limiting_shear'"
             )
         yield from self._tilt_faults()
         land = self.land_diameter_mm
@@ -169,18 +174,18 @@ class Scene(SceneFile):
         seconds = self.turn_s * (numerics.turns + numerics.warm_up_turns)
         if numerics.whirl_cutoff_hz is not None and numerics.whirl_cutoff_hz * seconds < 1.0:
             yield (
-                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: a period of it is longer than the run of "
-                f"{seconds:.3g} s; raise it or lengthen numerics.turns"
+                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: its period is longer than the run of {seconds:.3g} s; "
+                "raise it or lengthen numerics.turns"
             )
         samples = self.whirl_samples_per_turn * (numerics.turns + numerics.warm_up_turns)
         if samples * (numerics.replicates + numerics.companions) > MOST_SAMPLES:
             yield (
-                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: needs {samples:.3g} samples a replicate, and there is "
-                f"memory for {MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
+                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: needs {samples:.3g} samples a replicate, but memory holds "
+                f"{MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
             )
 
     def _seizures(self) -> Iterator[str]:
-        """Clearances of the cage of which fits, heat and rotation leave no more than the floor of their film."""
+        """Faults of cage clearances that fits, temperature and rotation reduce to the floor of their film."""
         cage, laws, clearances = self.cage, self.model, self.cage_clearances
         if clearances is None:
             return
@@ -190,24 +195,24 @@ class Scene(SceneFile):
         if clearances.guide is not None and laws.guide_land in lands:
             checks.append(("guide", clearances.guide, lands[laws.guide_land]))
         for name, play, floor_um in checks:
-            left_um = 1e6 * play.operating
-            if left_um <= 2.0 * floor_um:
+            operating_um = 1e6 * play.operating
+            if operating_um <= 2.0 * floor_um:
                 floor = f", not above twice model.{'land' if name == 'guide' else name}_film_floor_um = {floor_um:g}"
                 yield (
-                    f"cage.{name}_clearance_mm = {getattr(cage, f'{name}_clearance_mm'):g}: fits {1e6 * play.fit:+.1f} um, heat "
-                    f"{1e6 * play.temperature:+.1f} um and rotation {1e6 * play.rotation:+.1f} um leave {left_um:.1f} um"
-                    f"{floor if floor_um else ''}: the cage seizes; widen it or check the temperatures of mounting"
+                    f"cage.{name}_clearance_mm = {getattr(cage, f'{name}_clearance_mm'):g}: fits {1e6 * play.fit:+.1f} um, "
+                    f"temperature {1e6 * play.temperature:+.1f} um and rotation {1e6 * play.rotation:+.1f} um leave "
+                    f"{operating_um:.1f} um{floor if floor_um else ''}: the cage seizes; widen it or check the temperatures of mounting"
                 )
         lip = clearances.lip
         if laws.pocket == "contact" and lip is not None and 0.5 * lip.operating <= abs(clearances.shift):
             yield (
-                f"cage.pocket_radial_clearance_mm = {1e3 * lip.drawn:g}: the circle of pockets grows {1e6 * clearances.shift:+.1f} um "
-                f"against that of the rollers, whose lips leave {0.5e6 * lip.operating:.1f} um; widen it or check the temperatures "
+                f"cage.pocket_radial_clearance_mm = {1e3 * lip.drawn:g}: the pocket circle grows {1e6 * clearances.shift:+.1f} um "
+                f"relative to the roller circle, but the lips allow {0.5e6 * lip.operating:.1f} um; widen it or check the temperatures "
                 "of mounting"
             )
 
     def _overload_faults(self) -> Iterator[str]:
-        """Whether the most loaded roller, by Stribeck 5 F/Z, would be flattened over more than its diameter."""
+        """Fault of a load 5 F/Z (Stribeck) on one roller whose contact would be wider than its diameter."""
         bearing, load = self.bearing, self.operation.largest_load_N
         modulus = 1e-6 * equivalent_modulus(self.material("roller"), self.material("rings"))
         diameter, length = bearing.roller_diameter_mm, bearing.effective_length_mm
@@ -215,32 +220,32 @@ class Scene(SceneFile):
         width = math.sqrt(32.0 * 5.0 * load / bearing.rollers * radius / (math.pi * length * modulus))  # Hertz
         if width >= diameter:
             yield (
-                f"operation.radial_load_N = {load:g}: a roller of {diameter:g} mm would be flattened over {width:.3g} mm, which "
-                "none can; lessen the load or check its unit"
+                f"operation.radial_load_N = {load:g}: a roller of {diameter:g} mm would have a contact {width:.3g} mm wide; reduce "
+                "the load or check its unit"
             )
 
     def _tilt_faults(self) -> Iterator[str]:
-        """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
+        """Fault of a tilt at which a roller under the whole load touches over less than a slice."""
         bearing = self.bearing
         share = max(bearing.inner_tilt_share, 1.0 - bearing.inner_tilt_share)
         tilt, length = abs(bearing.tilt) * share, bearing.effective_length
         load = self.operation.largest_load_N
-        if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
+        if tilt < 1e-12 or load == 0.0:  # such a tilt moves the ends by less than an atom
             return
         from rbdyn.contact.hertz_line import palmgren
 
         stiffness = palmgren(equivalent_modulus(self.material("roller"), self.material("rings")), length).stiffness
         # Q = K/l int_0^c (tilt x)^(10/9) dx = (9/19) K/l tilt^(10/9) c^(19/9)
-        touching = (19.0 / 9.0 * load * length / (stiffness * tilt ** (10.0 / 9.0))) ** (9.0 / 19.0)
-        if touching < length / (self.model.slices or PROFILE_SLICES):
+        contact = (19.0 / 9.0 * load * length / (stiffness * tilt ** (10.0 / 9.0))) ** (9.0 / 19.0)
+        if contact < length / (self.model.slices or PROFILE_SLICES):
             yield (
-                f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over "
-                f"{touching * 1e3:.2g} mm of {bearing.effective_length_mm:g} mm; lessen the tilt"
+                f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over {contact * 1e3:.2g} mm "
+                f"of {bearing.effective_length_mm:g} mm; reduce the tilt"
             )
 
     @property
     def summary(self) -> str:
-        """The scene in a line; the clearance is as drawn."""
+        """The scene in one line, with the clearance of the drawing."""
         bearing, point = self.bearing, self.operation
         return (
             f"{bearing.rollers} rollers of {bearing.roller_diameter_mm:g} x {bearing.roller_length_mm:g} mm, diametral clearance "
@@ -249,7 +254,7 @@ class Scene(SceneFile):
 
     @property
     def mounted_clearance_mm(self) -> float:
-        """Diametral clearance in operation: as drawn, or as mounting, temperature and speed leave it [mm]."""
+        """Diametral clearance in operation [mm]: that of the drawing, changed by mounting, temperature and speed."""
         mounted = self.mounted_clearance
         return self.bearing.radial_clearance_mm if mounted is None else mounted.operating * 1e3
 
@@ -262,7 +267,7 @@ class Scene(SceneFile):
 
     @cached_property
     def mounted_clearance(self) -> "MountedClearance | None":
-        """What fits, temperatures and rotation do to the clearance; None where the scene has no mounting."""
+        """Radial clearance with the effects of fits, temperature and rotation; None where the scene has no mounting."""
         if self.mounting is None:
             return None
         from rbdyn.mounting.fits import operating_clearance
@@ -271,7 +276,7 @@ class Scene(SceneFile):
 
     @cached_property
     def cage_clearances(self) -> "CageClearances | None":
-        """What fits, temperatures and rotation do to the clearances of the cage; None where the scene states no mounting."""
+        """Cage clearances with the effects of fits, temperature and rotation; None where the scene has no mounting."""
         if self.mounting is None:
             return None
         from rbdyn.mounting.fits import RunningSpeeds, cage_clearances
@@ -282,14 +287,15 @@ class Scene(SceneFile):
 
     @property
     def clearances(self) -> "dict[str, OperatingClearance | None]":
-        """Diametral clearances "radial", "guide" (None where the rollers guide the cage) and "pocket", drawn and in operation [m]."""
+        """Diametral clearances [m] "radial", "guide" (None where the rollers guide the cage) and "pocket", on the drawing and in
+        operation."""
         from rbdyn.mounting.cage import OperatingClearance
 
         radial, cage = self.mounted_clearance, self.cage_clearances
         if radial is None or cage is None:
             play = None if self.cage.guidance == "roller" else self.cage.guide_clearance
-            drawn = self.bearing.radial_clearance, play, self.cage.pocket_clearance
-            plays = [None if each is None else OperatingClearance(each) for each in drawn]
+            nominal = self.bearing.radial_clearance, play, self.cage.pocket_clearance
+            plays = [None if clearance is None else OperatingClearance(clearance) for clearance in nominal]
         else:
             fit = radial.inner_fit + radial.outer_fit
             bearing = OperatingClearance(radial.initial, fit, radial.temperature, radial.rotation)
@@ -304,29 +310,29 @@ class Scene(SceneFile):
 
     @property
     def section_notes(self) -> tuple[str, ...]:
-        """The stiffness of the cage's bars in a sentence, where it follows from their section."""
+        """A sentence on the stiffness of the cage's bars, where it follows from their section."""
         if STIFFNESS in self._tables.get("model", {}):
             return ()
         return section_notes(self.bearing, self.cage, self.model.pocket_bar_stiffness_N_m)
 
     @property
     def catalogue_notes(self) -> tuple[str, ...]:
-        """A sentence on dimensions that disagree with the designation; none where it states none."""
+        """A sentence on dimensions that contradict the designation; none without a designation."""
         return catalogue_notes(self.bearing, self.mounting)
 
     @property
     def needs_slices(self) -> bool:
-        """Whether a roller must be cut into slices: it has a profile or its races are tilted."""
+        """Whether a roller needs slices: it has a profile or its races are tilted."""
         return self.bearing.roller_profile != "cylinder" or self.bearing.tilt_mrad != 0.0
 
     @property
     def slices(self) -> int:
-        """Number of slices of a roller: as given, else one, or as many as a profile or tilt needs."""
+        """Number of slices of a roller: stated, else one, or more for a profile or tilt."""
         return self.model.slices or (PROFILE_SLICES if self.needs_slices else 1)
 
     @property
     def land_diameter_mm(self) -> float:
-        """Diameter of the guide land, given or estimated [mm]."""
+        """Diameter of the guide land, stated or estimated [mm]."""
         if self.cage.land_diameter_mm is not None:
             return self.cage.land_diameter_mm
         side = {"outer": 1.0, "inner": -1.0, "roller": 0.0}[self.cage.guidance]
@@ -334,14 +340,14 @@ class Scene(SceneFile):
 
     @property
     def guide_clearance_m(self) -> float | None:
-        """Radial play of the cage in its land in operation [m]; None where no land guides it."""
+        """Radial clearance of the cage in its land in operation [m]; None where no land guides it."""
         clearance = self.guide_play_m
         landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
         return None if landless or clearance is None else 0.5 * clearance
 
     @property
     def cage_play_m(self) -> float | None:
-        """Radial play of the cage [m]: in its land, or in the pocket lips of the rollers that guide it; None without either."""
+        """Radial clearance of the cage [m] in its land, or at the pocket lips of guiding rollers; None without either."""
         lips = self.lip_clearance_m
         if self.guide_clearance_m is None:
             return None if lips is None else 0.5 * lips
@@ -349,7 +355,7 @@ class Scene(SceneFile):
 
     @property
     def guide_play_m(self) -> float | None:
-        """Diametral clearance of the cage in its guide in operation, whether its land acts or not [m]; None without one."""
+        """Diametral guide clearance in operation [m], also where the land is off; None without a guide."""
         mounted = self.cage_clearances
         if mounted is None or mounted.guide is None:
             return self.cage.guide_clearance
@@ -363,13 +369,14 @@ class Scene(SceneFile):
 
     @property
     def lip_clearance_m(self) -> float | None:
-        """Radial play between roller and lips in operation, both ways together [m]; None where a ring guides the cage."""
+        """Radial clearance between roller and lips in operation, both directions together [m]; None where a ring guides the
+        cage."""
         mounted = self.cage_clearances
         return self.cage.lip_clearance if mounted is None or mounted.lip is None else mounted.lip.operating
 
     @property
     def cage_temperature_C(self) -> float | None:  # noqa: N802
-        """Temperature of the cage, given or by default [C]; None where the scene states no mounting."""
+        """Temperature of the cage, stated or by default [C]; None where the scene has no mounting."""
         if self.mounting is None:
             return None
         from rbdyn.mounting.fits import cage_temperature_rise, mounted_rings
@@ -385,19 +392,19 @@ class Scene(SceneFile):
 
     @property
     def extends(self) -> bool:
-        """Whether its runs go on until they have settled: figures of a schedule never do."""
+        """Whether runs are extended until they settle, which those of a schedule never do."""
         return self.numerics.extend and self.operation.schedule is None
 
     @property
     def whirl_samples_per_turn(self) -> int:
-        """Samples of the cage's centre a shaft turn for the filtered whirl; 0 where it is not filtered."""
+        """Samples of the cage's centre in a shaft turn for the filtered whirl; 0 without a filter."""
         cutoff = self.numerics.whirl_cutoff_hz
-        # As few as numerics.samples_per_turn may be, so that every batch has some.
+        # At least the lower limit of numerics.samples_per_turn, so that every batch has samples.
         return 0 if cutoff is None else max(math.ceil(SAMPLES_A_PERIOD * cutoff * self.turn_s), 8)
 
     @property
     def impact_window_turns(self) -> float:
-        """Window of the largest force: as given, or the whole run where that is shorter."""
+        """Window of the largest force: as stated, or the whole run where that is shorter."""
         return min(self.numerics.impact_window_turns, self.numerics.turns)
 
     def material(self, part: str) -> Material:
@@ -405,31 +412,31 @@ class Scene(SceneFile):
         return material_of(getattr(self.materials, part))
 
 
-def scene_of(given: Scene | BallScene | Path | str) -> Scene | BallScene:
+def scene_of(source: Scene | BallScene | Path | str) -> Scene | BallScene:
     """The scene itself, or that of a file. Raises InputError for anything else and for the faults of the file."""
-    if isinstance(given, Scene | BallScene):
-        return given
-    if isinstance(given, str | PathLike):
-        return Scene.load(Path(given))
+    if isinstance(source, Scene | BallScene):
+        return source
+    if isinstance(source, str | PathLike):
+        return Scene.load(Path(source))
     raise InputError(
         [
-            f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file; "
-            "Scene.from_dict makes one of tables"
+            f"scene = {one_line(repr(source), LONGEST_NAME)}: must be a Scene or the path of a scene file; Scene.from_dict takes "
+            "tables"
         ]
     )
 
 
-def rollers_only(given: Scene | BallScene | Path | str) -> Scene:
-    """The scene, as ``scene_of``, where it is one of rollers. Raises InputError for a ball bearing."""
-    scene = scene_of(given)
+def rollers_only(source: Scene | BallScene | Path | str) -> Scene:
+    """The scene, as ``scene_of``, of a roller bearing. Raises InputError for a ball bearing."""
+    scene = scene_of(source)
     if isinstance(scene, Scene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
 
 
-def balls_only(given: Scene | BallScene | Path | str) -> BallScene:
-    """The scene, as ``scene_of``, where it is one of balls. Raises InputError for a roller bearing."""
-    scene = scene_of(given)
+def balls_only(source: Scene | BallScene | Path | str) -> BallScene:
+    """The scene, as ``scene_of``, of a ball bearing. Raises InputError for a roller bearing."""
+    scene = scene_of(source)
     if isinstance(scene, BallScene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])

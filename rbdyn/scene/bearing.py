@@ -1,4 +1,4 @@
-"""Drawing of a roller bearing: bearing, cage with the section of its bars and their stiffness, materials."""
+"""Drawing of a roller bearing: bearing, cage with the section and stiffness of its bars, materials."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
-from rbdyn.base.faults import Consistent, Strict
-from rbdyn.base.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
+from rbdyn.base.faults import (
+    LIGHTEST_RING_KG,
+    SI,
+    Consistent,
+    Fraction,
+    NotVanishing,
+    OptionalSI,
+    Positive,
+    Share,
+    Strict,
+)
 from rbdyn.base.words import counted
 from rbdyn.properties.catalogue import ROLLERS, envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, Material
@@ -26,13 +35,13 @@ PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "ta
 SECTION_KEYS = ("bar_width", "bar_thickness", "bar_length", "side_ring_width")
 
 
-def _listed(text: str | None) -> str | None:
+def _catalogue_designation(text: str | None) -> str | None:
     """A designation of a cylindrical roller bearing that the catalogue lists. Raises ValueError."""
     if text is not None:
-        named = read_designation(text)
-        if named.kind != ROLLERS:
+        designation = read_designation(text)
+        if designation.kind != ROLLERS:
             raise ValueError("is a ball bearing; name the cylindrical roller bearing or leave it out")
-        envelope(named, "correct it or leave it out")
+        envelope(designation, "correct it or leave it out")
     return text
 
 
@@ -53,52 +62,52 @@ class Bearing(Consistent):
 
     kind: Literal["cylindrical_roller"]
     """Kind of bearing."""
-    designation: Annotated[str | None, AfterValidator(_listed)] = None
-    """Designation in a maker's catalogue, as NU 210 or NU 210 ECP; bore, outside diameter, width and series follow from it.
-    The result then has the maker's friction next to the power loss. It changes nothing in the run."""
+    designation: Annotated[str | None, AfterValidator(_catalogue_designation)] = None
+    """Designation in a maker's catalogue, such as NU 210 or NU 210 ECP, which gives bore, outside diameter, width and series.
+    The result then compares the power loss with the maker's friction. The run itself does not change."""
     rollers: Annotated[int, Field(ge=2, le=500)]
     """Number of rollers."""
     roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]
     """Diameter of a roller."""
     roller_length_mm: Annotated[float, Field(ge=0.5, le=1000.0)]
-    """Whole length of a roller: mass, inertia and drag."""
+    """Overall length of a roller, which decides its mass, inertia and drag."""
     effective_length_mm: Annotated[float, Field(ge=0.1, le=1000.0)]
     """Part of the roller's length that carries load, without the rounded ends."""
     pitch_diameter_mm: Annotated[float, Field(ge=2.0, le=5000.0)]
     """Diameter of the circle through the rollers' centres, on which the clearance is split evenly."""
     radial_clearance_mm: Annotated[float, Field(ge=-0.2, le=2.0)]
-    """Diametral clearance: outer raceway less inner raceway less twice the roller; negative is a preload. With
-    [mounting] that of the loose parts."""
+    """Diametral clearance: outer raceway less inner raceway less twice the roller diameter; negative is a preload. With
+    [mounting] it is the clearance before mounting."""
     roller_profile: Literal["cylinder", "crowned", "logarithmic", "lundberg", "table"] = "cylinder"
-    """Drop of the roller towards its ends: "logarithmic" is the reference profile of ISO/TS 16281; the others but the
-    cylinder take the key named after them."""
+    """Drop of the roller towards its ends. "logarithmic" is the reference profile of ISO/TS 16281; "crowned", "lundberg" and
+    "table" each need the key of their name."""
     crown_radius_mm: Positive | None = None
     """Radius of the crown, for roller_profile = "crowned"."""
     lundberg_load_N: Positive | None = None  # noqa: N815
     """Load at which the Lundberg profile spreads its pressure evenly, for roller_profile = "lundberg"."""
     profile_table_mm_um: Annotated[list[list[float]], Field(min_length=2)] | None = None
-    """Points (distance from the middle in mm, drop in um), joined by straight lines, mirrored where all lie on one
-    side, for roller_profile = "table"."""
+    """Points (distance from the middle in mm, drop in um) joined by straight lines, for roller_profile = "table". Points of
+    one half are mirrored."""
     tilt_mrad: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
-    """Tilt of the inner against the outer ring, about the axis across tilt_direction_deg."""
+    """Tilt of the inner ring against the outer ring, about an axis perpendicular to tilt_direction_deg."""
     tilt_direction_deg: float = 0.0
-    """Direction in which the inner ring tilts, from that of the load."""
+    """Direction in which the inner ring tilts, measured from the load."""
     inner_tilt_share: Fraction = 0.5
-    """Share of the tilt between roller and inner race: a roller between equal contacts settles half-way (Harris)."""
+    """Share of the tilt between roller and inner race. A roller between equal contacts tilts by half (Harris)."""
     roller_diameter_errors_um: list[float] | None = None
-    """Each roller's diameter less the nominal one, instead of roller_diameter_spread_um."""
+    """Deviation of each roller's diameter from the nominal one, instead of roller_diameter_spread_um."""
     roller_diameter_spread_um: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """Standard deviation of a seeded normal spread of the rollers' diameters."""
+    """Standard deviation of the rollers' diameters, drawn from a normal distribution with the seed of the scene."""
     outer_waviness: list[Harmonic] = []
     """Harmonics of the outer raceway's radius: out-of-round (orders 2, 3: lobes against skidding) and waviness."""
     inner_waviness: list[Harmonic] = []
-    """Harmonics of the inner raceway's radius; they turn with the ring."""
+    """Harmonics of the inner raceway's radius, which rotate with the ring."""
     dynamic_capacity_N: Positive | None = None  # noqa: N815
-    """Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out."""
+    """Basic dynamic load rating from the catalogue. Default: calculated from the dimensions by ISO 281."""
     inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
-    """Inner ring with what of the shaft moves with it, 1 to 5 kg for a main shaft of this size. A drawing gives the
-    ring alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries.
-    With 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55."""
+    """Mass of the inner ring and of the part of the shaft that moves with it, 1 to 5 kg for a main shaft of this size. A drawing
+    gives the ring alone: 0.04 kg for the bearing of Chen et al. 2022. The share of the rotor that this bearing carries comes on
+    top. With 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55."""
 
     roller_diameter, pitch_diameter, radial_clearance = SI("mm"), SI("mm"), SI("mm")
     roller_length, effective_length, crown_radius = SI("mm"), SI("mm"), OptionalSI("mm")
@@ -111,7 +120,7 @@ class Bearing(Consistent):
 
     @property
     def rated_sizes(self) -> tuple[int, float, float, float]:
-        """What ratings by ISO 281 and ISO 76 ask for: rollers, their diameter and effective length, pitch diameter [m]."""
+        """Inputs of the ratings by ISO 281 and ISO 76: rollers, their diameter and effective length, pitch diameter [m]."""
         return self.rollers, self.roller_diameter, self.effective_length, self.pitch_diameter
 
     @property
@@ -129,31 +138,34 @@ class Bearing(Consistent):
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
-        """Inner and outer raceway at the pitch diameter less and plus one roller.
+        """Diameters of the inner and outer raceway [mm]: the pitch diameter less and plus one roller.
 
-        Their share of the clearance is left out: it would change a ring's growth by some 1e-3 of itself.
+        Their share of the clearance is left out, which would change the growth of a ring by about 1e-3 of itself.
         """
         return (self.pitch_diameter_mm - self.roller_diameter_mm, self.pitch_diameter_mm + self.roller_diameter_mm)
 
     def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
         if chord <= self.roller_diameter_mm:
-            what = (
-                f"rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch circle of "
-                f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            yield (
+                f"bearing.rollers = {self.rollers}: rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch circle of "
+                f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
             )
-            yield f"bearing.rollers = {self.rollers}: {what}; take fewer or smaller ones"
         if self.roller_diameter_mm >= self.pitch_diameter_mm:
-            what = f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway"
-            yield f"{what} on a pitch circle of {self.pitch_diameter_mm:g} mm; make the roller smaller"
+            yield (
+                f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
+                f"{self.pitch_diameter_mm:g} mm; make the roller smaller"
+            )
         if self.effective_length_mm > self.roller_length_mm:
-            why = f"contact longer than the roller of {self.roller_length_mm:g} mm"
-            fix = "shorten it or lengthen bearing.roller_length_mm"
-            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {fix}"
+            yield (
+                f"bearing.effective_length_mm = {self.effective_length_mm:g}: contact longer than the roller of "
+                f"{self.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
+            )
         if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
-            why = f"out of proportion to a roller of {self.roller_diameter_mm:g} mm"
-            fix = "give millimetres, below a tenth of the roller"
-            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {fix}"
+            yield (
+                f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: out of proportion to a roller of "
+                f"{self.roller_diameter_mm:g} mm; give millimetres, below a tenth of the roller"
+            )
         yield from self._profile_faults()
         yield from self._form_faults()
 
@@ -163,12 +175,16 @@ class Bearing(Consistent):
             if value is None and self.roller_profile == profile:
                 yield f"bearing.{key}: missing; bearing.roller_profile = {profile!r} needs it"
             if value is not None and self.roller_profile != profile:
-                what = f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other"
-                yield f"{what}: take away the one or set the other to {profile!r}"
+                yield (
+                    f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other: "
+                    f"leave out the first or set the second to {profile!r}"
+                )
         half = 0.5 * self.roller_length_mm
         if self.crown_radius_mm is not None and self.crown_radius_mm <= half:
-            what = f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: a crown of a roller of {self.roller_length_mm:g} mm"
-            yield f"{what} needs a radius above {half:g} mm, commonly metres; enlarge it"
+            yield (
+                f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: the crown of a roller of {self.roller_length_mm:g} mm needs "
+                f"a radius above {half:g} mm, commonly metres; enlarge it"
+            )
         points = self.profile_table_mm_um or []
         if any(len(point) != 2 for point in points):
             yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; fix the list"
@@ -177,20 +193,24 @@ class Bearing(Consistent):
             yield "bearing.profile_table_mm_um: positions must rise from point to point; sort them"
         for x, drop in points:
             if abs(x) > half:
-                what = f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at {half:g} mm"
-                yield f"{what}; shorten the profile or lengthen bearing.roller_length_mm"
+                yield (
+                    f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at {half:g} mm; "
+                    "shorten the profile or lengthen bearing.roller_length_mm"
+                )
         reach = max((abs(x) for x, _ in points), default=math.inf)
         if reach < 0.5 * self.effective_length_mm:
             yield (
                 f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "
-                f"{0.5 * self.effective_length_mm:g} mm from the middle; carry the table on"
+                f"{0.5 * self.effective_length_mm:g} mm from the middle; extend the table"
             )
 
     def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
         if errors is not None and len(errors) != self.rollers:
-            why = f"bearing.roller_diameter_errors_um: {counted(len(errors), 'value')} for {self.rollers} rollers"
-            yield f"{why}; give one a roller"
+            yield (
+                f"bearing.roller_diameter_errors_um: {counted(len(errors), 'value')} for {self.rollers} rollers; "
+                "give one value for each roller"
+            )
         if errors is not None and self.roller_diameter_spread_um > 0.0:
             yield (
                 "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other: "
@@ -198,64 +218,63 @@ class Bearing(Consistent):
             )
         limit = 0.01 * self.roller_diameter_mm * 1e3
         if errors is not None and any(abs(error) > limit for error in errors):
-            why = f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller"
-            yield f"{why}; give micrometres"
+            yield f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller; give micrometres"
 
 
 class Cage(Consistent):
     """Cage and guide land. Clearances are diametral, and with [mounting] those of the drawing."""
 
     guidance: Literal["outer", "inner", "roller"]
-    """What guides the cage: a land of the outer ring, of the inner ring, or the rollers in their pockets."""
+    """Guidance of the cage: by a land of the outer ring, by a land of the inner ring, or by the rollers in their pockets."""
     guide_clearance_mm: Annotated[
         Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
     ] = None
-    """Diametral clearance between cage and guide land; needed where a ring guides the cage."""
+    """Diametral clearance between cage and guide land; required where a ring guides the cage."""
     pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
     """Pocket width less roller diameter."""
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
     """Mass of the cage."""
     pocket_contact_length_mm: Positive | None = None
-    """Contact of a roller on a pocket wall: on a drawing, the straight part of the wall that the roller's cylinder
-    meets, less the breaks of both edges. Where left out, contact (and lips) take the roller's effective length and a
-    film the whole roller; where given, all take this."""
+    """Length of the contact between a roller and a pocket wall: the straight part of the wall less both edge breaks. It applies
+    to contact, lips and film. Default: the effective length of the roller for contact and lips, its full length for the film."""
     land_diameter_mm: Positive | None = None
-    """Diameter of the guide land; where left out the pitch diameter + 2/3 roller (outer) or - 2/3 roller (inner): 49.5
-    mm and 40.5 mm for the bearing of Chen et al. 2022."""
+    """Diameter of the guide land. Default: the pitch diameter plus (outer) or minus (inner) 2/3 roller diameter, 49.5 and
+    40.5 mm for the bearing of Chen et al. 2022."""
     inertia_kg_mm2: Positive | None = None
-    """Moment of inertia of the cage about its axis; where left out that of a ring from the land to the pitch diameter
-    -+ 1/3 roller."""
+    """Moment of inertia of the cage about its axis. Default: that of a ring from the land to the pitch diameter -+ 1/3 roller
+    diameter."""
     imbalance_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 0.0
-    """Centre of mass off the middle, towards the first pocket: 0 to 100 um."""
+    """Eccentricity of the cage's centre of mass, towards the first pocket. Usual: 0 to 100 um."""
     pocket_radial_clearance_mm: Positive | None = None
-    """Radial play between roller and pocket lips, where rollers guide the cage; the pocket clearance where left out.
-    Without lips nothing would hold such a cage: free rollers give way along their orbit."""
+    """Radial clearance between roller and pocket lips, where rollers guide the cage. Default: the pocket clearance. Without lips
+    such a cage would have no radial guidance, because free rollers give way along their orbit."""
     lands: Annotated[int, Field(ge=1, le=4)] = 2
     """Number of guide lands side by side."""
     land_width_mm: Positive = 3.0
     """Width of one guide land."""
     bar_width_mm: Positive | None = None
-    """Width of a cross-bar along the circumference, at the pitch circle. Width, thickness and length of a bar with the width of
-    a side ring are the section of a window cage, from which the stiffness of a bar follows (rbdyn/contact/cage_bar.py) unless
-    model.pocket_bar_stiffness_N_m is given. It does not follow cage.pocket_clearance_mm."""
+    """Width of a cross-bar along the circumference, at the pitch circle. The section of a window cage has four sizes: bar width,
+    bar thickness, bar length and side ring width. They give the stiffness of a bar (rbdyn/contact/cage_bar.py) unless
+    model.pocket_bar_stiffness_N_m is stated. The width does not change with cage.pocket_clearance_mm."""
     bar_thickness_mm: Positive | None = None
     """Radial thickness of the cross-bars and of the side rings."""
     bar_length_mm: Positive | None = None
-    """Axial length of a cross-bar, which is that of a pocket."""
+    """Axial length of a cross-bar and of a pocket."""
     side_ring_width_mm: Positive | None = None
     """Axial width of one side ring."""
 
     @field_validator("guide_clearance_mm")
     @classmethod
-    def _needed_by_a_land(cls, value: float | None, given: ValidationInfo) -> float | None:
-        if value is None and given.data.get("guidance") != "roller":
+    def _needed_by_a_land(cls, value: float | None, info: ValidationInfo) -> float | None:
+        if value is None and info.data.get("guidance") != "roller":
             raise PydanticKnownError("missing")
         return value
 
     hoop_modulus_share: Share = 0.65
-    """Share of the material's modulus that the cage, a hoop with pockets, keeps against its own rotation: 0.5 to 0.8. Side rings
-    alone carry the hoop between the bars, and the mass of these too: side rings of a quarter to a third of the cage's width
-    give 0.75 to 0.85, less what they bend from bar to bar. 1 is a hoop without pockets. Only [mounting] reads it."""
+    """Effective hoop modulus of the cage as a share of the material's modulus, 0.5 to 0.8; 1 is a hoop without pockets. It
+    decides how far rotation widens the cage. Between the bars only the side rings carry the hoop stress, with the mass of the
+    bars as load. Side rings of a quarter to a third of the cage's width give 0.75 to 0.85, less their bending from bar to bar.
+    It acts only with [mounting]."""
 
     guide_clearance, pocket_clearance, lip_clearance = OptionalSI("mm"), SI("mm"), OptionalSI("mm")
     pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")
@@ -264,11 +283,11 @@ class Cage(Consistent):
 
     def faults(self) -> Iterator[str]:
         if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
-            yield "cage: clearances above 5 mm are not clearances; give millimetres"
+            yield "cage: a clearance above 5 mm is implausible; give millimetres"
         elif self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
             yield (
-                f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips "
-                "hold the cage only under guidance by the rollers; take away the one or set the other to 'roller'"
+                f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips guide the cage "
+                "only under guidance by the rollers; leave out the first or set the second to 'roller'"
             )
         missing = [f"cage.{key}_mm" for key in SECTION_KEYS if getattr(self, f"{key}_mm") is None]
         if 0 < len(missing) < len(SECTION_KEYS):
@@ -279,12 +298,12 @@ class Cage(Consistent):
         """Radial play between roller and pocket lips [mm]; None where a ring guides the cage."""
         if self.guidance != "roller":
             return None
-        given = self.pocket_radial_clearance_mm
-        return self.pocket_clearance_mm if given is None else given
+        lips = self.pocket_radial_clearance_mm
+        return self.pocket_clearance_mm if lips is None else lips
 
 
 class CustomMaterial(Strict):
-    """A material by its numbers."""
+    """A material by its properties."""
 
     elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0), NotVanishing]  # noqa: N815
     """Young's modulus."""
@@ -293,7 +312,7 @@ class CustomMaterial(Strict):
     density_kg_m3: Annotated[float, Field(ge=100.0, le=30000.0)]
     """Density of the material."""
     thermal_expansion_1e_6_K: Annotated[float, Field(ge=0.0, le=200.0)] = 12.0  # noqa: N815
-    """Linear thermal expansion in 1e-6 per K; that of steel unless given."""
+    """Coefficient of linear thermal expansion in 1e-6 per K. Default: steel."""
 
 
 MaterialName = Literal[
@@ -303,7 +322,7 @@ MaterialName = Literal[
 
 
 class Materials(Strict):
-    """What each part is made of: a name, or a table of numbers."""
+    """Material of each part: a name, or a table of properties."""
 
     roller: MaterialName | CustomMaterial = "bearing_steel"
     """Material of the rollers."""
@@ -313,25 +332,25 @@ class Materials(Strict):
     """Material of the cage."""
 
 
-def material_of(chosen: MaterialName | CustomMaterial) -> Material:
-    """A material in SI, from its name or its numbers."""
-    if isinstance(chosen, CustomMaterial):
-        modulus, expansion = chosen.elastic_modulus_GPa * 1e9, chosen.thermal_expansion_1e_6_K * 1e-6
-        return Material(modulus, chosen.poisson_ratio, chosen.density_kg_m3, expansion)
-    return MATERIALS[chosen]
+def material_of(material: MaterialName | CustomMaterial) -> Material:
+    """A material in SI, from its name or its properties."""
+    if isinstance(material, CustomMaterial):
+        modulus, expansion = material.elastic_modulus_GPa * 1e9, material.thermal_expansion_1e_6_K * 1e-6
+        return Material(modulus, material.poisson_ratio, material.density_kg_m3, expansion)
+    return MATERIALS[material]
 
 
 STIFFNESS = "pocket_bar_stiffness_N_m"
-# What the stiffness by a section is multiplied by at the ends of its error (unknown_inputs.toml has the reason).
+# Factors on the stiffness by a section at the ends of its error (reason in unknown_inputs.toml).
 STIFFNESS_ERROR = (0.55, 1.25)
-# In roller diameters. A width that is estimated may be that of one roller more or less: only what is far off is refused.
+# Least width of a pocket in roller diameters. An estimated bar width may be that of one roller more or less.
 NARROWEST_POCKET = 0.75
 
 
 def with_bar_stiffness_of_section(scene: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Tables of a scene, with the stiffness of a cross-bar by its section where [cage] gives that and [model] no stiffness.
+    """Tables of a scene, with the stiffness of a cross-bar by its section where [cage] states it and [model] no stiffness.
 
-    What a table has wrong is left to its own check.
+    Faults of the tables are left to their own validation.
     """
     laws, cage = scene.get("model", {}), scene.get("cage")
     if not isinstance(laws, Mapping) or STIFFNESS in laws or not isinstance(cage, Mapping):
@@ -340,23 +359,23 @@ def with_bar_stiffness_of_section(scene: Mapping[str, Any]) -> Mapping[str, Any]
         return scene
     try:
         drawing = Bearing.model_validate(scene.get("bearing"))
-        checked = Cage.model_validate(cage)
+        cage_drawing = Cage.model_validate(cage)
         materials = Materials.model_validate(scene.get("materials", {}))
     except ValidationError:
         return scene
-    section = section_of(drawing, checked)
-    if section is None or any(section_misfits(drawing, checked)):
+    section = section_of(drawing, cage_drawing)
+    if section is None or any(section_misfits(drawing, cage_drawing)):
         return scene
     from rbdyn.contact.cage_bar import Elastic, bar_stiffness
 
     material = material_of(materials.cage)
     elastic = Elastic(material.elastic_modulus, material.poisson_ratio)
-    contact = checked.pocket_contact_length or drawing.effective_length
+    contact = cage_drawing.pocket_contact_length or drawing.effective_length
     return {**scene, "model": {STIFFNESS: bar_stiffness(section, elastic, min(contact, section.bar_length)), **laws}}
 
 
 def section_of(bearing: Bearing, cage: Cage) -> "CageSection | None":
-    """Section of the cage in SI; None where the scene gives none."""
+    """Section of the cage in SI; None where the scene states none."""
     from rbdyn.contact.cage_bar import CageSection
 
     width, thickness = cage.bar_width, cage.bar_thickness
@@ -367,7 +386,7 @@ def section_of(bearing: Bearing, cage: Cage) -> "CageSection | None":
 
 
 def section_misfits(bearing: Bearing, cage: Cage) -> Iterator[str]:
-    """A sentence for each size of a section that has no room in the bearing."""
+    """A sentence for each size of a section that does not fit the bearing."""
     if any(getattr(cage, f"{key}_mm") is None for key in SECTION_KEYS):
         return
     width, thickness, length, _ = (float(getattr(cage, f"{key}_mm")) for key in SECTION_KEYS)
@@ -375,24 +394,23 @@ def section_misfits(bearing: Bearing, cage: Cage) -> Iterator[str]:
     pocket = math.pi * bearing.pitch_diameter_mm / bearing.rollers - width
     if pocket < NARROWEST_POCKET * roller:
         yield (
-            f"cage.bar_width_mm = {width:g}: between {bearing.rollers} such bars pockets have {max(pocket, 0.0):.4g} mm, too narrow "
+            f"cage.bar_width_mm = {width:g}: {bearing.rollers} such bars leave pockets of {max(pocket, 0.0):.4g} mm, too narrow "
             f"for rollers of {roller:g} mm; make it narrower"
         )
     if thickness >= roller:
         yield (
-            f"cage.bar_thickness_mm = {thickness:g}: a cage between the raceways is thinner than a roller of {roller:g} mm; "
-            "make it thinner"
+            f"cage.bar_thickness_mm = {thickness:g}: must be less than the roller diameter of {roller:g} mm for a cage between "
+            "the raceways; make it thinner"
         )
     if length < bearing.roller_length_mm:
         yield (
-            f"cage.bar_length_mm = {length:g}: a pocket is no shorter than its roller of {bearing.roller_length_mm:g} mm; "
-            "lengthen it"
+            f"cage.bar_length_mm = {length:g}: the pocket is shorter than its roller of {bearing.roller_length_mm:g} mm; lengthen it"
         )
 
 
 def section_notes(bearing: Bearing, cage: Cage, stiffness: float | str) -> tuple[str, ...]:
-    """A sentence that states a stiffness [N/m] by the section, with its error; none where the scene gives no section."""
+    """A sentence on the stiffness [N/m] by the section, with its error; none where the scene states no section."""
     if section_of(bearing, cage) is None or isinstance(stiffness, str):
         return ()
     low, high = (100.0 * (factor - 1.0) for factor in STIFFNESS_ERROR)
-    return (f"cage: by their section bars have {stiffness:.3g} N/m (model.{STIFFNESS}), {low:+.0f} to {high:+.0f} %",)
+    return (f"cage: the section gives bars of {stiffness:.3g} N/m (model.{STIFFNESS}), {low:+.0f} to {high:+.0f} %",)

@@ -1,4 +1,4 @@
-"""Radii, masses and speeds of a roller bearing as it is mounted: worked out once a scene, in SI."""
+"""Radii, masses and speeds of a mounted roller bearing in SI, computed once for a scene."""
 
 import math
 from dataclasses import dataclass
@@ -20,13 +20,12 @@ class Kinematics(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What follows from a drawing and its mounting.
+    """Geometry from a drawing and its mounting.
 
-    ``raceways``: radii of the outer and the inner one [m], the mounted diametral ``clearance`` [m] split evenly about the
-    pitch circle. ``roller_radii``: of each roller [m], None where all have ``roller_radius``. ``land_radius``,
-    ``rim_radius``: of the estimated cage body, at the land and away from it [m]; ``cage_inertia`` [kg m^2]: given, or that of
-    a plain ring between them. ``roller_mass`` [kg]: of a plain cylinder; ``centrifugal_force`` [N]: on it at the nominal
-    speed.
+    ``raceways``: radii of outer and inner raceway [m], with the mounted diametral ``clearance`` [m] split evenly about the pitch
+    circle. ``roller_radii``: radius of each roller [m]; None where all have ``roller_radius``. ``land_radius``, ``rim_radius``:
+    radii of the cage body at the land and opposite [m]. ``cage_inertia`` [kg m^2]: stated, or that of a plain ring between these
+    radii. ``roller_mass`` [kg]: mass of a plain cylinder. ``centrifugal_force`` [N]: force on it at the nominal speed.
     """
 
     clearance: float
@@ -42,7 +41,7 @@ class Geometry:
 
     @property
     def reduced_radii(self) -> tuple[float, float]:
-        """Reduced radius of the contact of roller and outer race, roller and inner race [m]."""
+        """Reduced radii of the contacts of a roller with the outer and the inner race [m]."""
         outer, inner = self.raceways
         return 1.0 / (1.0 / self.roller_radius - 1.0 / outer), 1.0 / (1.0 / self.roller_radius + 1.0 / inner)
 
@@ -52,7 +51,7 @@ class Geometry:
 
 
 def epicyclic(raceways: tuple[float, float], radius: float, inner_speed: float, outer_speed: float) -> Kinematics:
-    """Rolling without slip, cage = (inner R_i + outer R_o)/(R_i + R_o), at ring speeds [rad/s]."""
+    """Rolling without slip at ring speeds [rad/s]: cage = (inner R_i + outer R_o)/(R_i + R_o)."""
     outer, inner = raceways
     cage = (inner_speed * inner + outer_speed * outer) / (inner + outer)
     return Kinematics(cage, (outer_speed * outer - cage * (outer - radius)) / radius, (inner_speed - cage) * inner)
@@ -61,7 +60,7 @@ def epicyclic(raceways: tuple[float, float], radius: float, inner_speed: float, 
 def geometry_of(scene: Scene) -> Geometry:
     """Geometry of a scene."""
     bearing, cage = scene.bearing, scene.cage
-    # Sums in the unit of the drawing, as they stand there.
+    # Sums are in the unit of the drawing, so that they are exact there.
     pitch, roller, half = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, 0.5 * scene.mounted_clearance_mm
     land, side = scene.land_diameter_mm, {"outer": -1.0, "inner": 1.0, "roller": 1.0}[cage.guidance]
     rim = pitch + side * roller / 3.0
@@ -84,7 +83,7 @@ def geometry_of(scene: Scene) -> Geometry:
 
 
 def _roller_radii(scene: Scene) -> Array | None:
-    """A spread is drawn with the scene's seed, once for all replicates: it is one bearing that is simulated."""
+    """Radii with the stated errors or a random spread, which the scene's seed fixes: all replicates run one bearing."""
     bearing = scene.bearing
     errors_um = bearing.roller_diameter_errors_um
     if errors_um is None and bearing.roller_diameter_spread_um > 0.0:

@@ -1,7 +1,7 @@
-"""Every key of an input file with its meaning, unit, range and default, and all of them as a JSON Schema; what a package adds to the manual.
+"""Keys of input files with meaning, unit, range and default, as text and as a JSON Schema; what a package adds to the manual.
 
-A key is described by the docstring under its field, which changes neither figures nor compiled code. Descriptions are read
-from the source only here: reading them whenever a scene is loaded would take a tenth of a second.
+The docstring under a field describes its key; editing it changes neither figures nor compiled code. Descriptions are read from
+the source only here, because this takes a tenth of a second.
 """
 
 import ast
@@ -18,23 +18,24 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from pydantic import BaseModel
 
+from rbdyn.base.command import flag, print_json
 from rbdyn.base.faults import InputError
-from rbdyn.base.options import flag
-from rbdyn.base.terminal import print_json
 from rbdyn.base.words import quantity
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WIDTH = 100
-# Bounds that only keep products from overflowing are not given.
+# Larger bounds only prevent overflow and are not listed.
 BOUNDLESS = 1e12
-Word = Annotated[str | None, typer.Argument(metavar="WORD", help="Only keys that have it in name or description.")]
-AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, by which an editor completes TOML.")]
-# What a whole number or a length in turns is counted by, by the end of a key.
+Word = Annotated[
+    str | None, typer.Argument(metavar="WORD", help="List only keys with this word in name or description.")
+]
+AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, with which an editor completes TOML.")]
+# Unit of numbers and lengths in shaft turns, by the end of a key.
 TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
 
 
 class Part(NamedTuple):
-    """What a package adds to the manual: its chapters, its command and the kinds of its input files."""
+    """Contribution of a package to the manual: its chapters, its command and the kinds of its input files."""
 
     package: str
     prose: Path  # folder of chapters, NN_name.md
@@ -43,7 +44,7 @@ class Part(NamedTuple):
 
 
 class Key(NamedTuple):
-    """One key: its dotted name, with [] behind a list of tables, and what may stand there."""
+    """One key: its dotted name, with [] behind a list of tables, and its description."""
 
     key: str
     file: str
@@ -56,32 +57,32 @@ class Key(NamedTuple):
 
 
 def run(kinds: Mapping[str, type[BaseModel]], word: str | None, as_schema: bool, as_json: bool) -> None:
-    """Print the keys of files by their kind. Raises InputError where no key has the word."""
+    """Print the keys of files by their kind. Raises InputError where no key contains the word."""
     if as_schema:
         print_json(schema(kinds))
         return
-    found = matching(keys(kinds), word)
-    if not found:
+    matches = matching(keys(kinds), word)
+    if not matches:
         raise InputError([f"WORD = {word!r}: no key contains it; try a shorter word, or none for all keys"])
     if as_json:
-        print_json({"keys": [key._asdict() for key in found]})
+        print_json({"keys": [key._asdict() for key in matches]})
         return
     file = ""
-    for key in found:
+    for key in matches:
         if key.file != file:
             file = key.file
             print(f"{file}\n{'=' * len(file)}")
         print("\n".join(lines(key)))
 
 
-def matching(found: list[Key], word: str | None) -> list[Key]:
-    """Keys with the word in name or description, capitals or not."""
-    sought = (word or "").lower()
-    return [key for key in found if sought in key.key.lower() or sought in key.description.lower()]
+def matching(all_keys: list[Key], word: str | None) -> list[Key]:
+    """Keys with the word in name or description, in any case."""
+    pattern = (word or "").lower()
+    return [key for key in all_keys if pattern in key.key.lower() or pattern in key.description.lower()]
 
 
 def lines(key: Key) -> list[str]:
-    """How a key is printed: name, unit, values and default; below, what it means."""
+    """A key as printed: name, values, unit and default; below, its meaning."""
     default = (
         "required" if key.required else "may be left out" if key.default is None else f"default {_toml(key.default)}"
     )
@@ -100,48 +101,48 @@ def schema(kinds: Mapping[str, type[BaseModel]]) -> dict[str, Any]:
     refs, whole = models_json_schema([(model, "validation") for model in kinds.values()])
     described: dict[str, dict[str, str]] = {}
     for model in _models(kinds.values()):
-        # A name that two modules use stands in the schema with the module before it.
+        # The schema prefixes a name that two modules use with the module.
         name = next(n for n in (model.__name__, _long_name(model)) if n in whole["$defs"])
         described[name] = descriptions(model)
     for name, table in whole["$defs"].items():
-        for key, each in table.get("properties", {}).items():
-            each["description"] = described[name][key]
-            each.pop("title", None)
-            each.pop("pattern", None)  # in a dialect that editors do not know
+        for key, node in table.get("properties", {}).items():
+            node["description"] = described[name][key]
+            node.pop("title", None)
+            node.pop("pattern", None)  # in a dialect that editors cannot read
     options = [{"title": kind, **refs[(model, "validation")]} for kind, model in kinds.items()]
     return {"$schema": DIALECT, "oneOf": options, "$defs": whole["$defs"]}
 
 
 def keys(kinds: Mapping[str, type[BaseModel]]) -> list[Key]:
-    """Keys of each kind of file; one that a former kind has too, with the same meaning, is listed once."""
+    """Keys of each kind of file; a key of several kinds with one meaning is listed once."""
     whole = schema(kinds)
-    found: dict[tuple[str, str], Key] = {}
+    by_meaning: dict[tuple[str, str], Key] = {}
     for option in whole["oneOf"]:
         for key in _keys_of(whole["$defs"], _target(option), "", option["title"]):
-            found.setdefault((key.key, key.description), key)
-    return list(found.values())
+            by_meaning.setdefault((key.key, key.description), key)
+    return list(by_meaning.values())
 
 
 @functools.cache
 def descriptions(model: type[BaseModel]) -> dict[str, str]:
-    """Docstrings under the fields of a model and of those that it extends, each as one line."""
-    found: dict[str, str] = {}
-    for each in reversed(model.__mro__):
-        if each.__module__.partition(".")[0] == "pydantic" or not hasattr(each, "model_fields"):
+    """Docstrings under the fields of a model and of its bases, each as one line."""
+    texts: dict[str, str] = {}
+    for base in reversed(model.__mro__):
+        if base.__module__.partition(".")[0] == "pydantic" or not hasattr(base, "model_fields"):
             continue
-        body = _classes(each.__module__)[each.__name__].body
+        body = _classes(base.__module__)[base.__name__].body
         for field, text in pairwise(body):
             if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
                 value = getattr(text, "value", None)
                 if isinstance(text, ast.Expr) and isinstance(value, ast.Constant):
-                    found[field.target.id] = " ".join(str(value.value).split())
-    return {name: found[name] for name in model.model_fields}
+                    texts[field.target.id] = " ".join(str(value.value).split())
+    return {name: texts[name] for name in model.model_fields}
 
 
 @functools.cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
     tree = ast.parse(inspect.getsource(sys.modules[module]))
-    return {each.name: each for each in tree.body if isinstance(each, ast.ClassDef)}
+    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
 def _long_name(model: type[BaseModel]) -> str:
@@ -149,21 +150,19 @@ def _long_name(model: type[BaseModel]) -> str:
 
 
 def _models(roots: Any) -> list[type[BaseModel]]:
-    """The models and all that their fields hold."""
-    from pydantic import BaseModel
-
-    found: dict[type[BaseModel], None] = {}
+    """The models and all models in their fields."""
+    models: dict[type[BaseModel], None] = {}
     waiting: list[Any] = list(roots)
     while waiting:
-        each = waiting.pop()
-        if isinstance(each, type) and issubclass(each, BaseModel):
-            if each not in found:
-                found[each] = None
-                waiting += [field.annotation for field in each.model_fields.values()]
-                waiting.append(each.__annotations__.get("__pydantic_extra__"))
+        kind = waiting.pop()
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            if kind not in models:
+                models[kind] = None
+                waiting += [field.annotation for field in kind.model_fields.values()]
+                waiting.append(kind.__annotations__.get("__pydantic_extra__"))
         else:
-            waiting += getattr(each, "__args__", ())
-    return list(found)
+            waiting += getattr(kind, "__args__", ())
+    return list(models)
 
 
 def _target(node: Mapping[str, Any]) -> str:
@@ -176,27 +175,27 @@ def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> It
     if isinstance(free := table.get("additionalProperties"), dict):
         yield from _keys_of(tables, _target(free), f'{prefix}"TABLE.KEY".', file)
     for key, node in table["properties"].items():
-        inner = [each for each in node.get("anyOf", [node]) if each.get("type") != "null"]
+        kinds = [kind for kind in node.get("anyOf", [node]) if kind.get("type") != "null"]
         whole = f"{prefix}{key}"
         required = key in table.get("required", ())
-        nested = [(each, "") for each in inner if "$ref" in each]
-        nested += [(each["items"], "[]") for each in inner if "$ref" in each.get("items", {})]
-        plain = [each for each in inner if "$ref" not in each and "$ref" not in each.get("items", {})]
+        nested = [(kind, "") for kind in kinds if "$ref" in kind]
+        nested += [(kind["items"], "[]") for kind in kinds if "$ref" in kind.get("items", {})]
+        plain = [kind for kind in kinds if "$ref" not in kind and "$ref" not in kind.get("items", {})]
         values = " or ".join(
             filter(None, [*map(_values, plain), *("a list of tables" if m else "a table" for _, m in nested)])
         )
         default = None if nested and not plain else node.get("default")
         yield Key(whole, file, _unit(key), values, default, required, node["description"], _unknown(whole))
-        for each, mark in nested:
-            yield from _keys_of(tables, _target(each), f"{whole}{mark}.", file)
+        for target, mark in nested:
+            yield from _keys_of(tables, _target(target), f"{whole}{mark}.", file)
 
 
 def _unknown(key: str) -> str:
-    """Over which range a key may lie that nobody knows, and why."""
+    """The documented range of an unknown key, with its reason."""
     from rbdyn.scene.uncertain import documented
 
-    ranges = [f"{each.words}: {each.reason}" for each in documented() if each.key == key]
-    return f"Where not known: {'; or '.join(ranges)}." if ranges else ""
+    ranges = [f"{entry.words} ({entry.reason})" for entry in documented() if entry.key == key]
+    return f"If unknown: {', or '.join(ranges)}." if ranges else ""
 
 
 def _unit(key: str) -> str:
@@ -204,9 +203,9 @@ def _unit(key: str) -> str:
 
 
 def _values(node: Mapping[str, Any]) -> str:
-    """What may stand there, in words."""
+    """Possible values in words."""
     if "enum" in node or "const" in node:
-        return " | ".join(_toml(each) for each in node.get("enum", [node.get("const")]))
+        return " | ".join(_toml(value) for value in node.get("enum", [node.get("const")]))
     kind = node.get("type")
     if kind == "array":
         items = node.get("items")
@@ -233,7 +232,7 @@ def _range(node: Mapping[str, Any]) -> str:
 
 
 def _toml(value: Any) -> str:
-    """A default as it would be written."""
+    """A default as written in TOML."""
     if isinstance(value, bool):
         return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""The oil and the traction it gives."""
+"""The oil and the traction of the races."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from rbdyn.base.faults import Consistent
-from rbdyn.base.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
-from rbdyn.properties.lubricants import OILS, Oil, oil_at
+from rbdyn.base.faults import SI, Consistent, Fraction, NonNegative, NotVanishing, Positive, Share
+from rbdyn.properties.materials import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
@@ -24,10 +23,10 @@ GRADE = "ISO VG "
 HOTTEST_C = 350.0
 # Kinematic viscosity [mm^2/s] beyond that of any oil, even at its pour point.
 THICKEST = 1e7
-# Keys that specify a grade or a data sheet; a scene without them is saved without them.
+# Keys of a grade or a data sheet, which a scene without them does not save.
 DATA_KEYS = ("base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3")
 SAVED_IF_GIVEN = (*DATA_KEYS, "supply")
-# Keys of [traction] that ask for one curve for all loads.
+# Keys of [traction] for one curve at all loads.
 CURVE_KEYS = ("mu_0", "mu_m", "mu_inf", "u_m_m_s", "constants")
 # Models whose traction follows pressure and temperature.
 RHEOLOGIES = ("thermal_newtonian", "eyring", "limiting_shear")
@@ -40,23 +39,23 @@ def _no_kelvin(value: Any) -> Any:
 
 
 def _four_numbers(value: Any) -> Any:
-    """TOML gives a list."""
+    """The list of TOML as a tuple."""
     if value is not None and not (isinstance(value, list | tuple) and len(value) == 4):
         raise ValueError("must be a list of four numbers, [A, B, C, D]")
     return tuple(value) if isinstance(value, list) else value
 
 
 class Lubricant(Consistent):
-    """The oil, its temperature and where it is."""
+    """The oil, its temperature and its supply."""
 
     oil: OilName
-    """The oil, with its viscosity over temperature and its pressure coefficient; of a grease, its base oil. "data_sheet"
-    takes viscosities_C_mm2_s and density_kg_m3."""
+    """Name of the oil, or of the base oil of a grease, which decides viscosity and pressure coefficient. "data_sheet" needs
+    viscosities_C_mm2_s and density_kg_m3."""
     base_oil: Literal["mineral", "naphthenic", "PAO", "ester", "PAG"] | None = None
-    """Base of a grade or a data sheet, from which its pressure coefficient, density, heat capacity, conductivity and limit
-    of traction are estimated (rbdyn/properties/oils.py); mineral where left out."""
+    """Base oil of a grade or a data sheet. It gives estimates of pressure coefficient, density, heat capacity, conductivity and
+    limiting traction (rbdyn/properties/oils.py). Default: mineral."""
     viscosity_index: Annotated[float, Field(ge=0.0, le=400.0)] | None = None
-    """Viscosity index of a grade; by base oil where left out: mineral 95, naphthenic 50, PAO and ester 140, PAG 200."""
+    """Viscosity index of a grade. Default by base oil: mineral 95, naphthenic 50, PAO and ester 140, PAG 200."""
     viscosities_C_mm2_s: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
     """Two points [temperature in C, kinematic viscosity in mm^2/s] of a data sheet."""
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
@@ -64,39 +63,36 @@ class Lubricant(Consistent):
     temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
     """Temperature of the oil in the contacts."""
     viscosity_mPas: Positive | None = None  # noqa: N815
-    """Dynamic viscosity at temperature_C, in place of the oil's own."""
+    """Dynamic viscosity at temperature_C. Default: that of the oil."""
     pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
-    """alpha of viscosity exp(alpha p), in place of the oil's own: 5 to 25 for oils."""
+    """Pressure coefficient alpha of viscosity exp(alpha p), 5 to 25 for oils. Default: that of the oil."""
     supply: Supply | None = None
-    """How the bearing gets its oil: bath, drop (drop feed), jet, oil_air or grease. It changes no law of motion: it sets the
-    starvation of the maker's friction model and the documented ranges of inlet_distance and oil_fraction."""
+    """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. It sets the starvation of the maker's friction model and
+    the documented ranges of inlet_distance and oil_fraction. It changes no law of motion."""
     oil_fraction: Fraction = 0.02
-    """Share of oil in the mixture that rollers plough through: 0.2 to 5 % for jet lubrication."""
+    """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
-    """Roughness of the rollers, root mean square. Honed rollers of aircraft bearings have 0.03 to 0.1; 0.05 on both
-    gives Lambda = 2.4 to 2.9 in the bearing of Chen et al. 2022 at 100 C, 0.1 gives 1.2 to 1.45."""
+    """Root-mean-square roughness of the rollers, 0.03 to 0.1 for honed rollers of aircraft bearings. In the bearing of Chen et
+    al. 2022 at 100 C, 0.05 on rollers and races gives Lambda = 2.4 to 2.9, and 0.1 gives 1.2 to 1.45."""
     race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
-    """Roughness of the races, root mean square. Honed races of aircraft bearings have 0.03 to 0.1."""
+    """Root-mean-square roughness of the races, 0.03 to 0.1 for honed races of aircraft bearings."""
     inlet_distance: Positive | None = None
-    """Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style
-    inputs have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance. For baths, drop feed, oil-air
-    and grease 5 (2 to 10) is assumed: over 135 points of five catalogue bearings it takes out trends over oil and load
-    against SKF's rolling moment, which no constant factor can. It starves film, traction and rolling together: SKF's own
-    starvation factor does not go into model.rolling_resistance_factor as well, or it would count twice."""
+    """Distance from the start of the oil to the edge of a contact, in half-widths of the contact. Default: flooded. ADORE-style
+    inputs have 10, which does not change the film and reduces the rolling resistance by 5 to 19 %. For baths, drop feed, oil-air
+    and grease 5 (2 to 10) is assumed. Over 135 points of five catalogue bearings this removes trends over oil and load compared
+    with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
+    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
     roller_roughness, race_roughness = SI("um"), SI("um")
 
     def faults(self) -> Iterator[str]:
-        """Whether the oil is given once: by name, by grade with base oil and index, or by a data sheet."""
+        """Whether the oil is stated once: by name, by grade with base oil and index, or by a data sheet."""
         sheet = self.oil == "data_sheet"
         alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
-        given = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
-        for key in (key for key in given if key in alien):
-            yield (
-                f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} sets that by itself; leave it out or "
-                "name another"
-            )
+        data = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
+        for key in (key for key in data if key in alien):
+            yield f"lubricant.{key} = {data[key]}: contradicts lubricant.oil = {self.oil!r}, which implies it; leave out one of them"
         for key in ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ():
-            if key not in given:
+            if key not in data:
                 yield f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it"
         points = self.viscosities_C_mm2_s or []
         if any(len(point) != 2 for point in points):
@@ -105,8 +101,8 @@ class Lubricant(Consistent):
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
                 yield (
-                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to "
-                    f"{HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
+                    f"lubricant.viscosities_C_mm2_s = {points}: viscosity must fall with temperature, within -60 to {HOTTEST_C:g} C "
+                    f"and 0.5 to {THICKEST:g} mm2/s; fix the points"
                 )
 
     @model_serializer(mode="wrap")
@@ -130,9 +126,9 @@ class Lubricant(Consistent):
 
     @property
     def estimates(self) -> tuple[str, ...]:
-        """A sentence on what is estimated of the oil, where its name does not give all."""
+        """A sentence on the estimated properties of the oil; none where its name gives all."""
         if self.oil == "MIL-L-85734":
-            return ("lubricant: MIL-L-85734 is taken as MIL-L-23699, of whose class it is",)
+            return ("lubricant: MIL-L-85734 is treated as MIL-L-23699, an oil of the same class",)
         if self.oil in OILS:
             return ()
         oil, parts, graded = self.in_service, [], self.oil.startswith(GRADE)
@@ -153,8 +149,12 @@ class Lubricant(Consistent):
 
     @property
     def in_service(self) -> Oil:
-        """The oil at its temperature, with what the scene replaces."""
-        oil = oil_at(self.oil, self.temperature_C) if self.oil in OILS else self._fluid().at(self.temperature_C)
+        """The oil at its temperature, with the properties that the scene states."""
+        oil = (
+            oil_at(self.oil, self.temperature_C)
+            if self.oil in OILS
+            else self._fluid().at_temperature(self.temperature_C)
+        )
         if self.viscosity_mPas is not None:
             viscosity = self.viscosity_mPas * 1e-3
             slope = oil.viscosity_slope * viscosity / oil.viscosity
@@ -165,10 +165,10 @@ class Lubricant(Consistent):
 
 
 def with_traction_of_oil(scene: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Tables of a scene, with the traction that goes with its oil where [traction] leaves it out.
+    """Tables of a scene, with the default traction of its oil where [traction] states none.
 
-    MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils that are given by a grade or a data sheet yield at the
-    limit of their base oil; other turbine oils are taken as MIL-L-23699 in a thermal film, of which they are the class.
+    MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils by grade or data sheet yield at the limit of their base
+    oil. Other turbine oils have the thermal film of MIL-L-23699, which is of their class.
     """
     oil, traction = (scene.get(table, {}) for table in ("lubricant", "traction"))
     if not isinstance(oil, Mapping) or not isinstance(traction, Mapping):
@@ -188,12 +188,12 @@ class Traction(Consistent):
     """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
-    """Law of the traction. four_constant: one curve for all loads, as in the paper, too hard for lightly loaded
-    rollers, so skidding is under-predicted; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
-    coulomb: dry. Where left out limiting_shear for oils by grade or data sheet, thermal_newtonian for turbine oils
-    next to MIL-L-7808 and MIL-L-23699."""
+    """Law of the traction. four_constant: one curve for all loads, as in Chen et al. 2022, which overestimates the traction of
+    lightly loaded rollers and so under-predicts skidding; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
+    coulomb: dry. Default: limiting_shear for oils by grade or data sheet, four_constant for MIL-L-7808 and MIL-L-23699,
+    thermal_newtonian for other turbine oils."""
     mu_0: NonNegative = 0.0
-    """Traction coefficient without slip, of an ADORE-style set for a turbine-engine oil."""
+    """Traction coefficient at zero slip, of an ADORE-style set for a turbine-engine oil."""
     mu_m: NonNegative = 0.050
     """Largest traction coefficient, at the slip u_m_m_s."""
     mu_inf: NonNegative = 0.036
@@ -203,63 +203,66 @@ class Traction(Consistent):
     constants: Annotated[tuple[float, float, float, float] | None, BeforeValidator(_four_numbers)] = None
     """A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
     rheology_oil: RheologyOil | None = None
-    """Oil of the thermal_newtonian constants of Gupta et al. 1981; lubricant.oil where left out, MIL-L-23699 for turbine
-    oils that have none of their own."""
+    """Oil of the thermal_newtonian constants of Gupta et al. 1981. Default: lubricant.oil, or MIL-L-23699 for turbine oils without
+    constants."""
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
     """Eyring stress: 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977)."""
     limiting_shear_ratio: Share = 0.07
-    """Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979)."""
+    """Ratio of shear stress to pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979)."""
     largest_shear_ratio: Share = 0.1
-    """Cap on shear stress over pressure of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
-    """
+    """Largest ratio of shear stress to pressure for thermal_newtonian and eyring, whose stress is unbounded above 1.5 GPa."""
     elasticity: bool = False
-    """Tangential elasticity of the races: their contacts give way before traction follows the steady law, by a spring as stiff as
-    the contact is against approach. Loaded contacts with a steep traction curve then need no implicit method: most bearings of
-    "rbdyn new" run five to ten times faster. Loss, slip and whirl stay the same; impacts may be lower, for a roller then gives way
-    between wall and race: by 5 % for the NU 210 at its defaults (137.8 +- 2.9 N against 144.5 +- 2.6 N, 60 replicates)."""
+    """Tangential elasticity of the race contacts: a spring as stiff as the contact in approach acts before traction follows the
+    steady law. Contacts with a steep traction curve then need no implicit method, and most bearings of "rbdyn new" run five to
+    ten times faster. Loss, slip and whirl do not change. Impacts may be lower, because a roller between wall and race gives way:
+    by 5 % for the NU 210 at its defaults (137.8 +- 2.9 N compared with 144.5 +- 2.6 N, 60 replicates)."""
     friction: Literal["film", "mixed"] = "film"
-    """film: the oil carries all; mixed: asperities carry the share exp(-b Lambda^c) of a load (Zhou and Hoeprich 1991)
-    and rub dry."""
+    """film: the oil film carries the whole load; mixed: asperities carry the share exp(-b Lambda^c) of the load in dry friction
+    (Zhou and Hoeprich 1991)."""
     boundary_friction: NonNegative = 0.1
     """Friction coefficient of asperities, for friction = "mixed"."""
     asperity_b: Positive = 2.32
-    """b of the asperities' share exp(-b Lambda^c): raceways of a tapered roller bearing, composite roughness 0.16 um
-    (Lubricants 11, 2023, 369, Table 4). It belongs to a surface finish: Zhou and Hoeprich give no general values."""
+    """Constant b of the asperities' share exp(-b Lambda^c) for raceways of a tapered roller bearing with a composite roughness of
+    0.16 um (Lubricants 11, 2023, 369, Table 4). It depends on the surface finish: Zhou and Hoeprich state no general values."""
     asperity_c: Positive = 0.97
-    """c of the asperities' share exp(-b Lambda^c), of the same source."""
+    """Constant c of the asperities' share exp(-b Lambda^c), from the same source."""
     coulomb: NonNegative = 0.1
     """Friction coefficient of dry races, for model = "coulomb"."""
     blend_speed_m_s: Positive = 0.02
-    """Slip over which friction changes sign, where it would otherwise jump."""
+    """Slip over which the friction force changes sign smoothly instead of a jump."""
     eyring_stress = SI("MPa")
 
     def faults(self) -> Iterator[str]:
         if self.constants is not None:
             yield from self._constant_faults(*self.constants)
         elif self.model == "four_constant" and not self.mu_m > max(self.mu_0, self.mu_inf):
-            what = f"traction.mu_m = {self.mu_m:g}: the peak must lie above traction.mu_0 = {self.mu_0:g}"
-            yield f"{what} and traction.mu_inf = {self.mu_inf:g}; raise it"
+            yield (
+                f"traction.mu_m = {self.mu_m:g}: the peak must lie above traction.mu_0 = {self.mu_0:g} and "
+                f"traction.mu_inf = {self.mu_inf:g}; raise it"
+            )
         if self.friction == "mixed" and self.model in ("coulomb", "off"):
-            what = f"traction.friction = 'mixed': traction.model = '{self.model}' has no film"
-            yield f"{what}; choose a model of a film or set traction.friction = 'film'"
+            yield (
+                f"traction.friction = 'mixed': traction.model = '{self.model}' has no film; choose a model of a film or set "
+                "traction.friction = 'film'"
+            )
         if self.elasticity and self.model == "off":
             yield "traction.elasticity = true and traction.model = 'off' contradict each other; leave out the elasticity"
 
     def _constant_faults(self, a: float, b: float, c: float, d: float) -> Iterator[str]:
-        shown = f"traction.constants = [{a:g}, {b:g}, {c:g}, {d:g}]"
+        key = f"traction.constants = [{a:g}, {b:g}, {c:g}, {d:g}]"
         fields = type(self).model_fields
         rivals = [key for key in ("mu_0", "mu_m", "mu_inf", "u_m_m_s") if getattr(self, key) != fields[key].default]
         if rivals:
-            keys = " and ".join(f"traction.{key} = {getattr(self, key):g}" for key in rivals)
-            yield f"{shown}: contradicts {keys}; give the constants or the peak, not both"
+            others = " and ".join(f"traction.{name} = {getattr(self, name):g}" for name in rivals)
+            yield f"{key}: contradicts {others}; give the constants or the peak, not both"
         if c <= 0.0:
-            yield f"{shown}: the third, C, must be greater than 0; fix it"
+            yield f"{key}: the third, C, must be greater than 0; fix it"
         elif smallest_traction(a, b, c, d) < 0.0:
-            yield f"{shown}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; fix them"
+            yield f"{key}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; fix them"
 
 
 def smallest_traction(a: float, b: float, c: float, d: float) -> float:
-    """Smallest value of (a + b u) exp(-c u) + d at u >= 0, with c > 0: at rest, far out or, for b < 0, in between."""
+    """Smallest value of (a + b u) exp(-c u) + d at u >= 0, with c > 0: at u = 0, at infinity or, for b < 0, in between."""
     values = [a + d, d]
     lowest = 1.0 / c - a / b if b < 0.0 else 0.0
     if lowest > 0.0:

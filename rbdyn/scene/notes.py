@@ -1,4 +1,4 @@
-"""What to look at again in a scene: values that look like another unit, dimensions that do not go with the designation stated."""
+"""Notes on suspicious values of a scene: a probable slip of the unit, dimensions that contradict the stated designation."""
 
 import math
 from collections.abc import Mapping
@@ -7,11 +7,11 @@ from rbdyn.properties.catalogue import Designation, Envelope, envelope, read_des
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage
 from rbdyn.scene.lubricant import Lubricant
-from rbdyn.scene.mounting import Mounting
+from rbdyn.scene.operation import Mounting
 
-# A key, its value or None, the ends of what is usual.
+# A key, its value or None, and its usual range.
 Usual = tuple[str, float | None, tuple[float, float]]
-# By the unit of a key, what a number in another unit is multiplied by; kelvin are shifted.
+# Factor from another unit, by the unit of a key; kelvin are shifted.
 FACTORS = {
     "mm": {"m": 1e3, "um": 1e-3},
     "um": {"mm": 1e3, "nm": 1e-3},
@@ -22,14 +22,14 @@ FACTORS = {
     "N_m": {"N/um": 1e6, "N/mm": 1e3},
 }
 ZERO_C_K = 273.15
-# Ester oils bear some 200 C and stiffen towards -54 C; bearing steels lose their hardness beyond 300 C, tool steels later.
+# Usual temperatures. Ester oils endure about 200 C and stiffen towards -54 C; bearing steels lose hardness above 300 C.
 OIL_C, RING_C = (-60.0, 220.0), (-60.0, 300.0)
 
 
-# Of a lubricant [1/GPa]: water has less than 1, the thickest mineral oils in the cold 60.
+# Usual pressure coefficient [1/GPa]: below 1 for water, 60 for the thickest mineral oils in the cold.
 PRESSURE_COEFFICIENT = (2.0, 80.0)
-# Stiffness of a bar over modulus and length of the roller: 0.005 of long slender bars, 0.3 of stubby ones, by the finite elements
-# of tests/oracle/test_cage_bar.py; a cage of another material than the scene says has a fortieth or forty times that.
+# Stiffness of a bar over modulus times roller length: 0.005 for slender bars, 0.3 for stubby ones, by the finite elements of
+# tests/oracle/test_cage_bar.py; a factor of forty to each side allows for another material.
 BAR_STIFFNESS = (1e-4, 20.0)
 
 
@@ -41,11 +41,13 @@ def unit_notes(
     cage_material: Material,
     bar_stiffness: float | str,
 ) -> tuple[str, ...]:
-    """One sentence a suspicious value; ``cage_material``: its density shows a cage that fills half the rollers' height, its
-    modulus how stiff a bar may be; ``bar_stiffness`` [N/m] or "rigid".
+    """One sentence for each suspicious value.
+
+    ``cage_material``: its density gives a usual mass of the cage, its modulus a usual stiffness of bars; ``bar_stiffness`` [N/m]
+    or "rigid".
     """
     usual = [*_of_cage(bearing, cage, cage_material, bar_stiffness), *_of_section(bearing, cage)]
-    # The least clearances are below any grade of manufacture, the largest some times the loosest class.
+    # The least clearances are below any tolerance grade, the largest several times the loosest class.
     usual += [
         (
             "bearing.radial_clearance_mm",
@@ -58,15 +60,15 @@ def unit_notes(
         ("lubricant.pressure_coefficient_1_GPa", oil.pressure_coefficient_1_GPa, PRESSURE_COEFFICIENT),
         ("lubricant.temperature_C", oil.temperature_C, OIL_C),
     ]
-    warm = {} if mounting is None else mounting.model_dump()
-    usual += [(f"mounting.{key}", value, RING_C) for key, value in warm.items() if key.endswith("_C")]
+    temperatures = {} if mounting is None else mounting.model_dump()
+    usual += [(f"mounting.{key}", value, RING_C) for key, value in temperatures.items() if key.endswith("_C")]
     return tuple(
         _note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1]
     )
 
 
 def _of_cage(bearing: Bearing, cage: Cage, material: Material, bar_stiffness: float | str) -> list[Usual]:
-    """Values of a cage and of the stiffness of its bars, with what is usual."""
+    """Values of a cage and the stiffness of its bars, with their usual ranges."""
     pitch, roller, length = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, bearing.roller_length_mm
     mass_g = 1e-6 * material.density * math.pi * pitch * 0.5 * roller * (length + cage.lands * cage.land_width_mm)
     inertia = 1e-3 * mass_g * (0.5 * pitch) ** 2
@@ -83,7 +85,7 @@ def _of_cage(bearing: Bearing, cage: Cage, material: Material, bar_stiffness: fl
 
 
 def _of_section(bearing: Bearing, cage: Cage) -> list[Usual]:
-    """Sizes of the section of a cage, with what is usual."""
+    """Sizes of the section of a cage, with their usual ranges."""
     roller, length = bearing.roller_diameter_mm, bearing.roller_length_mm
     return [
         (
@@ -98,64 +100,71 @@ def _of_section(bearing: Bearing, cage: Cage) -> list[Usual]:
 
 
 def _note(key: str, value: float, low: float, high: float) -> str:
-    """The sentence on a value outside its usual range, with the unit that may have been meant."""
+    """The sentence on a value outside its usual range, with the probable unit."""
     unit = next((unit for unit in FACTORS if key.endswith(f"_{unit}")), "")
-    meant = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
-    meant |= {"K": value - ZERO_C_K} if key.endswith("_C") else {}
-    likely = {other: number for other, number in meant.items() if low <= number <= high}
+    candidates = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
+    candidates |= {"K": value - ZERO_C_K} if key.endswith("_C") else {}
+    likely = {other: number for other, number in candidates.items() if low <= number <= high}
     other = _nearest(likely, low, high)
     fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
     return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}"
 
 
 def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:
-    """Of units that would all do, the one whose number is nearest to the middle of the range; None of none."""
+    """The likely unit whose number is nearest to the middle of the range; None without a likely unit."""
     if len(likely) < 2:
         return next(iter(likely), None)
     return min(likely, key=lambda other: abs(math.log(likely[other] ** 2 / (low * high))))
 
 
-# Relative errors: of raceways that the catalogue lists, of an estimated roller (series 10 within 10 %) and pitch circle.
+# Relative tolerances of sizes in the catalogue, of an estimated roller (series 10 within 10 %) and of its pitch circle.
 LISTED, ROLLER, PITCH = 0.01, 0.12, 0.01
 
 
-def catalogued(bearing: Bearing) -> tuple[Designation, Envelope] | None:
+def catalogue_entry(bearing: Bearing) -> tuple[Designation, Envelope] | None:
     """The designation of a bearing with its catalogue sizes; None where the scene states none."""
     if bearing.designation is None:
         return None
-    named = read_designation(bearing.designation)
-    return named, envelope(named)
+    designation = read_designation(bearing.designation)
+    return designation, envelope(designation)
 
 
 def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> tuple[str, ...]:
-    """One note on all dimensions that the catalogue has otherwise, none where the scene states no designation."""
-    listed = catalogued(bearing)
-    if listed is None:
+    """One note on all dimensions that contradict the catalogue; none where the scene states no designation."""
+    entry = catalogue_entry(bearing)
+    if entry is None:
         return ()
-    named, sizes = listed
-    inside = roller_interior(sizes, named.series == "10")
-    known = sizes.inner_raceway is not None and sizes.outer_raceway is not None
+    designation, sizes = entry
+    interior = roller_interior(sizes, designation.series == "10")
+    both = sizes.inner_raceway is not None and sizes.outer_raceway is not None
     pairs = [
-        ("bearing.pitch_diameter_mm", bearing.pitch_diameter_mm, inside.pitch_diameter, LISTED if known else PITCH),
-        ("bearing.roller_diameter_mm", bearing.roller_diameter_mm, inside.roller_diameter, LISTED if known else ROLLER),
+        ("bearing.pitch_diameter_mm", bearing.pitch_diameter_mm, interior.pitch_diameter, LISTED if both else PITCH),
+        (
+            "bearing.roller_diameter_mm",
+            bearing.roller_diameter_mm,
+            interior.roller_diameter,
+            LISTED if both else ROLLER,
+        ),
     ]
     if mounting is not None:
         pairs += [
             ("mounting.bore_mm", mounting.bore_mm, sizes.bore, LISTED),
             ("mounting.outside_diameter_mm", mounting.outside_diameter_mm, sizes.outside, LISTED),
         ]
-    other = [
-        f"{key} = {given:g} ({expected:g})"
-        for key, given, expected, error in pairs
-        if given is not None and abs(given - expected) > error * expected
+    differences = [
+        f"{key} = {value:g} ({expected:g})"
+        for key, value, expected, error in pairs
+        if value is not None and abs(value - expected) > error * expected
     ]
     if bearing.roller_length_mm > sizes.width:
-        other.append(f"bearing.roller_length_mm = {bearing.roller_length_mm:g} (below {sizes.width:g}, the width)")
-    if not other:
+        differences.append(
+            f"bearing.roller_length_mm = {bearing.roller_length_mm:g} (below {sizes.width:g}, the width)"
+        )
+    if not differences:
         return ()
     return (
         (
-            f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(other)}; "
+            f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(differences)}; "
             "correct the designation or these keys"
         ),
     )

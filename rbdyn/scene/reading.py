@@ -1,4 +1,4 @@
-"""How a scene file is read."""
+"""Reading of scenes from files and tables, and changed copies of a scene."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
@@ -18,23 +18,23 @@ else:
     ModelMetaclass = type(Consistent)
 
 
-class Checked(ModelMetaclass):
-    """Tables given by keyword are checked as those of a file are, with the same messages."""
+class Validation(ModelMetaclass):
+    """Validates tables passed by keyword like those of a file, with the same messages."""
 
-    def __call__(self, *given: Any, **tables: Any) -> Any:
+    def __call__(self, *arguments: Any, **tables: Any) -> Any:
         """The scene of these tables. Raises InputError with all faults at once."""
-        if given:
+        if arguments:
             raise InputError(
                 [
-                    f"{self.__name__}({one_line(repr(given[0]), LONGEST_NAME)}): takes tables by keyword; "
+                    f"{self.__name__}({one_line(repr(arguments[0]), LONGEST_NAME)}): takes tables by keyword; "
                     f"{self.__name__}.load reads a file, {self.__name__}.from_dict a dict"
                 ]
             )
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
-class SceneFile(Consistent, metaclass=Checked):
-    """A scene that is read from TOML. Equal scenes of equal seed and version give equal bits."""
+class SceneFile(Consistent, metaclass=Validation):
+    """A scene from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod
     def load(cls, path: Path | str, overrides: Iterable[str] = ()) -> Self:
@@ -43,26 +43,22 @@ class SceneFile(Consistent, metaclass=Checked):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str = "scene", overrides: Iterable[str] = ()) -> Self:
-        """Validate nested tables as TOML gives them; ``source`` stands in the messages. Raises InputError."""
+        """Validate nested tables in the form of TOML; messages name the ``source``. Raises InputError."""
         if not isinstance(data, Mapping):
-            what = f"{source} = {one_line(repr(data), LONGEST_NAME)}: must be a dict of tables"
-            raise InputError([f"{what}; {cls.__name__}.load reads a file"])
-        listed = [overrides] if isinstance(overrides, str) or not isinstance(overrides, Iterable) else list(overrides)
-        if listed == [overrides] or not all(isinstance(each, str) for each in listed):
-            what = f"overrides = {one_line(repr(overrides), LONGEST_NAME)}"
-            raise InputError([f'{what}: must be a list such as ["cage.mass_g=50"]'])
+            name = one_line(repr(data), LONGEST_NAME)
+            raise InputError([f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file"])
+        assignments = _assignments(overrides)
         data = deepcopy(data)
-        for override in listed:
-            set_key(data, override)
+        for assignment in assignments:
+            set_key(data, assignment)
         scene = validated(cls._of_kind(data), data, source)
-        scene.once("_given", lambda: data)
+        scene.once("_stated", lambda: data)
         return scene
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """The scene with other values under dotted keys, as in ``scene.changed({"cage.mass_g": 50.0})``.
 
-        What was left out is worked out anew, as of a file with these values. Raises InputError with all faults at once, as a
-        file does.
+        Defaults are computed anew, as for a file with these values. Raises InputError with all faults at once.
         """
         if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
             raise InputError(
@@ -74,22 +70,22 @@ class SceneFile(Consistent, metaclass=Checked):
         return self.from_dict(data, "changed scene")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy, of whose changes nothing is left that the original worked out of itself."""
-        copied = super().model_copy(update=update, deep=deep)
-        for name in copied.__dict__.keys() - type(self).model_fields:
-            del copied.__dict__[name]
-        return copied
+        """A copy without the cached properties of the original."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in copy.__dict__.keys() - type(self).model_fields:
+            del copy.__dict__[name]
+        return copy
 
     def once(self, name: str, make: Callable[[], T]) -> T:
-        """What ``make`` gives, worked out once a scene and kept with it under a name: a scene never changes."""
+        """The value of ``make``, computed once for the scene and cached under a name."""
         if name not in self.__dict__:
             self.__dict__[name] = make()
         return cast(T, self.__dict__[name])
 
     @property
     def _tables(self) -> dict[str, Any]:
-        """Tables as they were given, without what was left out."""
-        return self.once("_given", lambda: self.model_dump(exclude_unset=True))
+        """Tables as stated, without defaults."""
+        return self.once("_stated", lambda: self.model_dump(exclude_unset=True))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary}>"
@@ -97,9 +93,9 @@ class SceneFile(Consistent, metaclass=Checked):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the keys that were given."""
+        """Table of the stated keys for a notebook."""
         rows = ((name, ", ".join(_leaves(table))) for name, table in self._tables.items())
-        return html_table(repr(self).strip("<>"), ("table", "keys given"), rows)
+        return html_table(repr(self).strip("<>"), ("table", "stated keys"), rows)
 
     @property
     def summary(self) -> str:
@@ -112,8 +108,18 @@ class SceneFile(Consistent, metaclass=Checked):
         return cls
 
 
+def _assignments(overrides: Any) -> list[str]:
+    """The overrides as a list of texts. Raises InputError for anything else."""
+    if isinstance(overrides, Iterable) and not isinstance(overrides, str):
+        assignments = list(overrides)
+        if all(isinstance(assignment, str) for assignment in assignments):
+            return assignments
+    name = one_line(repr(overrides), LONGEST_NAME)
+    raise InputError([f'overrides = {name}: must be a list such as ["cage.mass_g=50"]'])
+
+
 def _leaves(table: Any, prefix: str = "") -> Iterator[str]:
-    """'key = value' of everything in nested tables; of long lists only how many they hold."""
+    """'key = value' for each key of nested tables; of long lists only the number of values."""
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from _leaves(value, f"{prefix}{key}.")

@@ -1,4 +1,4 @@
-"""Which inputs of a scene are not known, and the scene at values of them."""
+"""Unknown inputs of a scene, and the scene at values of these inputs."""
 
 import difflib
 import functools
@@ -14,7 +14,7 @@ from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, one
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
-# What a key is worth that is left out and follows from the rest, in its own unit.
+# Value of a key without an entry that follows from other keys, in its own unit.
 DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "cage.land_diameter_mm": lambda scene: scene.land_diameter_mm,
     "cage.inertia_kg_mm2": lambda scene: 1e6 * scene.geometry.cage_inertia,
@@ -24,12 +24,12 @@ DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "lubricant.viscosity_mPas": lambda scene: 1e3 * scene.lubricant.in_service.viscosity,
     "lubricant.pressure_coefficient_1_GPa": lambda scene: 1e9 * scene.lubricant.in_service.pressure_coefficient,
 }
-# Keys that follow from other inputs where a scene leaves them out.
+# Keys that follow from other inputs where a scene has no entry.
 FOLLOWING = frozenset({*DERIVED, "model.pocket_bar_stiffness_N_m"})
 
 
 class Input(NamedTuple):
-    """An input that is not known: its key, its law, and why that law."""
+    """An unknown input: its key, its law, and the reason for the law."""
 
     key: str
     law: Law | Sampled
@@ -44,23 +44,23 @@ def inputs_of(
     sample: Mapping[str, Sampled] = MappingProxyType({}),
     source: str = "scene",
 ) -> list[Input]:
-    """Inputs of a scene that are not known, sorted by key: what is declared, and what is documented of the rest.
+    """Unknown inputs of a scene, sorted by key: the declared ones, and the documented ones of all other keys.
 
-    ``data``: the tables that the scene was read from: what stands there is known unless it is named as estimated.
-    ``fixed``: keys that vary otherwise, each with what it is; ``sample``: those of a posterior sample; ``source``: the file
-    that declares them. Raises InputError for keys that cannot vary.
+    ``data``: the tables of the scene, whose entries are exact unless named as estimated. ``fixed``: keys that vary otherwise,
+    each with its role. ``sample``: keys of a posterior sample. ``source``: the file of the declarations. Raises InputError for
+    keys that cannot vary.
     """
     keys = {**uncertain.laws, **sample}
-    known = {each.key for each in documented()}
+    documented_keys = {entry.key for entry in documented()}
     faults = _key_faults(keys)
-    others = Claims({tuple(key.split(".")): what for key, what in fixed.items()})
+    others = Claims({tuple(key.split(".")): role for key, role in fixed.items()})
     faults += [
-        f'uncertain."{key}": is {what} too; take it out of one of them'
+        f'uncertain."{key}": is {role} too; remove it from one of them'
         for key in keys
-        if (what := others.on(tuple(key.split("."))))
+        if (role := others.on(tuple(key.split("."))))
     ]
     faults += [
-        f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; take it out'
+        f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; remove it'
         for pair in uncertain.correlation
         for key in pair.keys
         if key in sample
@@ -68,19 +68,19 @@ def inputs_of(
     faults += [
         f'uncertain.estimated: "{key}" has no documented range; write "{key}" = {{law = ...}}'
         for key in uncertain.estimated
-        if key not in known
+        if key not in documented_keys
     ]
     refuse(f"{source}: {fault}" for fault in faults)
     inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
     inputs += [
-        Input(each.key, each.as_law, each.reason)
-        for each in documented_of(scene)
-        if each.key not in keys
-        and others.on(tuple(each.key.split("."))) is None
+        Input(entry.key, entry.as_law, entry.reason)
+        for entry in documented_of(scene)
+        if entry.key not in keys
+        and others.on(tuple(entry.key.split("."))) is None
         and (
-            each.key in uncertain.estimated
-            or (uncertain.defaults == "documented" and not each.asked and not _given(data, each.key))
+            entry.key in uncertain.estimated
+            or (uncertain.defaults == "documented" and not entry.on_request and not _has_entry(data, entry.key))
         )
     ]
     refuse(f"{source}: {fault}" for fault in _times_faults(scene, inputs))
@@ -89,8 +89,8 @@ def inputs_of(
 
 @functools.cache
 def value_keys() -> Mapping[str, bool]:
-    """Keys of a scene that say something of the bearing, by dotted name: whether a single value may stand there."""
-    return {key: one for key, one in _keys_of(Scene, "") if key.partition(".")[0] not in NO_INPUTS}
+    """Keys of a scene with properties of the bearing, by dotted name: whether they hold a single value."""
+    return {key: single for key, single in _keys_of(Scene, "") if key.partition(".")[0] not in NO_INPUTS}
 
 
 def _keys_of(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, bool]]:
@@ -103,7 +103,7 @@ def _keys_of(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, bool]]:
 
 
 def _kinds(annotation: Any) -> Iterator[Any]:
-    """What a field may hold, one by one; Literal for any choice of texts."""
+    """Types of a field one by one; Literal for any choice of texts."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         yield from _kinds(parts[0])
@@ -114,26 +114,26 @@ def _kinds(annotation: Any) -> Iterator[Any]:
 
 
 def _key_faults(keys: Iterable[str]) -> list[str]:
-    """A sentence for each key at which no law can give a value."""
-    faults, known = list[str](), value_keys()
-    for key in (key for key in keys if not known.get(key)):
+    """A sentence for each key that cannot have a law."""
+    faults, valid = list[str](), value_keys()
+    for key in (key for key in keys if not valid.get(key)):
         name, table = one_line(key, LONGEST_NAME), key.partition(".")[0]
         if table in NO_INPUTS:
-            faults.append(f"uncertain: {name}: {table} holds nothing that can be unknown of a bearing; take it out")
-        elif key in known:
-            faults.append(f"uncertain: {name}: holds more than one value; name a key of a single one")
+            faults.append(f"uncertain: {name}: {table} holds no property of the bearing; remove it")
+        elif key in valid:
+            faults.append(f"uncertain: {name}: holds more than one value; name a key of a single value")
         else:
-            # To look for the nearest key takes a millisecond; beyond what is reported nobody reads it.
-            alike = [each for each in known if each.startswith(f"{table}.")] or known
-            near = difflib.get_close_matches(name, alike, n=1) if len(faults) < MOST_FAULTS else []
-            faults.append(f"uncertain: {name}: unknown key; {f'did you mean {near[0]}?' if near else 'take it out'}")
+            # A search for the nearest key takes a millisecond: only for reported faults.
+            similar = [other for other in valid if other.startswith(f"{table}.")] or valid
+            near = difflib.get_close_matches(name, similar, n=1) if len(faults) < MOST_FAULTS else []
+            faults.append(f"uncertain: {name}: unknown key; {f'did you mean {near[0]}?' if near else 'remove it'}")
     return faults
 
 
 def _times_faults(scene: Scene, inputs: Iterable[Input]) -> Iterator[str]:
-    """A sentence for each input whose law multiplies what is no number, nothing, or itself by way of others."""
-    laws = {each.key: each.law for each in inputs}
-    seen = set[str]()
+    """A sentence for each law whose factor is no number, is 0, or depends on its own key."""
+    laws = {entry.key: entry.law for entry in inputs}
+    visited = set[str]()
     for key, law in laws.items():
         if law.times is None:
             continue
@@ -142,16 +142,16 @@ def _times_faults(scene: Scene, inputs: Iterable[Input]) -> Iterator[str]:
         if not is_number(base):
             yield f"{where}: the scene has no number there; name another key"
         elif base == 0.0:
-            yield f"{where}: the scene has 0 there, of which all multiples are 0; give a law without times"
+            yield f"{where}: the scene has 0 there, so all multiples are 0; give a law without times"
         elif other is not None and not all(map(is_number, getattr(other, "values", None) or ())):
             yield f"{where}: the values of that key are no numbers; name another key"
-        way, at = set[str](), key
-        while at in laws and at not in seen and (base_key := laws[at].times) not in (None, at):
-            way.add(at)
-            seen.add(at)
-            at = str(base_key)
-        if at in way:
-            yield f'{where}: leads back to "{at}"; let one of these keys multiply no other'
+        path, step = set[str](), key
+        while step in laws and step not in visited and (base_key := laws[step].times) not in (None, step):
+            path.add(step)
+            visited.add(step)
+            step = str(base_key)
+        if step in path:
+            yield f'{where}: leads back to "{step}"; remove times from one of these keys'
 
 
 def is_number(value: Any) -> bool:
@@ -162,20 +162,20 @@ def is_number(value: Any) -> bool:
 def with_values(
     data: Mapping[str, Any], source: str, laws: Mapping[str, Law | Sampled], values: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Tables of the scene at values of its inputs; numbers that multiply another key's value do so here.
+    """Tables of the scene at ``values`` of its inputs; relative values are multiplied by the value of their base key.
 
-    Raises InputError where no scene has these values.
+    Raises InputError where these values give no valid scene.
     """
     tables, times = deepcopy(dict(data)), {key: laws[key].times for key in values}
     numbers = {key: value for key, value in values.items() if times[key] is None}
     relative = {key: base for key, base in times.items() if base is not None}
     _multiply(tables, numbers, relative, values)
-    # What a scene is given comes first, for the rest may follow from it, though not from each other.
+    # Stated values come first: derived ones may follow from them, though not from each other.
     for late in (False, True):
         roots = {
             key: base
             for key, base in relative.items()
-            if (base == key or base not in values) and late == (base in FOLLOWING and not _given(tables, base))
+            if (base == key or base not in values) and late == (base in FOLLOWING and not _has_entry(tables, base))
         }
         scene = Scene.from_dict(tables, source) if roots else None
         numbers = {key: _number(scene, base, key, source) * values[key] for key, base in roots.items()}
@@ -187,7 +187,7 @@ def with_values(
 def _multiply(
     tables: dict[str, Any], numbers: dict[str, Any], relative: dict[str, str], values: Mapping[str, Any]
 ) -> None:
-    """Put ``numbers`` of keys into tables, and those of ``relative`` keys that multiply them, which are taken out there."""
+    """Put ``numbers`` of keys into tables, then the products of ``relative`` keys with these, which are removed from there."""
     while numbers:
         for key, value in numbers.items():
             put(tables, key, value)
@@ -217,7 +217,7 @@ def put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def value_of(scene: Scene | None, key: str) -> Any:
-    """What a scene has at a dotted key, given, by default or worked out; None where there is nothing."""
+    """Value of a dotted key of a scene: stated, by default or derived; None without a value."""
     value: Any = scene
     for part in key.split("."):
         value = getattr(value, part, None)
@@ -225,7 +225,7 @@ def value_of(scene: Scene | None, key: str) -> Any:
 
 
 def plain_values(scene: Scene) -> dict[str, Any]:
-    """Value by dotted key of all tables; "left out" where there is none."""
+    """Value by dotted key of all tables; "left out" for a key without a value."""
     return {
         f"{table}.{key}": LEFT_OUT if value is None else value
         for table, keys in scene.model_dump(mode="json").items()
@@ -235,16 +235,16 @@ def plain_values(scene: Scene) -> dict[str, Any]:
 
 
 def documented_of(scene: Scene) -> list[Documented]:
-    """The documented ranges that count for a scene."""
+    """The documented ranges that apply to a scene."""
     values = plain_values(scene)
     moduli = {
         f"materials.{part}.elastic_modulus_GPa": 1e-9 * scene.material(part).elastic_modulus
         for part in type(scene.materials).model_fields
     }
-    counting = [each for each in documented() if each.key in values and each.counts({**values, **moduli})]
-    return [each if each.plus is None else each.about(float(value_of(scene, each.plus))) for each in counting]
+    ranges = [entry for entry in documented() if entry.key in values and entry.counts({**values, **moduli})]
+    return [entry if entry.plus is None else entry.about(float(value_of(scene, entry.plus))) for entry in ranges]
 
 
-def _given(data: Mapping[str, Any], key: str) -> bool:
+def _has_entry(data: Mapping[str, Any], key: str) -> bool:
     table, _, name = key.rpartition(".")
     return isinstance(data.get(table), dict) and name in data[table]

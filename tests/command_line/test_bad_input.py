@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.dimension_chain import read_chains
-from doe.report.steps.fit import design_record
-from doe.report.study.summary import design_record as summary_design
+from doe.report.files import study_design_record as summary_design
+from doe.report.sections.design import design_record
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from doe.workflow.runs import design_of, evaluation
 from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
-from rbdyn.quasistatic.sweep.points import parsed
+from rbdyn.quasistatic.sweep import keys_of_texts
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -48,8 +48,8 @@ def table(folder: Path, text: str | bytes):
     ("text", "words"),
     [
         ("a,b,y\n1,2,3,\n4,5,6,\n", "row 1 has 4 fields and the header 3; remove the commas at its end"),
-        ("a,b,y\n1,2,3,9\n4,5,6,9\n", "row 1 has 4 fields and the header 3; give it a field a column"),
-        ("a,b,y\n1,2,3\n4,5\n", "row 2 has 2 fields and the header 3; give it a field a column"),
+        ("a,b,y\n1,2,3,9\n4,5,6,9\n", "row 1 has 4 fields and the header 3; give it a field for each column"),
+        ("a,b,y\n1,2,3\n4,5\n", "row 2 has 2 fields and the header 3; give it a field for each column"),
         ("a,b,y\n1,2,3\n4,5,6,7\n", "row 2 has 4 fields and the header 3"),
         ("a,b,y,c,c\n1,2,3,4,5\n", "column 'c' comes 2 times; keep one"),
         ("a,b\n1,2\n", "column 'y' is missing; add it"),
@@ -69,7 +69,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y,replicates\n1,2,3,1e300\n", "replicates in row 1 = 1e300: is beyond 1e+09"),
         ("a,b,y,block\n1,2,3,1.5\n", "block in row 1 = 1.5: is not a whole number"),
         ("a,b,y,run,block\n1,2,3,1,1\n1,2,3,1,2\n", "block of run 1 is 2 in one replicate and 1 in another"),
-        ("a,b,y,run,y_error\n1,2,3,1,.1\n1,2,4,1,.1\n", "column y_error: rows of one run are its replicates, whose scatter"),
+        ("a,b,y,run,y_error\n1,2,3,1,.1\n1,2,4,1,.1\n", "column y_error: rows of one run are its replicates, and it follows from their scatter"),
         ("a,b,y,run,replicates\n1,2,3,1,8\n1,2,4,1,8\n", "column replicates: rows of one run are its replicates"),
         ("a,b,y\n1,2,1e-60\n", "y in row 1 = 1e-60: is nearer to 0 than 1e-50; check the unit"),
         ('a,b,y\n1,2,3\n""\n', "row 2 has 1 field and the header 3"),
@@ -77,7 +77,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b," + "y" * 5000 + "\n1,2,3\n", "column 'y' is missing"),
         ("a,b,y\n1,2," + "9" * 5000 + "\n", "is longer than 400 characters; write a shorter number"),
         ("", "is empty; write a header"),
-        ("a,b,y\n", "has a header and no rows; add a row a run"),
+        ("a,b,y\n", "has a header and no rows; add a row for each run"),
         ("a,b,y\n1,2,\0003\n", "y in row 1 = '\\\\x003': is not a finite number"),
         (b"a,b,y\n1,2,3\xe9\n", "line 2: byte 0xe9 is no UTF-8); save the file as UTF-8"),
         (bytes(range(256)), "cannot be read (line 2: byte 0x80"),
@@ -228,7 +228,7 @@ def test_design_and_study_refuse_alike_before_anything_runs(tmp_path, old, new, 
     ("change", "words"),
     [
         (("tolerance = 0.003", ""), "factor.tolerance of radial"),
-        (('goal = "min"', 'goal = "none"'), "one alone has no front"),
+        (('goal = "min"', 'goal = "none"'), "a front needs two responses with a goal"),
     ],
 )
 def test_a_study_without_a_front_is_refused_before_it_runs(tmp_path, change, words):
@@ -242,7 +242,7 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
     """Design, its CSV, the summary and the table of runs number the blocks of a design alike."""
     from types import SimpleNamespace
 
-    from doe.report.study.files import _runs_table
+    from doe.report.files import _runs_table
     from doe.workflow.runs import Runs
 
     path = study(tmp_path, ('alpha = "rotatable"', 'alpha = "orthogonal_blocks"\nblocks = true'))
@@ -279,5 +279,5 @@ def test_a_number_of_text_in_a_result_is_refused(tmp_path):
 
 def test_other_ways_in(tmp_path):
     """A count beyond all memory, and a path that no system has."""
-    assert "more than the 100000" in faults_of(parsed, ["operation.axial_load_N=0:1:1000000000000"])[0]
+    assert "more than the 100000" in faults_of(keys_of_texts, ["operation.axial_load_N=0:1:1000000000000"])[0]
     assert "cannot be read" in faults_of(read_toml, "a\0b")[0]

@@ -15,8 +15,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
 from rbdyn.quasistatic.bearing import equilibrium
-from rbdyn.quasistatic.sweep.points import parsed
-from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.quasistatic.sweep import keys_of_texts, sweep
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -188,12 +187,12 @@ def test_invariant_what_symmetry_makes_zero_is_told_as_zero(file, changes, zeros
 
 def test_unit_values_of_the_command_line():
     """Unit: evenly spaced or listed values; anything else is refused in a sentence."""
-    assert parsed(["a.b=1:2:3", "c=4,-5"]) == {"a.b": [1.0, 1.5, 2.0], "c": [4.0, -5.0]}
+    assert keys_of_texts(["a.b=1:2:3", "c=4,-5"]) == {"a.b": [1.0, 1.5, 2.0], "c": [4.0, -5.0]}
     for text in ("a", "=1,2", "a=1:2", "a=1:2:1", "a=1:2:x", "a=one"):
         with pytest.raises(InputError, match="--sweep"):
-            parsed([text])
+            keys_of_texts([text])
     with pytest.raises(InputError, match="swept twice"):
-        parsed(["a=1", "a=2"])
+        keys_of_texts(["a=1", "a=2"])
 
 
 def test_command_line_prints_notes_of_points_unless_quiet():

@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.steps.calibrate import blocks, files_of, record_of, stored, write
+from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
 from doe.workflow.calibration import find_calibration, read_question
 from doe.workflow.rig import cage_speed, read_rig
-from rbdyn.base.render.terminal import text
+from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -69,8 +69,8 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"rows": [*ROWS[:2], ",80,2,180,3"]}, "operation.inner_speed_rpm in row 3 = '': is empty; fill it in"),
         ({"rows": [*ROWS[:2], "24000,80,0,180,3"]}, "impact_force_N_sd in row 3 = 0: is not above 0; check the sign"),
         ({"rows": [*ROWS[:2], "24000,8e1_0,2,180,3"]}, "impact_force_N in row 3 = '8e1_0': is not a finite number"),
-        ({"rows": [*ROWS[:2], "24000,,2,180,3"]}, "impact_force_N_sd in row 3 = 2: belongs to nothing in this row"),
-        ({"header": HEADER + ",cutoff_hz", "rows": [f"{row},9" for row in ROWS]}, "cutoff_hz in row 1 = 9: belongs to nothing"),
+        ({"rows": [*ROWS[:2], "24000,,2,180,3"]}, "impact_force_N_sd in row 3 = 2: has no use in this row"),
+        ({"header": HEADER + ",cutoff_hz", "rows": [f"{row},9" for row in ROWS]}, "cutoff_hz in row 1 = 9: has no use"),
         ({"header": HEADER + ",cage_speed_rpm,signal_file,signal_kind", "rows": [f"{row},4700,a.csv,cage_speed" for row in ROWS]},
          "cage_speed_rpm in row 1 = 4700: comes from signal_file too; leave out one"),
         ({"header": HEADER + ",signal_file,signal_kind,pulses_per_turn", "rows": [f"{row},a.csv,cage_pulses,{'9' * 5000}" for row in ROWS]},
@@ -86,8 +86,8 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"header": HEADER + ",hold", "rows": [f"{row},1" for row in ROWS]}, "only 0 rows not on hold"),
         ({"header": HEADER + ",hold", "rows": [f"{row},perhaps" for row in ROWS]}, "write 1 for a row that is held out"),
         ({"uncertain": UNCERTAIN.replace("low = 40.0", "low = -40.0")}, 'uncertain."cage.mass_g" at -'),
-        ({"uncertain": UNCERTAIN.replace("cage.mass_g", "operation.inner_speed_rpm")}, "is sought too"),
-        ({"uncertain": UNCERTAIN.replace("set =", "sample = 'old.csv'\nset =")}, "is what a calibration gives; leave it out"),
+        ({"uncertain": UNCERTAIN.replace("cage.mass_g", "operation.inner_speed_rpm")}, "is a target too"),
+        ({"uncertain": UNCERTAIN.replace("set =", "sample = 'old.csv'\nset =")}, "is a result of calibration; leave it out"),
         ({"uncertain": UNCERTAIN + "[calibrate.discrepancy]\nwhirl = 0.1\n"}, "discrepancy: whirl is not measured"),
         ({"uncertain": UNCERTAIN + "[calibrate]\ndiscrepancy = 'some'\n"}, "calibrate.discrepancy"),
         ({"uncertain": UNCERTAIN.replace("set = [", "set = ['operation.inner_speed_rpm=1e4', ")}, "is a column of"),
@@ -297,7 +297,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert stored(tmp_path, "made of this") == record and stored(tmp_path, "made of that") is None
     with (tmp_path / "posterior.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 1000 and set(rows[0]) == {each.key for each in question.sought}
+    assert len(rows) == 1000 and set(rows[0]) == {each.key for each in question.targets}
     base = Scene.load(EXAMPLES / "cylindrical_roller.toml")
     assert base.changed({key: float(value) for key, value in rows[0].items()}).cage.mass_g == float(
         rows[0]["cage.mass_g"]
@@ -305,6 +305,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
 
 
+@pytest.mark.slow
 def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path) -> None:
     scene, _, rig, *_ = _own_rig(tmp_path, reads=1.2)
     found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
@@ -331,7 +332,7 @@ def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) 
     assert any("intervals are far too narrow" in note for note in found.notes)
     assert all(each["evidence"] is None for each in record_of(found, "made of this")["outputs"].values())
     # Two replicates of 40 turns err by 1 %, one measurement of 20 turns by twice that.
-    impact = found.found.measured.variances[found.found.measured.output == 0]
+    impact = found.match.measured.variances[found.match.measured.output == 0]
     assert np.sqrt(impact) == pytest.approx(0.02, rel=0.1)
 
 

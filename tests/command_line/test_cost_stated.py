@@ -15,16 +15,17 @@ from short_studies import short_study, silent
 from test_study_status import Killed, killed_in, study_command
 
 from doe import clearance
-from doe.commands.status import print_status
-from doe.running.keeper import agenda_in
-from doe.running.runner import Ledger, Stage
+from doe.commands.study import status_blocks
+from doe.running.runner import Ledger, Stage, agenda_in
 from doe.running.store import Point
 from doe.study_file import Study
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base import forecast
-from rbdyn.base.terminal import notice
-from rbdyn.dynamics import run
+from rbdyn.base.blocks import Detail
+from rbdyn.base.command import notice
+from rbdyn.base.terminal import show
+from rbdyn.dynamics import ensemble
 from rbdyn.dynamics import simulate as module
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -39,7 +40,7 @@ defaults = "none"
 points = 16
 "cage.mass_g" = { law = "normal", mean = 45.0, sd = 3.0 }
 """
-LEFT = re.compile(r"^note: (?:(\d+) to )?(\d+) runs? of [\d. to]+ shaft turns in all (?:is|are) left: \d+ at once, ", re.MULTILINE)  # fmt: skip
+LEFT = re.compile(r"^note: (?:(\d+) to )?(\d+) runs? of [\d. to]+ shaft turns in all remains?, \d+ at once: ", re.MULTILINE)  # fmt: skip
 OPTIONS = {"adaptive": False, "robust": False}
 
 
@@ -52,7 +53,7 @@ def left(said: str) -> list[tuple[int, int]]:
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let what is left be stated of the shortest runs."""
     monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
-    monkeypatch.setattr(run, "FIRST_LOOK_S", 0.0)
+    monkeypatch.setattr(ensemble, "FIRST_LOOK_S", 0.0)
 
 
 @pytest.mark.parametrize(("command", "more", "runs"), [("simulate", (), 3), ("map", MAPPED, 6)])
@@ -169,20 +170,20 @@ def test_status_counts_every_step_to_the_end(tmp_path, monkeypatch, capsys):
     low, high = record["left_range_s"]
     assert 0.0 < low <= record["left_s"] <= high
     assert record["predicted_s"][0] < record["predicted_s"][1] and record["took_s"] is None
-    print_status(record, quiet=True)
+    show(status_blocks(record), Detail.LEAST)
     shown = capsys.readouterr().out
     assert "5 steps: design runs 8 of 20, front, confirmation 0 of 5, tolerances, answer" in shown
-    assert "runs left 14 to 17; time left " in shown and "predicted for the last command from its start: " in shown
+    assert "runs left 14 to 17; time left " in shown and "Predicted for the last command from its start: " in shown
     robust = {each.name: each for each in study_stages(study, robust=True)}
     settings = study.file.robust
-    assert robust["robust"].left == (3 * settings.points, robust["robust"].runs)
+    assert robust["robust"].runs_left == (3 * settings.points, robust["robust"].runs)
     assert list(robust)[-3:] == ["robust", "tolerances", "answer"]
 
 
 def test_a_run_under_way_states_what_is_left_before_it_ends(tmp_path, monkeypatch):
     """Of a slow run the share that is done tells, with how much longer drift may make it."""
     sentences: list[str] = []
-    monkeypatch.setattr("doe.running.keeper.LOOK_S", 0.0)
+    monkeypatch.setattr("doe.running.runner.LOOK_S", 0.0)
     with agenda_in(tmp_path / STORE, "doe study", 2, OPTIONS, "", sentences.append) as keeper:
         keeper.plan([Stage.of("design runs", 20, 80.0)])
 
@@ -193,7 +194,7 @@ def test_a_run_under_way_states_what_is_left_before_it_ends(tmp_path, monkeypatc
         keeper.timed(engine, works, growth=8.0)([Point("a", "a"), Point("b", "b")], nowhere)
     (sentence,) = sentences
     # A second a shaft turn: 20 runs of 80 turns on two threads are 800 s, in the range.
-    assert sentence.startswith("20 runs of 1600 shaft turns in all are left: 2 at once, they take ")
-    assert sentence.endswith("where figures drift")
-    low, high = (each for each in keeper.agenda.predicted)
+    assert sentence.startswith("20 runs of 1600 shaft turns in all remain, 2 at once: ")
+    assert sentence.endswith("if figures drift")
+    low, high = (each for each in keeper.agenda.prediction_s)
     assert low < 800.0 < high

@@ -13,15 +13,14 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from doe.cli import app
-from doe.report.sections.fits import fit_blocks
-from doe.report.steps.fit import fit_record
+from doe.report.sections.fit import fit_blocks, fit_record
 from doe.running.store import StoppedError
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.blocks import Detail
-from rbdyn.base.render.terminal import text
+from rbdyn.base.terminal import text
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
@@ -350,6 +349,7 @@ def test_bad_names_tell_the_columns(tmp_path, options, words):
 def test_a_study_of_a_table_needs_no_scene(tmp_path, monkeypatch):
     """What needs runs says that the scene is missing; names stand in one place only."""
     monkeypatch.chdir(tmp_path)  # the commands write beside
+    monkeypatch.setattr("doe.workflow.surfaces.MOST_RIVALLED", 0)
     text = study(tmp_path).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith(("key = ", 'file = "cyl', "set = "))]
     bare = tmp_path / "bare.toml"
@@ -361,5 +361,5 @@ def test_a_study_of_a_table_needs_no_scene(tmp_path, monkeypatch):
         shown = CliRunner().invoke(app, [command, str(bare)])
         assert shown.exit_code == 2 and "scene: missing; add [scene] with its file" in shown.stderr
     twice = run(tmp_path, TABLE, "--factor", "a")
-    assert twice.exit_code == 2 and "study.toml says it; leave out one or the other" in twice.stderr
+    assert twice.exit_code == 2 and "study.toml states it; leave out one or the other" in twice.stderr
     assert "nothing to fit; give STUDY.toml, or --data" in CliRunner().invoke(app, ["fit"]).stderr

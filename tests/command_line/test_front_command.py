@@ -8,11 +8,10 @@ from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.steps.front import front_record
+from doe.report.sections.front import front_record
 from doe.study_file.sections import Tolerances
-from doe.workflow.front import find_front
-from doe.workflow.goals import known_tolerances
-from doe.workflow.pick import widest_of
+from doe.workflow.front import find_front, known_tolerances
+from doe.workflow.pick import widest_tolerances_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
 
@@ -36,7 +35,7 @@ def test_point_is_judged_beside_the_front(tmp_path):
     study = edited_study(tmp_path)
     shown = command(study, "--point", "0.017,0.187,0.285")
     assert shown.exit_code == 0, shown.output
-    assert "the point asked for" in shown.output and "inside the scatter of single runs" in shown.output
+    assert "the stated point" in shown.output and "inside the scatter of single runs" in shown.output
     assert "dominates the baseline with probability" in " ".join(shown.output.split())
     by_name = "pocket_clearance_mm=0.285, radial_clearance_mm=0.017,guide_clearance_mm=0.187"
     record = json.loads(command(study, "--point", by_name, "--json").output)
@@ -57,7 +56,7 @@ def test_unit_a_cell_of_the_table_that_is_no_number_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("0.017,0.187", "give one value a factor"),
+        ("0.017,0.187", "give a value for each factor"),
         ("radial=0.1", "no such factor; name one of"),
         ("0.017,wide,0.3", "guide_clearance_mm = wide: is not a finite number"),
         ("0.017,nan,0.3", "is not a finite number"),
@@ -149,7 +148,7 @@ def test_goals_that_make_no_sense_are_refused_with_their_key(tmp_path, replace, 
 
 
 def test_one_goal_has_no_front(tmp_path):
-    with pytest.raises(InputError, match="one alone has no front"):
+    with pytest.raises(InputError, match="a front needs two responses with a goal"):
         front_of(tmp_path, ('goal = "min"', 'goal = "none"'))
 
 
@@ -192,7 +191,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     study = edited_study(tmp_path, *TOLERANCES)
     surfaces = table_surfaces(study)
     point = np.array([0.0136, 0.184, 0.301])
-    found = widest_of(study, surfaces, point, Tolerances())
+    found = widest_tolerances_of(study, surfaces, point, Tolerances())
     ratios = list(known_tolerances(study).values())
     assert found.half_widths / ratios == pytest.approx([found.half_widths[0] / ratios[0]] * 3)
     # Counted afresh: parts that keep half of every gain.
@@ -203,7 +202,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
         at = [surface.predict((each - study.centre) / study.step) for each in (study.baseline, point, parts)]
         kept &= at[2] <= at[0] - 0.5 * (at[0] - at[1])
     assert kept.mean() == pytest.approx(0.95, abs=0.01)
-    unsure = widest_of(study, surfaces, point, Tolerances(surface_uncertainty=True))
+    unsure = widest_tolerances_of(study, surfaces, point, Tolerances(surface_uncertainty=True))
     assert unsure.half_widths.tolist() == [0.0, 0.0, 0.0] and "even the exact pick" in unsure.sentence
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from doe_command import doe
 
+from rbdyn.base.command import checkpoint_message, output_folder
 from rbdyn.base.faults import InputError
-from rbdyn.base.terminal import keeping, output_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -57,7 +57,7 @@ def test_another_command_or_file_is_refused_and_nothing_is_written(tmp_path, sce
     with pytest.raises(InputError) as refused:
         output_folder(folder, command, scenes[which])
     assert refused.value.faults == [
-        f"--out {folder}: holds what rbdyn simulate made of {scenes[0]}; name another folder or remove this one"
+        f"--out {folder}: holds results of rbdyn simulate from {scenes[0]}; name another folder or remove this one"
     ]
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -101,7 +101,7 @@ def test_commands_keep_to_the_rule(tmp_path, command):
             "--json",
         ),
     ]
-    sentence = f"--out {out}: holds what doe made of {study}; name another folder or remove this one"
+    sentence = f"--out {out}: holds results of doe from {study}; name another folder or remove this one"
     for shown in refusals:
         assert (shown.returncode, shown.stderr.strip()) == (2, sentence)
     assert json.loads(refusals[-1].stdout)["faults"] == [sentence]
@@ -117,7 +117,11 @@ def test_two_processes_that_write_one_file_leave_a_whole_one(tmp_path):
 
 
 def test_ctrl_c_says_kept_only_where_something_is(tmp_path):
-    for path, words in ((None, ""), (tmp_path / "none", ""), (tmp_path, f"kept in {tmp_path}: start again")):
-        with pytest.raises(KeyboardInterrupt) as stopped, keeping(path):
+    for path, words in (
+        (None, ""),
+        (tmp_path / "none", ""),
+        (tmp_path, f"saved in {tmp_path}; start the command again"),
+    ):
+        with pytest.raises(KeyboardInterrupt) as stopped, checkpoint_message(path):
             raise KeyboardInterrupt
         assert words in str(stopped.value) and bool(str(stopped.value)) == bool(words)

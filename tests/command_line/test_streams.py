@@ -64,6 +64,7 @@ def brief(tmp_path_factory):
     short_study(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BRIEF", str(folder))
+        patch.setattr("doe.workflow.surfaces.MOST_RIVALLED", 0)
         patch.setattr(coverage, "REPEATS", 2)
         patch.setattr(coverage, "TRUTH_REPLICATES", 2)
         # What commands load and compile is loaded here once, not in each child.
@@ -103,7 +104,7 @@ def test_a_full_device_is_told_in_one_sentence(monkeypatch, start, line):
     monkeypatch.setattr(coverage, "TRUTH_REPLICATES", 2)  # in place of 64
     found = shell(f"{line} > /dev/full") if start is shell else forked(line, output="/dev/full")
     assert found.returncode == 1
-    assert found.stderr == "standard output: No space left on device; make room, or write elsewhere\n"
+    assert found.stderr == "standard output: No space left on device; free space or write elsewhere\n"
 
 
 def test_tables_are_written_where_python_starts_with_ascii():
@@ -164,7 +165,7 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
         codes.add(process.returncode)
-        assert told in ("", "interrupted; nothing was kept\n")
+        assert told in ("", "interrupted; nothing was saved\n")
     assert 130 in codes and codes <= {0, 130}
 
 

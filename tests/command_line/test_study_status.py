@@ -20,11 +20,9 @@ from typer.testing import CliRunner
 
 from doe import clearance
 from doe.cli import app
-from doe.commands.status import print_status
-from doe.running.keeper import agenda_in
-from doe.running.lock import STALE_S, at_work
-from doe.running.runner import ANSWER_S, Stage
-from doe.running.store import Point, Store
+from doe.commands.study import status_blocks
+from doe.running.runner import ANSWER_S, Stage, agenda_in
+from doe.running.store import STALE_S, Point, Store, at_work
 from doe.study_file import Study
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import (
@@ -37,8 +35,10 @@ from doe.workflow.status import (
     study_stages,
     study_status,
 )
+from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import read_toml
 from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.terminal import show
 from rbdyn.dynamics import simulate as module
 
 
@@ -92,13 +92,13 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     # The answer is not written, and the confirmation has not begun.
     assert last["status"] == "running" and last["left_s"] > FRONT_S + ANSWER_S
     assert last["points"] == {"total": 20, "done": 18, "failed": 2, "running": 0, "missing": 0}
-    print_status(middle, quiet=False)
+    show(status_blocks(middle))
     shown = capsys.readouterr().out
     assert (
         f"{points['done']} done, 2 failed" in shown
         and "5 steps: design runs" in shown
         and "confirmation 0 of 5, tolerances, answer" in shown
-        and "failed: design run 2, design run 4: " in shown
+        and "Failed: design run 2, design run 4: " in shown
         and "time left" in shown
     )
 
@@ -126,7 +126,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
     assert record["points"]["done"] == 20 and record["status"] == "running"
     assert record["other"] == {"done": 1, "failed": 0, "running": 1}
     words = doe_process("status", "study.toml").stdout
-    assert "20 done, 0 failed, 0 running, 0 missing" in words and "other runs: 1 done" in words
+    assert "20 done, 0 failed, 0 running, 0 missing" in words and "Other runs: 1 done" in words
     assert loaded_by(invoke("status", "study.toml")) == set()
 
 
@@ -151,14 +151,14 @@ def test_a_running_study_is_found_by_its_file(tmp_path, monkeypatch):
 
     far.mkdir()
     other.mkdir()
-    assert "nothing has run yet in study_results" in asked()
+    assert "Nothing has run yet in study_results" in asked()
     with at_work(path, far / STORE), Store(far / STORE):
         assert str(far / STORE) in asked()
         with at_work(path.parent / "cylindrical_roller.toml", other / STORE), Store(other / STORE):
             assert str(far / STORE) in asked()
         with at_work(path, other / STORE), Store(other / STORE):
             assert f"runs in {far} and in {other}; name one of them by --out" in asked()
-    killed = f"from doe.running.lock import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
+    killed = f"from doe.running.store import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
     subprocess.run([sys.executable, "-c", killed], check=True)
     (left,) = (tmp_path / "cache" / "rbdyn" / "at_work").iterdir()
     assert "study_results" in asked()
@@ -223,7 +223,7 @@ def test_study_killed_in_any_stage_is_unfinished_there_and_nothing_runs(tmp_path
 def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is_gone(tmp_path, monkeypatch, capsys):
     path, out = short_study(tmp_path), tmp_path / "out"
     killed_in(monkeypatch, 10**9)
-    monkeypatch.setattr("doe.report.study.files.write", lambda outcome, folder: looked(outcome, folder))
+    monkeypatch.setattr("doe.report.files.write", lambda outcome, folder: looked(outcome, folder))
     seen = []
 
     def looked(outcome, folder):
@@ -246,7 +246,7 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
     record = study_status(Study.load(path), out)
     assert record["status"] == "finished" and record["left_s"] == 0.0 and record["stage"] is None
     capsys.readouterr()
-    print_status(record, quiet=True)
+    show(status_blocks(record), Detail.LEAST)
     assert "finished; of 20 design points 20 done" in capsys.readouterr().out
     (out / "answer.txt").unlink()
     assert study_status(Study.load(path), out)["status"] == "unfinished"
@@ -288,7 +288,7 @@ def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
 
 
 def test_uncertainty_of_a_scene_has_a_status_too(tmp_path, monkeypatch, capsys):
-    from doe.commands.uncertainty import uncertainty
+    from doe.commands.unknown import uncertainty
 
     path, out = short_study(tmp_path).with_name("cylindrical_roller.toml"), tmp_path / "scene"
     assert "bearing" in read_toml(path)
@@ -301,7 +301,7 @@ def test_uncertainty_of_a_scene_has_a_status_too(tmp_path, monkeypatch, capsys):
     )
     assert record["points"]["done"] == 6 and record["points"]["missing"] >= 16 - 5
     assert record["points"]["total"] == sum(record["points"][kind] for kind in ("done", "failed", "running", "missing"))
-    print_status(record, quiet=True)
+    show(status_blocks(record), Detail.LEAST)
     assert "unfinished, ended in stage" in capsys.readouterr().out
 
 
@@ -330,7 +330,7 @@ def test_fault_that_ended_a_command_is_told(tmp_path, monkeypatch):
     with pytest.raises(typer.Exit):
         study_command(path, out)
     record = study_status(Study.load(path), out)
-    assert record["status"] == "unfinished" and "only 0 of 20 design runs went well" in record["stopped_by"]
+    assert record["status"] == "unfinished" and "only 0 of 20 design runs succeeded" in record["stopped_by"]
 
 
 def test_command_without_a_store_says_that_nothing_ran(tmp_path, monkeypatch, capsys):
@@ -338,8 +338,8 @@ def test_command_without_a_store_says_that_nothing_ran(tmp_path, monkeypatch, ca
     monkeypatch.chdir(tmp_path)
     record = status_of(path, None)
     assert record["status"] == "unfinished" and record["left_s"] is None and record["points"]["total"] == 0
-    print_status(record, quiet=False)
-    assert "nothing has run yet in cylindrical_roller_uncertainty" in capsys.readouterr().out
+    show(status_blocks(record))
+    assert "Nothing has run yet in cylindrical_roller_uncertainty" in capsys.readouterr().out
 
 
 def test_unit_a_file_is_no_folder_of_results(tmp_path):

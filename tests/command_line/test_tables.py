@@ -14,9 +14,9 @@ from instant_runs import instant_result, instantly
 from short_studies import short_study
 
 from doe.cli import app as doe_app
+from rbdyn.base import terminal
 from rbdyn.base.blocks import Table
-from rbdyn.base.render import terminal
-from rbdyn.base.render.terminal import FRAME, PADDING, parts
+from rbdyn.base.terminal import FRAME, PADDING, fitting_parts
 from rbdyn.cli.app import app as rbdyn_app
 
 EXAMPLES = ROOT / "examples"
@@ -67,10 +67,10 @@ def tables_of(monkeypatch, run) -> list[tuple]:
     def keep(texts, room):
         header, *rows = zip(*texts, strict=True)
         tables.append(("", header, rows))
-        return parts(texts, room)
+        return fitting_parts(texts, room)
 
     with monkeypatch.context() as patch:
-        patch.setattr(terminal, "parts", keep)
+        patch.setattr(terminal, "fitting_parts", keep)
         run()
     return tables
 
@@ -98,7 +98,7 @@ def test_no_word_of_a_heading_is_broken(monkeypatch, tmp_path, name):
 
 def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
     from doe.commands.study import study
-    from doe.report.study.summary import summary
+    from doe.report.files import summary
 
     def write(outcome, folder: Path) -> dict:
         record = summary(outcome) | {"files": []}
@@ -107,7 +107,7 @@ def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
 
     path = short_study(tmp_path)
     instantly(monkeypatch.setattr)
-    monkeypatch.setattr("doe.report.study.files.write", write)
+    monkeypatch.setattr("doe.report.files.write", write)
     assert_unbroken(
         monkeypatch, tables_of(monkeypatch, lambda: study(path, tmp_path / "out", 2, quiet=False, verbose=True))
     )
@@ -117,10 +117,10 @@ def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
 def test_columns_fill_the_room_and_only_what_has_none_is_broken(room):
     header = ["run", *(f"a_long_name_of_factor_{number}" for number in range(9)), "a verdict in words", "87.09 ± 0.35"]
     rows = [["1", *["0.125"] * 9, "far more than its error, and in all of the replicates", "1.2 ± 0.4"]]
-    broken = parts([*zip(header, *rows, strict=True)], room)
+    broken = fitting_parts([*zip(header, *rows, strict=True)], room)
     assert sorted({place for part in broken for place, _ in part}) == list(range(len(header)))
     for part in broken:
         assert part[0][0] == 0 and FRAME + sum(width + PADDING for _, width in part) <= room
         assert all(width >= max(map(len, header[place].split())) for place, width in part)
-    assert parts([("x" * 300, "1"), ("y" * 300, "2")], room)[0][1][1] < room
-    assert parts([("only",)], room) == [[(0, 4)]]
+    assert fitting_parts([("x" * 300, "1"), ("y" * 300, "2")], room)[0][1][1] < room
+    assert fitting_parts([("only",)], room) == [[(0, 4)]]

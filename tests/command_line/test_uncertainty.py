@@ -2,7 +2,7 @@
 
 import json
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,16 @@ from typer.testing import CliRunner
 
 from doe.clearance import read_scene
 from doe.cli import app
-from doe.report.steps.robust import MOST_PAIRS, robust_record, robust_sentences
+from doe.report.sections.unknown import MOST_PAIRS, robust_record, robust_sentences
 from doe.study_file import Study
 from doe.study_file.sections import Robust
 from doe.workflow.confirmation import odds_sentence
-from doe.workflow.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
+from doe.workflow.input_sets import ROUND_SEEDS, override_notes, read_case, replicated_sets, run
 from doe.workflow.robust import Decision, check_robust, fresh_rows, judge
 from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
+from rbdyn.base.digests import code_behind
 from rbdyn.base.faults import InputError
-from rbdyn.base.sources import code_behind
 from rbdyn.base.storage import digest_of
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -53,6 +53,16 @@ correlation = [
     {{ keys = ["cage.mass_g", "model.land_fill"], rank = {} }},
 ]
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_resamplings() -> Iterator[None]:
+    """Intervals and the robust front from fewer draws: their coverage is the subject of ``test_odds`` and ``test_unknown_worth``."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("doe.unknown.decision.RESAMPLES", 40)
+        patch.setattr("doe.unknown.decision.HALVES", 40)
+        patch.setattr("doe.workflow.robust.GENERATIONS", 15)
+        yield
 
 
 def _scene(folder: Path, uncertain: str = UNCERTAIN) -> Path:
@@ -303,7 +313,7 @@ def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Any]:
 
 def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Study, Any]) -> None:
     study, found = judgement
-    shares = dict(zip(found.responses, found.better.each, strict=True))
+    shares = dict(zip(found.responses, found.better.gains, strict=True))
     assert shares["impact_force_N"].value > 0.98 and shares["power_loss_W"].value > 0.98
     assert found.better.all.value == pytest.approx(0.4, abs=0.05)
     assert found.decides[0].key == "cage.imbalance_um"
@@ -349,7 +359,7 @@ def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Study, A
     assert "flooded" not in words and words.startswith("Most decisive unknown: cage.imbalance_um. Measuring it")
     loose = replace(found.decides[0], flip_interval=None)
     words = robust_sentences(replace(found, decides=[loose]), study.factors)[1]
-    assert "From which value on it changes the choice is not known well enough to state. Measuring it" in words
+    assert "The value at which it changes the choice is too uncertain to state. Measuring it" in words
     assert Robust.model_fields["points"].metadata[-1].le == MOST_PAIRS
 
 
@@ -470,7 +480,7 @@ def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:
     """Against all replicates by hand: means, variances of these and degrees of freedom, at every set."""
     case = read_case(_scene(tmp_path, IMBALANCE), OUTPUTS, ())
     quantiles = case.joint(case.every).sets(16, 1)
-    whole = replicated(case, quantiles, _Outputs(0.5), 4)  # type: ignore[arg-type]
+    whole = replicated_sets(case, quantiles, _Outputs(0.5), 4)  # type: ignore[arg-type]
     seeds = (0, ROUND_SEEDS, 2 * ROUND_SEEDS)
     more = ([], ["numerics.replicates=2"], ["numerics.replicates=4"])
     parts = [run(case, case.every, quantiles, _Outputs(0.5), *each) for each in zip(seeds, more, strict=True)]  # type: ignore[arg-type]
@@ -483,15 +493,15 @@ def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:
 def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     overrides = ["numerics.turns=80", "numerics.rtol=0.003", "cage.imbalance_um=3.0"]
     case = read_case(_scene(tmp_path, MASS), OUTPUTS, overrides)
-    assert overriding(case, overrides, "the run at the scene's own inputs") == [
+    assert override_notes(case, overrides, "the run at the scene's own inputs") == [
         "--set numerics.turns=80 changes the run at the scene's own inputs, not the input sets: uncertain.set gives these numerics.turns=20",
         "--set numerics.rtol=0.003 changes every run",
     ]
-    assert overriding(case, ["numerics.turns=80"]) == [
+    assert override_notes(case, ["numerics.turns=80"]) == [
         "--set numerics.turns=80 changes no run: uncertain.set gives all of them numerics.turns=20"
     ]
-    assert overriding(case, ["numerics.turns=20"]) == ["--set numerics.turns=20 changes every run"]
-    assert overriding(case, ["cage.imbalance_um=3.0"]) == []
+    assert override_notes(case, ["numerics.turns=20"]) == ["--set numerics.turns=20 changes every run"]
+    assert override_notes(case, ["cage.imbalance_um=3.0"]) == []
     monkeypatch.setattr("doe.workflow.uncertainty.OUTPUTS", OUTPUTS[:1])
     found = find_uncertainty(_scene(tmp_path, IMBALANCE), overrides[:1], _Outputs(0.1), 16, 1.0)  # type: ignore[arg-type]
     assert found.notes[0].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
@@ -572,9 +582,8 @@ def test_a_study_is_not_finished_once_its_steps_change() -> None:
     """The packages themselves hold no code: their steps count."""
     assert set(code_behind(CODE)) > {
         "doe.unknown.decision",
-        "doe.unknown.worth",
         "doe.response_surface.least_squares",
-        "doe.report.steps.robust",
+        "doe.report.sections.unknown",
     }
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbdyn.dynamics.forces.guide_land import NoGuide
+from rbdyn.dynamics.forces.cage import NoGuide
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(
@@ -136,17 +136,18 @@ def test_literature_friction_at_the_makers_level():
 
 def test_unit_extremes_of_several_scenes(outer, monkeypatch):
     """Unit: a line a scene; the scene itself and one without load close their power balance."""
-    from rbdyn.accuracy import stability
+    from rbdyn.accuracy import variants
 
-    module, every = script("benchmarks/extremes"), stability.cases
+    module, every = script("benchmarks/extremes"), variants.cases
     names = ("as given", "no load")
-    monkeypatch.setattr(stability, "cases", lambda scene: {name: every(scene)[name] for name in names})
+    monkeypatch.setattr(variants, "cases", lambda scene: {name: every(scene)[name] for name in names})
     report = module.study(outer, others=("cylindrical_roller.toml",))
     assert [row[:3] for row in report.tables[0].rows] == [["scene", "2", "0"], ["cylindrical_roller.toml", "2", "0"]]
     assert [row["of"] for row in report.record["cases"]] == ["scene"] * 2 + ["cylindrical_roller.toml"] * 2
-    assert not report.failed and max(row["power_gap"] for row in report.record["cases"]) < stability.LARGEST_GAP
+    assert not report.failed and max(row["power_gap"] for row in report.record["cases"]) < variants.LARGEST_GAP
 
 
+@pytest.mark.slow
 def test_unit_a_script_of_studies_writes_and_refuses(tmp_path):
     """Unit: tables on standard output and files in the folder; a scene with nothing to study is one sentence, exit code 2."""
     folder = EXAMPLES / "benchmarks"

@@ -77,7 +77,7 @@ def model_of(table, **groups):
 def balanced(row, control, load, given=None, start=None):
     """A solution, which must be one: its residual and that of the ring below 1e-9 of the largest force."""
     found = solve(row, control, np.asarray(load, float), given, start)
-    assert found.found, found.status
+    assert found.is_equilibrium, found.status
     largest = max(np.abs(found.inner_load).max(), np.abs(found.outer_load).max(), np.abs(load[:3]).max(), 1e-9)
     assert found.residual <= 1e-9 * largest
     assert all(np.isfinite(part).all() for part in found if isinstance(part, np.ndarray))

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rbdyn.base.cache import with_digest
-from rbdyn.compiled.kernel import entry, keep_code
+from rbdyn.base.digests import with_digest
+from rbdyn.compiled.kernel import entry, save_code
 
 
 def line(x: Any) -> Any:
@@ -29,7 +29,7 @@ ARGUMENTS = (0.5, 7)  # two signatures
 def fresh(function: Callable[[Any], Any], folder: Path) -> Any:
     """The function as a new process has it: compiled code only on disk."""
     compiled = entry(function)
-    keep_code(compiled, folder)
+    save_code(compiled, folder)
     return compiled
 
 

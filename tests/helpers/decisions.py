@@ -9,8 +9,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from doe.emulator import pooled_variances
+from doe.unknown.decision import Decides, decides
 from doe.unknown.inputs import nested
-from doe.unknown.worth import Decides, decides
 from rbdyn.base.arrays import Array
 
 FRESH = 8192

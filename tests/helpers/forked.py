@@ -5,6 +5,7 @@ What Python itself does with its streams before the first import is the subject 
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import shlex
@@ -62,6 +63,8 @@ def _child(words: list[str], closed: frozenset[int], output: int, errors: int, e
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(output, 1)
         os.dup2(errors, 2)
+        # A file of the parent, collected as garbage here, would close a number that a file of the command has by then.
+        gc.freeze()
         os.closerange(3, os.sysconf("SC_OPEN_MAX"))
         for number, name in enumerate(("stdin", "stdout", "stderr")):
             stream: Any = None  # as Python has it where the stream is closed

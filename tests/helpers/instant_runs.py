@@ -69,16 +69,31 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
     return ran
 
 
+def unillustrated(patch: Any) -> None:
+    """Let reports have empty pictures and show no motion, which takes most of the time of a study in no time."""
+    from matplotlib.figure import Figure
+
+    from doe import clearance
+    from doe.report.still import Still
+
+    patch(clearance, "histories", lambda *rest: {})
+    patch(clearance, "draw_motion", lambda *rest: [])
+    patch(Figure, "tight_layout", lambda figure, **options: None)
+    patch(Figure, "savefig", lambda figure, path, **options: Path(path).write_bytes(b""))
+    patch(Still, "svg", lambda still: "<svg/>")
+
+
 def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = False) -> None:
     """The program."""
-    from doe.commands.steps import keeping_runs
+    from doe.commands.options import keeping_runs
     from doe.commands.study import study as doe_study
     from doe.study_file import Study
     from doe.workflow.runs import run_design
-    from rbdyn.base.terminal import guarded, output_folder, print_json
+    from rbdyn.base.command import guarded, output_folder, print_json
 
     ran = instantly(setattr, seconds)
     if whole:
+        unillustrated(setattr)
         doe_study(study, out, workers, as_json=True)
         print(ran, file=sys.stderr)
         return

@@ -1,6 +1,6 @@
 """The path without an option against the general path fed with the option's neutral value: the same right-hand side.
 
-``test_leave_out`` runs this interpreted: each pair is another set of law types. Neutral values are put into the
+``test_invariants`` runs this interpreted: each pair is another set of law types. Neutral values are put into the
 parameters by hand, for a scene that says them builds the plain path.
 """
 
@@ -14,7 +14,7 @@ import pytest
 from conftest import law_types, make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
-from rbdyn.accuracy.options import OPTIONS
+from rbdyn.accuracy.variants import OPTIONS
 from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
@@ -27,12 +27,20 @@ from rbdyn.contact.traction import (
     SurfaceAxes,
     TractionSurface,
 )
-from rbdyn.dynamics.forces.bodies import SupportedRing
+from rbdyn.dynamics.forces.bodies import CylinderDrag, NoDrag, SupportedRing
+from rbdyn.dynamics.forces.cage import (
+    DryContact,
+    InnerGuide,
+    LippedPocket,
+    LubricatedPocket,
+    NoContact,
+    NoFilm,
+    NoGuide,
+    NoPocket,
+    OuterGuide,
+)
 from rbdyn.dynamics.forces.equations import LOAD
-from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoContact, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps
-from rbdyn.dynamics.forces.surroundings import CylinderDrag, NoDrag
 from rbdyn.dynamics.parameters.model import roller_bearing
 
 # Round-off of the sums, relative to the largest of each kind of derivative, power or load. Both paths compute the

@@ -117,15 +117,15 @@ SCATTER = np.array([0.012, 0.03, 0.0003])
 
 
 def bearing_runs(seed):
-    """Runs of it with normal scatter, and standard errors that the replicates tell."""
+    """Runs of it with normal scatter, and standard errors by the replicates."""
     random = np.random.default_rng(seed)
 
     def evaluate(points, replicates):
         true = bearing(points)
         deviation = SCATTER * true / np.sqrt(replicates)[:, None]
         freedom = np.maximum(2 * replicates - 1, 1)[:, None] * np.ones(true.shape, dtype=np.int64)
-        told = deviation * np.sqrt(random.chisquare(freedom) / freedom)
-        return true + deviation * random.standard_normal(true.shape), told, freedom
+        estimate = deviation * np.sqrt(random.chisquare(freedom) / freedom)
+        return true + deviation * random.standard_normal(true.shape), estimate, freedom
 
     return evaluate
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from typer.main import get_command
 
+from rbdyn.cli import manual
 from rbdyn.cli.app import app
-from rbdyn.cli.keys import kinds
-from rbdyn.cli.manual import command
+from rbdyn.cli.manual import kinds
 from rbdyn.cli.manual.page import page
 from rbdyn.scene.keys import Part
 
@@ -21,13 +21,13 @@ ROOT = Path(__file__).parents[2]
 def declared() -> dict[str, str]:
     """Entry points of the manual."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return project["entry-points"][command.GROUP]
+    return project["entry-points"][manual.GROUP]
 
 
 def parts() -> list[Part]:
     """Parts in the order of the page."""
-    own = Part("rbdyn", Path(command.__file__).with_name("prose"), get_command(app), kinds())
-    return [own, *(EntryPoint(name, value, command.GROUP).load()() for name, value in declared().items())]
+    own = Part("rbdyn", Path(manual.__file__).with_name("prose"), get_command(app), kinds())
+    return [own, *(EntryPoint(name, value, manual.GROUP).load()() for name, value in declared().items())]
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from typing import Any
 from headless import offline_browser
 from synthetic_study import motion, summary
 
-from doe.report.html import html_report
+from doe.report.page import html_report
 
 PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.integrators import records as at
+from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 
 STEEL = MATERIALS["bearing_steel"]
 SQUARE = np.array([np.nan, np.nan, np.nan, 0.0, 0.0])
@@ -35,7 +35,7 @@ def turned(load, angle):
 def test_oracle_equilibrium_to_30_digits(table):
     """Oracle: the root of all equations written once more, found to 30 digits, is this solution to 1e-10 and better."""
     case = scene(table)
-    load, given = load_of(case), given_of(case)
+    load, given = load_of(case), constraint_of(case)
     found = balanced(*row_of(case)[:2], load, given)
     exact, rough = doubled(table, STEEL, STEEL)
     q, balls, worst = root(exact, rough, found.displacement, found.balls, load, np.isnan(given))
@@ -307,12 +307,12 @@ def test_invariant_preload_by_force_and_by_displacement():
         for z, p in ((5000.0, 2000.0), (7000.0, 0.0))
     )
     row, control = row_of(apart)[:2]
-    by_force = balanced(row, control, load_of(apart), given_of(apart))
+    by_force = balanced(row, control, load_of(apart), constraint_of(apart))
     assert np.array_equal(by_force.displacement, balanced(row, control, load_of(together)).displacement)
     nut = scene(
         LARGE, operation={"load_N": None, "radial_load_N": 3000.0, "preload_um": 1e6 * float(by_force.displacement[2])}
     )
-    by_nut = balanced(row, control, load_of(nut), given_of(nut))
+    by_nut = balanced(row, control, load_of(nut), constraint_of(nut))
     assert by_nut.reaction == pytest.approx(by_force.reaction, rel=1e-8, abs=1e-5)
 
 

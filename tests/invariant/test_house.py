@@ -23,13 +23,14 @@ EDGES = {
     "rbdyn/plots/": "speaks to people",
     "rbdyn/accuracy/ball_solvers.py": "makes scenes of a scene",
     "rbdyn/accuracy/coverage.py": "makes a scene of a scene",
-    "rbdyn/accuracy/stability.py": "makes scenes of a scene",
+    "rbdyn/accuracy/variants.py": "makes scenes of a scene",
     "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
     "doe/workflow": "asks for chains",
+    "doe/commands/new_parts.py": "writes chains",
     "doe/study_file/sections.py": "checks chains",
 }
 
@@ -182,3 +183,56 @@ def test_invariant_words_are_those_of_the_field():
                 place = line + text.count("\n", 0, max(text.find(each.group()), 0))
                 found.append(f"{path.relative_to(ROOT).as_posix()}:{place} {each.group()}")
     assert read > 10_000 and not found, "\n".join(found)
+
+
+# Words of a sentence that a reader takes in at once; where a sentence ends; and what is no sentence.
+LONGEST_SENTENCE = 25
+SENTENCE_END = re.compile(r"(?<=[.!?:;])\s+|\n\s*\n|\n\s*[-*] ")
+SQL = re.compile(r"\s*(?:SELECT|INSERT|UPDATE|DELETE|CREATE|PRAGMA|WITH)\b")
+
+
+def _messages(path: Path) -> list[tuple[int, str]]:
+    """Line and text of each string and f-string of a module that is no docstring; a value of an f-string is one word."""
+    tree = parsed(path)
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    docstrings = {
+        id(node.body[0].value) for node in ast.walk(tree) if isinstance(node, owners) and _opens_with_text(node)
+    }
+    formatted = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+    pieces = {id(piece) for node in formatted for piece in node.values}
+    plain = [
+        (node.lineno, node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings | pieces
+    ]
+    return plain + [
+        (node.lineno, "".join(piece.value if isinstance(piece, ast.Constant) else "X" for piece in node.values))
+        for node in formatted
+    ]
+
+
+def _opens_with_text(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> bool:
+    """Whether the first statement is a bare expression, as a docstring is."""
+    return bool(node.body) and isinstance(node.body[0], ast.Expr)
+
+
+def _long_sentences(text: str) -> list[str]:
+    """Sentences of a text with more words than a reader takes in at once; numbers and signs are no words."""
+    sentences = (part for part in SENTENCE_END.split(text) if not SQL.match(text))
+    return [part for part in sentences if len(re.findall(r"\S*[A-Za-z]\S*", part)) > LONGEST_SENTENCE]
+
+
+def test_invariant_messages_are_short_sentences():
+    """Invariant: no sentence of a message, label, note or description of a key has more than 25 words; SQL is exempt."""
+    assert (
+        _long_sentences("a word " * 13)
+        and not _long_sentences("a word 1 - " * 12)
+        and not _long_sentences("SELECT a " * 20)
+    )
+    read, long = 0, []
+    for path in SOURCES:
+        for line, text in _messages(path):
+            read += 1
+            name = path.relative_to(ROOT).as_posix()
+            long += [f"{name}:{line}: {' '.join(sentence.split())}" for sentence in _long_sentences(text)]
+    assert read > 10_000 and not long, "\n".join(long)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rbdyn.dynamics.ensemble import Stop
@@ -21,16 +21,21 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
 
-INTERPRETED = Path(__file__).parents[1] / "helpers" / "interpreted_invariants.py"
+HELPERS = Path(__file__).parents[1] / "helpers"
+INTERPRETED = (HELPERS / "interpreted_invariants.py", HELPERS / "interpreted_leave_out.py")
 SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])
 
 
-def test_invariant_over_scenes_of_every_make():
-    """Invariant: ``interpreted_invariants``, in a process where nothing is compiled."""
+@pytest.mark.parametrize(
+    ("files", "share"), [(INTERPRETED, 0.3), pytest.param(INTERPRETED[:1], 1.0, marks=pytest.mark.slow)]
+)
+def test_invariant_over_scenes_of_every_make(files, share):
+    """Invariant, agreement: ``interpreted_invariants`` over a share of its scenes, and ``interpreted_leave_out``, in a process
+    where nothing is compiled."""
     found = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", INTERPRETED],
-        cwd=INTERPRETED.parents[2],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *files],
+        cwd=HELPERS.parents[1],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "SHARE_OF_SCENES": str(share)},
         capture_output=True,
         text=True,
         check=False,
@@ -50,19 +55,21 @@ def built(scene):
 
 
 def equal(scene, mine, theirs):
-    """Equal derivatives, to the round-off of positions (3e-18 m) over approaches (1e-8 m), relative to each block."""
+    """Equal derivatives, to the round-off of positions (3e-18 m) over approaches (1e-8 m), relative to each block.
+
+    Torques on the cage can cancel. Its spin is as exact as the forces on the pitch circle, so its scale is theirs too.
+    """
     z, parts = scene.bearing.rollers, layout_of(scene)
-    blocks = [
-        slice(2 * z, 4 * z),
-        slice(4 * z, 5 * z),
-        slice(5 * z + 3, 5 * z + 5),
-        slice(5 * z + 5, 5 * z + 6),
-        slice(5 * z + 8, 5 * z + 10),
-    ]
+    cage, spin = slice(5 * z + 3, 5 * z + 5), slice(5 * z + 5, 5 * z + 6)
+    pitch_radius = 0.5e-3 * scene.bearing.pitch_diameter_mm
+    blocks = [slice(2 * z, 4 * z), slice(4 * z, 5 * z), cage, spin, slice(5 * z + 8, 5 * z + 10)]
     if parts.support is not None:
         blocks.append(slice(parts.support + 2, parts.support + 4))
     for block in blocks:
-        assert np.abs(mine[block] - theirs[block]).max() < 1e-8 * np.abs(theirs[block]).max() + 1e-9, block
+        scale = np.abs(theirs[block]).max()
+        if block == spin:
+            scale = max(scale, np.abs(theirs[cage]).max() / pitch_radius)
+        assert np.abs(mine[block] - theirs[block]).max() < 1e-8 * scale + 1e-9, block
 
 
 def pairs_of(scene):
@@ -169,6 +176,7 @@ def mirror(scene):
 
 @SCENES
 @given(seed=st.integers(0, 10**6), steps=st.integers(1, 9))
+@example(seed=152076, steps=6)  # torques on the cage nearly cancel
 @settings(max_examples=30, deadline=None)
 def test_invariant_permutation(fixture, seed, steps, request, evaluate, random_state):
     """Invariant: rollers renamed by some pockets, with the cage so much further, change only names."""

@@ -11,6 +11,7 @@ import pytest
 
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.newton import walk
 from rbdyn.quasistatic.runout.lots import (
     CHANGES,
     RACES,
@@ -24,9 +25,7 @@ from rbdyn.quasistatic.runout.lots import (
     runouts,
 )
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring
-from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.turn import follow
-from rbdyn.quasistatic.runout.walk import walk
+from rbdyn.quasistatic.runout.turn import ball_path, follow, perfect, waviness
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parents[2] / "examples" / "angular_contact_7014.toml"
@@ -194,7 +193,7 @@ def test_oracle_readings_of_a_lot(bench, response):
 def test_unit_design_meets_its_class(bench):
     """Unit: the design yields what was wanted within error, its full solutions agree, half the class half the races."""
     lot = Lot(highest_order=20)
-    given = {"wanted": 0.9, "bearings": 1000, "sway_shares": (1.0,)}
+    given = {"target_yield": 0.9, "bearings": 1000, "sway_shares": (1.0,)}
     found = design(bench, lot, radial_limit=2e-6, axial_limit=2e-6, solved=6, **given)
     assert found.yielded == pytest.approx(0.9, abs=4.0 * found.standard_error)
     assert found.check.agreeing == found.check.bearings == 6
@@ -311,7 +310,7 @@ def test_unit_double_decker_takes_no_form_errors():
         "operation": {"axial_load_N": 100.0},
         "errors": {"steps": 100},
     }
-    with pytest.raises(InputError, match="one row of balls only"):
+    with pytest.raises(InputError, match="a single row of balls only"):
         BallScene.from_dict(table)
 
 

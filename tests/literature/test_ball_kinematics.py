@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpmath import fp, mp
 from numba import njit
 
-from rbdyn.base.fields import RPM
+from rbdyn.base.faults import RPM
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.quasistatic.row.ball import FixedShare, Spinning, ball_forces, orbit_and_spin
 from rbdyn.quasistatic.row.model import cage_speed, row_model

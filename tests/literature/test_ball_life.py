@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
-from rbdyn.contact.hertz_point import ball_on_race
+from rbdyn.contact.point_contact import ball_on_race
 from rbdyn.life import balls as life
 
 GAMMA = 11.5 / 43.5

@@ -8,7 +8,7 @@ import math
 import pytest
 from conftest import ROOT
 
-from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
+from rbdyn.cli.new_scene import OperatingPoint, ball_values, catalogue_subject, roller_values
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import (
@@ -76,16 +76,17 @@ def test_literature_every_roller_bearing_of_the_catalogue(size):
     assert static == pytest.approx(sizes.static_capacity, rel=1e-3)
     # 1.00 of the classic ratings, 0.87 of those raised by 15 %; up to 1.12 where the catalogue lists one raceway only.
     assert 0.85 < dynamic / sizes.dynamic_capacity < 1.13
-    values = roller_values(named, sizes, OperatingPoint(None, None, None, oil_named("VG 68"), 70.0, "CN"))
+    subject = catalogue_subject(named, sizes)
+    values = roller_values(subject, OperatingPoint(None, None, None, oil_named("VG 68"), 70.0, "CN"))
     assert Scene.from_dict(data_of("roller_scene.toml", values)).unit_notes == ()
 
 
 def data_of(template, values):
     import tomllib
 
-    from rbdyn.base.options import filled
+    from rbdyn.base.command import fill_template
 
-    return tomllib.loads(filled((ROOT / "rbdyn" / "cli" / template).read_text(encoding="utf-8"), values))
+    return tomllib.loads(fill_template((ROOT / "rbdyn" / "cli" / template).read_text(encoding="utf-8"), values))
 
 
 def test_literature_rollers_without_a_listed_raceway():
@@ -142,7 +143,8 @@ def test_unit_every_listed_ball_bearing_gives_a_scene(series):
     """Unit: each bore of each series gives a scene that validates."""
     for code in ("00", "01", "02", "03", *(f"{number:02d}" for number in range(4, 21))):
         named = read_designation(series + code)
-        values = ball_values(named, envelope(named), OperatingPoint(3000.0, None, None, oil_named("VG 68"), 70.0, "CN"))
+        subject = catalogue_subject(named, envelope(named))
+        values = ball_values(subject, OperatingPoint(3000.0, None, None, oil_named("VG 68"), 70.0, "CN"))
         Scene.from_dict(data_of("ball_scene.toml", values))
 
 
@@ -199,7 +201,7 @@ def test_unit_unknown_designations(text):
 def test_unit_every_suffix_is_read(text, stated):
     """Unit: what each suffix states, alone, joined and glued."""
     named = read_designation(text)
-    assert {group: named.stated(group) for group in stated} == stated
+    assert {group: named.value_of(group) for group in stated} == stated
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,7 @@ from rbdyn.compiled.elementary import (
     tenth_root,
 )
 from rbdyn.contact import cage_film, damping, hertz_line, rolling_resistance, traction
-from rbdyn.properties.lubricants import oil_at
-from rbdyn.properties.materials import MATERIALS, equivalent_modulus
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus, oil_at
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 LINE = hertz_line.palmgren(STEEL, 3.5e-3)
@@ -357,7 +356,7 @@ def test_invariant_film_resists_motion(eccentricity, radial_rate, whirl_rate):
 
 def test_literature_petrov():
     """Literature: a centred journal feels Petrov's moment 2 pi eta R^3 L omega/c and no force, exactly."""
-    from rbdyn.dynamics.forces.guide_land import film_wrench
+    from rbdyn.dynamics.forces.cage import film_wrench
 
     land = cage_film.short_journal_film(2.87e-3, 24.7e-3, 3e-3, 2, 75e-6, 3e-6, 0.5)
     fx, fy, on_journal, on_bearing, _, power, *_ = film_wrench(land, 1.0, 0.0, 0.0, 0.0, 0.0, 996.6, 100.0)

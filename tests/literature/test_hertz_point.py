@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipkm1
 
-from rbdyn.contact import hertz_point as hertz
+from rbdyn.contact import point_contact as hertz
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doe.dimension_chain import fit_limits, grade_tolerances, ring_limits, tolerance_unit
-from rbdyn.properties.tolerances import RANGES, STANDARD_TOLERANCES, positioned
+from rbdyn.properties.tolerances import RANGES, STANDARD_TOLERANCES, position_limits
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_shaft_based_fits_hold_as_tight_as_hole_based_ones(nominal, letter, grad
 @pytest.mark.parametrize("letter", ["d", "h", "js", "n", "H", "F", "JS"])
 def test_any_width_can_stand_at_the_position_of_a_letter(letter):
     width = grade_tolerances(40)["IT6"]
-    assert positioned(40, letter, width) == pytest.approx(fit_limits(40, f"{letter}6"))
+    assert position_limits(40, letter, width) == pytest.approx(fit_limits(40, f"{letter}6"))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from rbdyn import Scene
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.validity import friction_check, friction_notes, light_load_notes
-from rbdyn.life import maker_friction
+from rbdyn.life import rollers
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.catalogue import Envelope, envelope, read_designation
 
@@ -48,7 +48,7 @@ def test_literature_skf_moments(bearing):
         for cst in (3.0, 11.0, 60.0):
             for supply, k_rs in ((None, 3e-8), ("bath", 3e-8), ("jet", 3e-8), ("oil_air", 6e-8), ("grease", 6e-8)):
                 lengths = 1e-3 * bore, 1e-3 * outside
-                found = maker_friction.skf_moments(series, *lengths, speed * RPM, 1e-6 * cst, load, supply=supply)
+                found = rollers.skf_moments(series, *lengths, speed * RPM, 1e-6 * cst, load, supply=supply)
                 expected = moments_in_mm(bore, outside, first, speed, load, cst, k_rs)
                 assert [1e3 * each for each in found] == pytest.approx(expected, rel=1e-12)
 
@@ -78,15 +78,15 @@ def test_literature_friction_check_at_the_reference_speed(bearing, make_scene):
 def test_unit_limits_of_the_factors():
     """Unit: slow bearings are neither heated nor starved and slide at the boundary, fast ones in the film; axial load slides."""
     slow, thick = 1e-6 * RPM, 1e-4
-    assert maker_friction.inlet_heating_factor(0.07, slow, thick) == pytest.approx(1.0, abs=1e-9)
-    assert maker_friction.starvation_factor(0.05, 0.09, slow, thick, "grease") == pytest.approx(1.0, abs=1e-9)
-    assert maker_friction.sliding_friction(0.07, slow, thick) == pytest.approx(0.12)
-    assert maker_friction.sliding_friction(0.07, 1e5 * RPM, thick) == pytest.approx(0.02)
+    assert rollers.inlet_heating_factor(0.07, slow, thick) == pytest.approx(1.0, abs=1e-9)
+    assert rollers.starvation_factor(0.05, 0.09, slow, thick, "grease") == pytest.approx(1.0, abs=1e-9)
+    assert rollers.sliding_friction(0.07, slow, thick) == pytest.approx(0.12)
+    assert rollers.sliding_friction(0.07, 1e5 * RPM, thick) == pytest.approx(0.02)
     fast = 8500.0 * RPM, 11e-6
-    bath = maker_friction.starvation_factor(0.05, 0.09, *fast, "bath")
-    assert maker_friction.starvation_factor(0.05, 0.09, *fast, "grease") == pytest.approx(bath**2)
-    assert maker_friction.inlet_heating_factor(0.07, *fast) < 1.0 and bath < 1.0
-    radial, both = (maker_friction.skf_moments("2", 0.05, 0.09, *fast, 3e3, axial) for axial in (0.0, 500.0))
+    bath = rollers.starvation_factor(0.05, 0.09, *fast, "bath")
+    assert rollers.starvation_factor(0.05, 0.09, *fast, "grease") == pytest.approx(bath**2)
+    assert rollers.inlet_heating_factor(0.07, *fast) < 1.0 and bath < 1.0
+    radial, both = (rollers.skf_moments("2", 0.05, 0.09, *fast, 3e3, axial) for axial in (0.0, 500.0))
     assert both.rolling == radial.rolling
     assert both.sliding - radial.sliding == pytest.approx(1e-3 * 0.16 * 70.0**0.9 * 500.0 * 0.02, rel=1e-3)
 
@@ -94,8 +94,8 @@ def test_unit_limits_of_the_factors():
 def test_literature_heat_of_large_seats():
     """Literature: above 50 000 mm^2 the heat flow density falls with the power -0.34 of the seat, without a step."""
     small, large = (Envelope(100.0, 200.0, width) for width in (5e4 / (300.0 * math.pi), 1e5 / (300.0 * math.pi)))
-    assert maker_friction.iso_15312_heat(small) == pytest.approx(0.016 * 5e4)
-    assert maker_friction.iso_15312_heat(large) == pytest.approx(0.016 * 1e5 * 2.0**-0.34)
+    assert rollers.iso_15312_heat(small) == pytest.approx(0.016 * 5e4)
+    assert rollers.iso_15312_heat(large) == pytest.approx(0.016 * 1e5 * 2.0**-0.34)
 
 
 def test_unit_no_check_without_a_model(make_scene):
@@ -147,7 +147,7 @@ def test_command_line_one_note_on_other_dimensions(tmp_path):
 def test_literature_minimum_load_by_series(make_scene):
     """Literature: k_r (6 + 4 n/n_r)(d_m/100)^2 kN with the factor of the series and the catalogue's reference speed."""
     for (size, *_), factor in zip(BEARINGS, (0.15,) * 8 + (0.1, 0.2), strict=True):
-        assert maker_friction.SERIES[read_designation(f"NU{size}").series].minimum_load == factor
+        assert rollers.SERIES[read_designation(f"NU{size}").series].minimum_load == factor
     assert minimum_loads(0.07, 4250.0 * RPM, 0.0, 0.0, (0.15, 8500.0 * RPM))["SKF, k_r = 0.15"] == pytest.approx(588.0)
     point = ("operation.inner_speed_rpm=4250.0", "operation.radial_load_N=100.0")
     (note,) = light_load_notes(make_scene('bearing.designation="NU 210"', *point))

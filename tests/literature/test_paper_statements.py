@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rbdyn.quasistatic.double_decker.model import double_decker_of
-from rbdyn.quasistatic.rivals import double_decker_search
-from rbdyn.quasistatic.rivals.full_system import evaluate, system_of
-from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED
+from rbdyn.quasistatic.double_decker import double_decker_of
+from rbdyn.quasistatic.finite_search import CONVERGED
+from rbdyn.quasistatic.full_system import evaluate, system_of
 from rbdyn.quasistatic.row.model import load_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -67,10 +66,11 @@ def test_literature_double_decker_search(hu, script):
     assert "so 4 to 6 fewer" in found["6 to 8 searches a condition"].ours
 
 
-def test_oracle_equations_of_the_double_decker(hu):
+def test_oracle_equations_of_the_double_decker(hu, script):
     """Oracle: the derivative of all 80 equations is that of differences; Newton's zero has no resultant on either ring."""
     scene = hu.double_decker_scene(200.0, 40000.0)
     stack, load = double_decker_of(scene).stack, load_of(scene)
+    double_decker_search = script("published.double_decker_search")
     at = double_decker_search.equations(stack, load)
     found = double_decker_search.solve(stack, load)
     u = np.concatenate([
@@ -88,13 +88,14 @@ def test_oracle_equations_of_the_double_decker(hu):
     assert found.outer.reaction[2] == pytest.approx(200.0, rel=1e-9)
 
 
-def test_oracle_minimise_is_the_compiled_one(hu):
+def test_oracle_minimise_is_the_compiled_one(hu, script):
     """Oracle: on one row the method for any equations takes the steps of the compiled one."""
-    from rbdyn.quasistatic.rivals import finite_search
+    from rbdyn.quasistatic import finite_search
 
+    minimise = script("published.double_decker_search").minimise
     problem = hu.problem_of(hu.scene(hu.TABLE_3[3]))
     compiled = finite_search.solve(*problem)
-    system = system_of(problem.row, problem.load, problem.given)
+    system = system_of(problem.row, problem.load, problem.fixed)
 
     def at(u):
         residual, jacobian = np.zeros(u.size), np.zeros((u.size, u.size))
@@ -105,7 +106,7 @@ def test_oracle_minimise_is_the_compiled_one(hu):
     for start in finite_search.search_points(problem.row):
         searches += 1
         u = np.concatenate((start.ravel(), np.zeros(system.free.size)))
-        outcome, taken, _, u = double_decker_search.minimise(at, u)
+        outcome, taken, _, u = minimise(at, u)
         steps += taken
         if outcome == CONVERGED:
             break

@@ -11,8 +11,7 @@ from scipy.optimize import minimize
 
 from doe.designs import central_composite, definitive_screening, full_factorial, optimal
 from doe.designs.design import conference_matrix
-from doe.designs.evaluation import evaluate, lost_terms, moment_matrix
-from doe.designs.model import model_matrix, model_terms
+from doe.designs.model import evaluate, lost_terms, model_matrix, model_terms, moment_matrix
 from doe.designs.optimal import Exchange
 from doe.response_surface import fit
 
@@ -138,7 +137,7 @@ def test_invariant_no_exchange_improves_the_design(criterion):
     """Invariant: from scratch, no coordinate moved by a part of the grid gains more than what counts as nothing."""
     terms = model_terms(3, "quadratic")
     made = central_composite(3, alpha="face_centred", centre_replicates=1).coded[:11]
-    points = optimal(3, criterion=criterion, runs=5, made=made).coded
+    points = optimal(3, criterion=criterion, runs=5, earlier_runs=made).coded
     assert np.array_equal(points[:11], made)
 
     def loss(points):
@@ -179,7 +178,7 @@ def test_more_runs_never_tell_less():
     terms, made = model_terms(3, "quadratic"), central_composite(3).coded
     variances, random = [], np.random.default_rng(1)
     for runs in (2, 4, 8):
-        design = optimal(3, criterion="i", runs=runs, made=made)
+        design = optimal(3, criterion="i", runs=runs, earlier_runs=made)
         assert design.kind == ("given",) * 20 + ("optimal",) * runs
         assert design.reach == pytest.approx(8**0.25)
         variances.append(mean_variance(design.coded / design.reach, terms))
@@ -193,7 +192,7 @@ def test_new_runs_make_a_block_of_their_own_where_those_given_have_blocks():
     """The design is the best for the terms beside the blocks, and keeps to values that a factor may take."""
     first = central_composite(2, centre_replicates=4, blocks=True)
     levels = [np.array([-1.0, 0.0, 1.0]), None]
-    design = optimal(2, criterion="d", runs=4, made=first.coded, block=first.block, levels=levels)
+    design = optimal(2, criterion="d", runs=4, earlier_runs=first.coded, block=first.block, levels=levels)
     assert design.block.tolist() == [*first.block, 2, 2, 2, 2]
     assert lost_terms(design.coded, QUADRATIC, design.block) == []
     assert set(design.coded[-4:, 0]) <= {-1.0, 0.0, 1.0}

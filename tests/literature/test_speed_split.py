@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.quasistatic.double_decker.model import (
+from rbdyn.quasistatic.double_decker import (
     RPM,
     LayerFriction,
     balanced_split,

@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 
 from rbdyn.contact.damping import damped_load
-from rbdyn.dynamics.companions import (
-    DAMPED,
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.integrators import rosenbrock, runge_kutta
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.state import light_contact
+from rbdyn.dynamics.recording import recording_of
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics.metrics import (
     DAMPING_SCALE,
     LEAST_DAMPING,
     MOST_DAMPING,
+    NOTABLE_DAMPING,
+    Replicate,
     companions_of,
     longest_step,
     numerical_damping,
     resolved_damping,
     usual_companions,
 )
-from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.integrators import dormand_prince, kutta_pair, rosenbrock
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.state import light_contact
-from rbdyn.dynamics.recording import recording_of
-from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.metrics import Replicate
 
 SLOW = ("operation.inner_speed_rpm=2000", "operation.radial_load_N=4000")
 
@@ -40,7 +40,9 @@ def amplification(weights, x):
     return abs(1.0 + 1j * x * (matrix[-1] @ slopes))
 
 
-@pytest.mark.parametrize(("name", "weights"), [("rk43", kutta_pair.A), ("rk45", dormand_prince.A)])
+@pytest.mark.parametrize(
+    ("name", "weights"), [("rk43", runge_kutta.KUTTA_WEIGHTS), ("rk45", runge_kutta.PRINCE_WEIGHTS)]
+)
 def test_oracle_damping_of_explicit_pairs(name, weights):
     """Oracle: each pair's stability function on the imaginary axis is 1 - x^6/C to leading order."""
     for x in (0.3, 0.2):
@@ -101,12 +103,14 @@ def test_unit_companions_follow_the_steps(make_scene, outer):
     light = light_contact(slow)
     assert light.frequency == pytest.approx(1.69e5, rel=0.01) and light_contact(outer) is None
     for method in DAMPING_SCALE:
-        limit = longest_step(light, DAMPED * light.damping, method)
-        assert numerical_damping(light, limit, method) == pytest.approx(DAMPED * light.damping)
+        limit = longest_step(light, NOTABLE_DAMPING * light.damping, method)
+        assert numerical_damping(light, limit, method) == pytest.approx(NOTABLE_DAMPING * light.damping)
         found = companions_of(slow, runs_with(slow, 1.05 * limit, method))
         assert found.rtol == pytest.approx(1e-3) and found.method == method and found.share == pytest.approx(10.0 / 9.0)
         left = numerical_damping(light, found.longest_step, method)
-        assert left == pytest.approx(resolved_damping(1.05**5 * DAMPED * light.damping, light.damping), rel=1e-4)
+        assert left == pytest.approx(
+            resolved_damping(1.05**5 * NOTABLE_DAMPING * light.damping, light.damping), rel=1e-4
+        )
         assert companions_of(slow, runs_with(slow, 0.95 * limit, method)) == usual_companions(slow)
     assert companions_of(outer, runs_with(outer, 1.0)) == usual_companions(outer)
     assert usual_companions(slow).longest_step == math.inf
@@ -116,7 +120,9 @@ def test_unit_companions_follow_the_method_that_damps_most(make_scene):
     """Unit: of runs by two methods, that whose steps damp light contacts most is resolved."""
     slow = make_scene(*SLOW)
     light = light_contact(slow)
-    long, short = (longest_step(light, share * light.damping, "rk43") for share in (2.0 * DAMPED, 0.1 * DAMPED))
+    long, short = (
+        longest_step(light, share * light.damping, "rk43") for share in (2.0 * NOTABLE_DAMPING, 0.1 * NOTABLE_DAMPING)
+    )
     runs = [*runs_with(slow, long, "rk43"), *runs_with(slow, short, "rosenbrock")]
     assert companions_of(slow, runs).method == companions_of(slow, runs[::-1]).method == "rk43"
     assert companions_of(slow, runs[2:]) == usual_companions(slow)
@@ -134,8 +140,8 @@ def test_unit_undamped_races_ask_for_finite_steps(make_scene):
 @pytest.mark.parametrize("race", [2e-5, 5e-4, 1.9e-2])
 def test_unit_companions_leave_a_tenth_of_a_logarithm(race):
     """Unit: by the logarithm of the damping, companions keep a tenth of the bias; what is beyond the law's range adds none."""
-    for damping in (DAMPED * race, MOST_DAMPING, 1.0):
-        bias = math.log10(1.0 + min(damping, max(MOST_DAMPING, DAMPED * race)) / race)
+    for damping in (NOTABLE_DAMPING * race, MOST_DAMPING, 1.0):
+        bias = math.log10(1.0 + min(damping, max(MOST_DAMPING, NOTABLE_DAMPING * race)) / race)
         assert math.log10(1.0 + resolved_damping(damping, race) / race) == pytest.approx(0.1 * bias)
 
 

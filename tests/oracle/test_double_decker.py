@@ -14,15 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
-from rbdyn.base.faults import InputError
-from rbdyn.base.fields import RPM
+from rbdyn.base.faults import RPM, InputError
 from rbdyn.properties.materials import MATERIALS
-from rbdyn.quasistatic.double_decker import equilibrium as double_decker
-from rbdyn.quasistatic.double_decker.equilibrium import Layer, load_on_middle_ring, solve_double_decker
-from rbdyn.quasistatic.double_decker.model import double_decker_of, static_capacity
+from rbdyn.quasistatic import double_decker
+from rbdyn.quasistatic.double_decker import (
+    Layer,
+    double_decker_of,
+    load_on_middle_ring,
+    solve_double_decker,
+    static_capacity,
+)
 from rbdyn.quasistatic.row.ball import ball_forces
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import contacts, given_of, load_of
+from rbdyn.quasistatic.row.model import constraint_of, contacts, load_of
 from rbdyn.scene.ball import BallRow
 
 FILE = Path(__file__).parents[2] / "examples" / "double_decker.toml"
@@ -38,7 +42,7 @@ def scene_of(*overrides):
 def solved(scene):
     """Model and solution of a scene."""
     model = double_decker_of(scene)
-    return model, solve_double_decker(model.stack, load_of(scene), given_of(scene), model.middle_given)
+    return model, solve_double_decker(model.stack, load_of(scene), constraint_of(scene), model.middle_constraint)
 
 
 @pytest.mark.parametrize("control", ["outer", "inner", "half", "common_cage"])
@@ -58,7 +62,7 @@ def test_oracle_all_coupled_equations_vanish(control, overrides):
     """Oracle: at the result, every equation of balls, inner ring and middle ring written out from the drawing is met."""
     scene = scene_of(*overrides, f"model.raceway_control='{control}'")
     _, found = solved(scene)
-    assert found.found
+    assert found.is_equilibrium
     offset = 1e-3 * scene.bearing.middle.axial_offset_mm
     of_inner, of_outer, inner_ring, middle_ring = residuals(
         *drawings(scene), offset, found.displacement, found.middle_displacement, found.inner.balls,
@@ -84,7 +88,7 @@ def test_literature_all_conditions_of_table_4_solve(axial, speed):
     for tilt in ("fixed", "free"):
         scene = scene_of(*change, f"operation.tilt='{tilt}'")
         _, found = solved(scene)
-        assert found.found and found.steps == 0
+        assert found.is_equilibrium and found.steps == 0
         places = found.displacement, found.middle_displacement, found.inner.balls, found.outer.balls
         balls, more_balls, inner_ring, middle_ring = residuals(*drawings(scene), 0.0, *places, load_of(scene))
         free = 3 if tilt == "fixed" else 5
@@ -111,7 +115,9 @@ def test_oracle_stiffness_is_that_of_both_rows_in_series(control, tilt):
         step = np.zeros(5)
         step[k] = 0.05 if k < 3 else 5e-5
         ends = [
-            solve_double_decker(model.stack, load_of(scene) + side * step, given_of(scene), model.middle_given, found)
+            solve_double_decker(
+                model.stack, load_of(scene) + side * step, constraint_of(scene), model.middle_constraint, found
+            )
             for side in (1.0, -1.0)
         ]
         matrix[:, k] = (ends[0].displacement - ends[1].displacement)[:free] / (2.0 * step[k])
@@ -143,7 +149,7 @@ def test_limit_of_a_rigid_outer_row():
     )
     found = solve_double_decker(model.stack._replace(outer=Layer(stiff, control)), load_of(scene), SQUARE, SQUARE)
     alone = solve(*model.stack.inner, load_of(scene), SQUARE)
-    assert found.found
+    assert found.is_equilibrium
     assert found.displacement[:3] == pytest.approx(alone.displacement[:3], rel=2e-3, abs=1e-12)
     assert found.stiffness[2, 2] == pytest.approx(alone.stiffness[2, 2], rel=2e-3)
 
@@ -182,10 +188,10 @@ def test_invariant_prescribed_displacements_give_the_load_back(load, mask, tilts
     force = np.array([*load, 0.0, 0.0])
     middle = FREE if tilts == "free" else SQUARE
     first = solve_double_decker(model.stack, force, middle, middle)
-    assert first.found
+    assert first.is_equilibrium
     told = np.where(np.array(mask) | ~np.isnan(middle), first.displacement, np.nan)
     again = solve_double_decker(model.stack, np.where(np.isnan(told), force, 0.0), told, middle)
-    assert again.found
+    assert again.is_equilibrium
     assert again.reaction[:3] == pytest.approx(force[:3], abs=1e-5)
     assert again.displacement == pytest.approx(first.displacement, abs=1e-11)
 
@@ -194,7 +200,7 @@ def test_unit_square_inner_ring_over_a_tilting_middle_ring():
     """Unit: the inner ring held square, the middle ring tilts until no moment is left on it."""
     scene = scene_of("bearing.middle.tilt='free'", "operation.inner_speed_rpm=20000.0")
     _, found = solved(scene)
-    assert found.found and found.steps > 0
+    assert found.is_equilibrium and found.steps > 0
     assert np.abs(found.displacement[3:]).max() < 1e-15 < np.abs(found.middle_displacement[3:]).max()
     assert found.outer.reaction == pytest.approx(found.middle_load, abs=1e-7)
     stiffer = solved(scene_of("operation.inner_speed_rpm=20000.0"))[1]
@@ -205,7 +211,7 @@ def test_unit_no_equilibrium_is_told(monkeypatch):
     """Unit: where Newton on the middle ring may not go on, the status says so and nothing is raised."""
     monkeypatch.setattr(double_decker, "STEPS", 0)
     result = equilibrium(scene_of("operation.axial_load_N=0.0", "operation.prescribed.z_mm=0.02"))
-    assert not result.found and result.status == double_decker.LOST
+    assert not result.is_equilibrium and result.status == double_decker.LOST
     assert "inner" not in result.as_dict()
 
 
@@ -225,9 +231,9 @@ def test_extreme_scenes_solve(overrides):
     """Extreme: reversed, absent and overturning loads, a middle ring that hangs loose, ten times the speed."""
     scene = scene_of(*overrides)
     _, found = solved(scene)
-    assert found.found
+    assert found.is_equilibrium
     assert found.middle_load[:3] == pytest.approx(found.outer.reaction[:3], abs=1e-6)
-    free = np.isnan(given_of(scene))
+    free = np.isnan(constraint_of(scene))
     assert found.reaction[free] == pytest.approx(load_of(scene)[free], abs=1e-6)
 
 

@@ -14,7 +14,7 @@ from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate
 from rbdyn.dynamics.statistics.error_bars import error_notes, find_transient
 from rbdyn.dynamics.statistics.metrics import bias_scale, companion_error, companion_tolerance
-from rbdyn.dynamics.target import Model, checked, choose, learned, predicted_error, target_of, total_error
+from rbdyn.dynamics.target import Model, choose, learned, predicted_error, target_of, total_error, valid_target
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -216,7 +216,7 @@ def test_unit_total_error_and_target_option():
     assert Quantity(50.0, None, None, 9.0).error is None
     assert total_error(Quantity(50.0, None, 1.5, 9.0)) is None
     assert (total_error(Quantity(0.0, 0.0, 0.0, 9.0)), total_error(Quantity(0.0, 0.1, 0.0, 9.0))) == (0.0, None)
-    assert target_of("2%") == target_of(" 0.02 ") == checked(0.02)
+    assert target_of("2%") == target_of(" 0.02 ") == valid_target(0.02)
     for text in ("0", "-1%", "nan", "60%", "much", "", "%", "inf"):
         with pytest.raises(InputError, match=r"write it as 2% or 0\.02"):
             target_of(text)

@@ -12,18 +12,24 @@ import numpy as np
 import pytest
 
 from rbdyn import accuracy
-from rbdyn.accuracy import integrators
+from rbdyn.accuracy import methods
 from rbdyn.accuracy import methods as comparison
 from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of
-from rbdyn.accuracy.integrators import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
 from rbdyn.accuracy.methods import (
+    METHODS,
+    OURS,
+    RUNGE_KUTTA_4,
+    SCIPY_RK45,
+    VELOCITY_VERLET,
     Error,
+    Method,
     Reference,
     attempt,
     attempts_of,
     curve,
     difference,
     end_of,
+    fixed_step,
     front,
     reference,
     starts_after_transient,
@@ -32,7 +38,7 @@ from rbdyn.accuracy.methods import (
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.integrators.records import empty_tally
+from rbdyn.dynamics.integrators.advance import empty_tally
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
@@ -148,7 +154,7 @@ def test_unit_fixed_step_stops_where_it_ceases_to_be_finite(stretches):
 
 def test_unit_budget(smooth, smooth_end, monkeypatch):
     """Unit: a method that asks for too many right-hand sides fails in words, in C code as well."""
-    monkeypatch.setattr(integrators, "BUDGET_PER_TURN", 500)
+    monkeypatch.setattr(methods, "BUDGET_PER_TURN", 500)
     tried = [SCIPY_RK45]
     if importlib.util.find_spec("sksundae"):
         tried += CVODE[:1]
@@ -191,7 +197,7 @@ def test_unit_study_of_methods(outer, tmp_path):
         for method, settings in ((OURS, (1e-1, 1e-6)), (SCIPY_RK45, (1e-1, 1e-5)))
     ]
     steps = []
-    report = comparison.study(outer, lambda done, total: steps.append((done, total)), 0.1, few)
+    report = comparison.study(outer, lambda done, total: steps.append((done, total)), 0.04, few)
     assert accuracy.write(report, tmp_path) == ["methods.json", "methods.csv", "methods.png"]
     record = report.record
     assert [row["status"] for row in record["rows"]] == ["ok"] * 4 and record["format"] == "rbdyn.methods/1"

@@ -65,6 +65,7 @@ def test_unit_touching_gap():
     assert touching_gap(OIL, RADIUS, LENGTH, SPEED, stiffness, 1e-6) == 1e-6
 
 
+@pytest.mark.slow
 def test_invariant_a_concentric_unloaded_bearing_is_driven_by_films(make_scene):
     """Invariant: without load and films the cage of a concentric bearing slows down; films drive it; power balances to 1e-4
     and the rolling resistance of both races adds up.

@@ -15,7 +15,7 @@ from scipy.special import iv, modstruve
 
 from rbdyn.contact import film_thickness as films
 from rbdyn.contact import rheology
-from rbdyn.properties.lubricants import oil_at
+from rbdyn.properties.materials import oil_at
 
 INNER = films.RollingContact(3.57e-3, 3.5e-3, 226.4e9, 26.2)
 OUTER = INNER._replace(radius=5.43e-3)

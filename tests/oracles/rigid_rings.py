@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_point import ball_on_race
+from rbdyn.contact.point_contact import ball_on_race
 
 # A step is too long where the energy rises again this steeply, as a share of how it fell.
 RISE = 0.9

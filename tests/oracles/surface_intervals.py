@@ -6,7 +6,7 @@ import numpy as np
 from scipy import special
 
 from doe.response_surface import Surface
-from doe.response_surface.box_cox import backward, forward, slope
+from doe.response_surface.least_squares import backward, forward, slope
 
 
 def interval(surface: Surface, coded, level: float = 0.95, extra: float = 0.0):

@@ -11,13 +11,11 @@ from test_runge_kutta import one_step, orders_of, slope_of
 
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.forces.equations import SHAFT, mechanical_energy
-from rbdyn.dynamics.integrators import dormand_prince as dp
-from rbdyn.dynamics.integrators import kutta_pair as pair
-from rbdyn.dynamics.integrators.method_laws import interpolate
-from rbdyn.dynamics.integrators.records import DERIVATIVES
+from rbdyn.dynamics.integrators import runge_kutta
+from rbdyn.dynamics.integrators.advance import DERIVATIVES, interpolate
 from rbdyn.dynamics.simulate import simulate
 
-KUTTA = pair.Kutta()
+KUTTA = runge_kutta.Kutta()
 RK43 = "numerics.method=rk43"
 LONGER = ("numerics.turns=60", "numerics.discard_turns=20", "numerics.replicates=4")
 
@@ -49,11 +47,15 @@ def largest_stable(table, direction):
 
 def test_unit_tableau():
     """Unit: row sums, tree conditions to order four, an embedded third order, first same as last."""
-    a = square(pair.A)
+    a = square(runge_kutta.KUTTA_WEIGHTS)
     b, c = a[-1], a.sum(axis=1)
-    e = np.array([pair.E1, pair.E2, pair.E3, pair.E4, pair.E5])
-    assert c == pytest.approx(pair.C, abs=1e-15)
-    assert b[:4] == pytest.approx([pair.B1, pair.B2, pair.B3, pair.B4], abs=0.0)
+    e = np.array(
+        [runge_kutta.KUTTA_E1, runge_kutta.KUTTA_E2, runge_kutta.KUTTA_E3, runge_kutta.KUTTA_E4, runge_kutta.KUTTA_E5]
+    )
+    assert c == pytest.approx(runge_kutta.KUTTA_NODES, abs=1e-15)
+    assert b[:4] == pytest.approx(
+        [runge_kutta.KUTTA_B1, runge_kutta.KUTTA_B2, runge_kutta.KUTTA_B3, runge_kutta.KUTTA_B4], abs=0.0
+    )
     lower = {"1": (np.ones(5), 1), "c": (c, 1 / 2), "c2": (c**2, 1 / 3), "A c": (a @ c, 1 / 6)}
     fourth = {
         "c3": (c**3, 1 / 4),
@@ -71,11 +73,14 @@ def test_unit_tableau():
 def test_oracle_stability():
     """Oracle: the known limits of both pairs; a right-hand side of this one carries farther for decay and vibration."""
     contact = -0.8 + 2.5j  # 1e5/s: the stiffest loaded contact of the example
-    kutta, prince = ([largest_stable(table, way) for way in (-1.0, 1j, contact)] for table in (pair.A, dp.A))
+    kutta, prince = (
+        [largest_stable(table, way) for way in (-1.0, 1j, contact)]
+        for table in (runge_kutta.KUTTA_WEIGHTS, runge_kutta.PRINCE_WEIGHTS)
+    )
     assert kutta[:2] == pytest.approx([2.785, 2.828], abs=0.002)
     assert prince[0] == pytest.approx(3.307, abs=0.002)
     assert kutta[0] / 4 > 1.25 * prince[0] / 6 and kutta[2] / 4 > 1.25 * prince[2] / 6
-    assert min(kutta) > KUTTA.limit and min(prince[0], prince[2]) > dp.DormandPrince().limit
+    assert min(kutta) > KUTTA.limit and min(prince[0], prince[2]) > runge_kutta.DormandPrince().limit
 
 
 def test_rate_order_four(make_scene, conservative):
@@ -92,7 +97,7 @@ def test_rate_dense_output(conservative, evaluate):
     y, steps = run.carry.y.copy(), np.array([4e-6, 2.8e-6, 2e-6, 1.4e-6])
 
     def inside(h, theta):
-        k, end = one_step(run.bearing, y, h, evaluate, pair.A)
+        k, end = one_step(run.bearing, y, h, evaluate, runge_kutta.KUTTA_WEIGHTS)
         return np.array([interpolate(KUTTA, y, None, k, h, theta, i) for i in range(y.size)]), end
 
     assert inside(4e-6, 0.0)[0] == pytest.approx(y, abs=1e-14)

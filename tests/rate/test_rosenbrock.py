@@ -13,15 +13,14 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, SHAFT, mechanical_energy
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import PARTS, layout
-from rbdyn.dynamics.integrators import records as at
+from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import rosenbrock as ros
 from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.implicit import differences, rodas
-from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
-from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, factor, jacobian, shifted, solve
+from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, differences_of, factor, jacobian, rodas, shifted, solve
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales, slip_scale
+from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 
@@ -38,8 +37,8 @@ def dense(matrix):
     for j in range(z):
         place = j + z * np.arange(PARTS)
         full[np.ix_(place, place)] = matrix.own[:, :, j]
-        full[place, body:] = matrix.right[:, j, :]
-        full[np.ix_(body + matrix.pushed, place)] = matrix.left[:, :, j]
+        full[place, body:] = matrix.upper[:, j, :]
+        full[np.ix_(body + matrix.pushed, place)] = matrix.lower[:, :, j]
     full[body:, body:] = matrix.bodies
     return full
 
@@ -51,7 +50,7 @@ def test_unit_arrow_matrix(supported, interpreted):
     draw = np.random.default_rng(3)
     state = layout(7, supported, True)
     matrix, factors = arrow_matrix(state), arrow_matrix(state)
-    for block in (matrix.own, matrix.right, matrix.left, matrix.bodies):
+    for block in (matrix.own, matrix.upper, matrix.lower, matrix.bodies):
         block[:] = draw.normal(size=block.shape)
     right_side = draw.normal(size=state.size)
     steps = (shifted, factor, solve)
@@ -83,7 +82,7 @@ def test_oracle_jacobian(fixture, request, evaluate, random_state):
     for seed in range(3):
         y = random_state(scene, seed)
         n = y.size
-        found = differences(scene, bearing)
+        found = differences_of(layout_of(scene), bearing, increments(scene, bearing))
         k, power, loads = np.zeros((2, n)), np.zeros((2, POWERS)), np.zeros((2, LOADS))
         start = evaluate(bearing, y)
         k[0], power[0], loads[0] = start
@@ -239,7 +238,7 @@ def test_oracle_stiffness(make_scene, outer, evaluate):
         run.to(1.0)
     assert held_by_stability(calm.carry.stiffness) < 0.05
     assert held_by_stability(stiff.carry.stiffness) > 0.9
-    found = differences(heavy, stiff.bearing)
+    found = differences_of(layout_of(heavy), stiff.bearing, increments(heavy, stiff.bearing))
     y, n = stiff.carry.y, stiff.carry.y.size
     k, power, loads = np.zeros((2, n)), np.zeros((2, POWERS)), np.zeros((2, LOADS))
     k[0], power[0], loads[0] = evaluate(stiff.bearing, y)
@@ -263,7 +262,7 @@ def test_unit_auto(make_scene, outer):
     explicit = make_scene(*STEEPER, "numerics.method=rk45", "numerics.turns=1", "numerics.discard_turns=0")
     held = simulate(explicit, workers=2)
     assert held.cost["held_by_stability"] > 0.9 and held.cost["implicit_runs"] == 0
-    assert any("held by stability" in note and "'auto'" in note for note in held.notes)
+    assert any("stability, not accuracy, limits" in note and "'auto'" in note for note in held.notes)
     assert result.cost["eigenvalue_1_s"] == pytest.approx(held.cost["eigenvalue_1_s"], rel=0.1)
 
 
@@ -296,10 +295,10 @@ def test_unit_tolerance_scales(make_scene, outer):
 def test_unit_workspace_fits_every_layout(everything):
     """Unit: the bearing of one roller has the types of the whole one, so that no law is compiled twice."""
     bearing = roller_bearing(everything)
-    work = rodas(everything, bearing)
-    single = work.found.one.bearing
+    work = rodas(layout_of(everything), bearing, increments(everything, bearing))
+    single = work.differences.one.bearing
     assert [type(part) for part in single] == [type(part) for part in bearing]
-    assert work.found.one.y.size == layout_of(everything).size - PARTS * (bearing.rollers - 1)
+    assert work.differences.one.y.size == layout_of(everything).size - PARTS * (bearing.rollers - 1)
 
 
 @pytest.mark.slow

@@ -15,8 +15,8 @@ from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
 
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
-from doe.report.html import html_report
-from doe.report.steps.front import emulators_record
+from doe.report.page import html_report
+from doe.report.sections.search import emulators_record
 from doe.study_file import Study
 from doe.study_file.sections import Category
 
@@ -54,7 +54,7 @@ def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dic
     study = Study.load(EXAMPLES / "clearance_study.toml")
     study = replace(study, file=study.file.model_copy(update={"category": category}))
     found = SimpleNamespace(
-        found=SimpleNamespace(emulators=emulators), study=SimpleNamespace(levels=(1,) * len(category))
+        search=SimpleNamespace(emulators=emulators), study=SimpleNamespace(levels=(1,) * len(category))
     )
     region = {each["name"]: [each["low"], each["high"]] for each in record["asked"]["factors"]}
     region[FACTORS[2]][1] += 0.1

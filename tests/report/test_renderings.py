@@ -8,13 +8,11 @@ import re
 import pytest
 from synthetic_study import RESPONSES, motion, summary
 
-from doe.report.html import html_report
-from doe.report.markdown import markdown_report
-from doe.report.sections import sections
-from doe.report.study.summary import answer_text, blocks
+from doe.report.files import answer_text, blocks
+from doe.report.page import html_report, markdown_report, sections
+from rbdyn.base import html as page
+from rbdyn.base import markdown, terminal
 from rbdyn.base.blocks import Bullets, Detail, Heading, Note, Paragraph, Section, Table, Tile, Tiles
-from rbdyn.base.render import html as page
-from rbdyn.base.render import markdown, terminal
 
 NUMBER = re.compile(r"[-+±]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PICTURE = re.compile(r"<figure.*?</figure>|<details class=\"controls\".*?</details>", re.DOTALL)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from html import unescape
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
@@ -15,16 +16,13 @@ import numpy as np
 import pytest
 from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 
-from doe.report.html import html_report
-from doe.report.html.build import SCRIPTS
-from doe.report.markdown import markdown_report
+from doe.report.page import LETTERS, SCRIPTS, html_report, markdown_report, packed
+from doe.report.pictures import response_surface
 from doe.report.sections.answer import CLEARANCES
-from doe.report.sections.fits import _coefficient
-from doe.report.sections.plot import Plot
-from doe.report.sections.record import scalars
+from doe.report.sections.fit import _coefficient
+from doe.report.sections.front_pictures import error_bars
+from doe.report.sections.record import change, rounded_down, scalars
 from doe.report.still import Still
-from doe.report.study.plots import response_surface
-from doe.report.words import change, rounded_down
 from doe.study_file import Study
 from doe.workflow.pick import Outward
 from doe.workflow.runs import read_runs
@@ -100,7 +98,7 @@ def test_page_is_whole_small_and_fetches_nothing(page):
     assert set(outline.links) <= set(outline.ids)
     assert not re.search(r"https?://|url\(|@import|\bfetch\(|XMLHttpRequest|import\(", page)
     assert "default-src 'none'" in page
-    assert len(page.encode()) < 400_000
+    assert len(page.encode()) < 250_000
 
 
 def test_answer_comes_first(page):
@@ -159,7 +157,7 @@ def test_least_record_of_all_still_answers():
 def test_power_terms_that_are_nil_everywhere_are_left_out(page):
     words = " ".join(Outline(page).words)
     power = words[words.index("Power loss by term") :]
-    assert "land" in power and "nil everywhere are left out" in power
+    assert "land" in power and "zero everywhere are left out" in power
     assert ">nil<" not in page
 
 
@@ -174,14 +172,14 @@ def test_pick_is_the_one_that_the_study_stands_by():
     record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
     record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {"factors": plain["factors"]}
     text = html_report(record)
-    beside = data_of(text)["beside"]
-    assert beside["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
-    assert beside["without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
+    compared = data_of(text)["compared"]
+    assert compared["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
+    assert compared["without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
     words = " ".join(Outline(text).words)
     assert "Why this point: by what manufacture leaves of it." in words
-    kept = words[words.index("the simulation kept, without tolerances") :]
+    simulated = words[words.index("predicted by the surfaces and simulated, without tolerances") :]
     # Its own simulated gain, not that of the pick.
-    assert "11.16 ± 0.65 % less" in kept[:400] and "5.5" not in kept[:200]
+    assert "11.16 ± 0.65 % less" in simulated[:400] and "5.5" not in simulated[:200]
 
 
 def test_tolerances_are_never_rounded_up():
@@ -244,12 +242,46 @@ def test_data_are_the_points_of_the_record(page):
     assert data["surfaces"][0]["student"] == pytest.approx(2.1199, abs=1e-4)
 
 
-def test_every_point_of_the_front_is_in_every_picture(page):
-    count = sum(len(each["points"]) for each in data_of(page)["fronts"])
-    assert count == 12 + 6
-    for number in range(count):
-        # Three pairs of responses, and parallel coordinates.
-        assert page.count(f'data-point="{number}"') == 4
+def places_of(path: str) -> list[tuple[float, float]]:
+    """Where the lines of a path by steps begin."""
+    places, place = [], np.zeros(2)
+    for letter, *step in re.findall(r"(m| |(?=-))(-?[\d.]+) ?(-?[\d.]+)", path):
+        place = place + np.array(step, float)
+        if letter == "m":
+            places.append(tuple(place))
+    return places
+
+
+def test_every_point_of_the_front_is_where_scripts_look_for_it(page):
+    """Three pairs of responses by the axes that each picture states, and as many lines over parallel axes."""
+    data = data_of(page)
+    pictures = re.findall(r'<svg[^>]* data-front="([^"]*)">(.*?)</svg>', page, re.DOTALL)
+    assert [json.loads(unescape(axes))["kind"] for axes, _ in pictures] == ["pair"] * 3 + ["parallel"]
+    for axes, picture in pictures:
+        stated = json.loads(unescape(axes))
+        left, upper, right, lower = stated["frame"]
+        for role, front in zip(("front", "robust"), data["fronts"], strict=True):
+            if stated["kind"] == "parallel":
+                threads = re.search(rf'<g class="threads {role}"[^>]*>(.*?)</g>', picture)[1]
+                assert threads.count("<path") == len(front["points"])
+                continue
+            dots = places_of(re.search(rf'<g class="dots {role}"><path d="([^"]*)"', picture)[1])
+            (_, i, low, high), (_, j, least, most) = stated["axes"]
+            y = np.array([point["y"] for point in front["points"]])
+            across = left + (right - left) * (y[:, i] - low) / (high - low)
+            up = lower - (lower - upper) * (y[:, j] - least) / (most - least)
+            assert np.array(dots) == pytest.approx(np.column_stack([across, up]), abs=0.11)
+
+
+def test_packed_numbers_are_close_and_zero_is_exact():
+    numbers = [0.0, -12.34, 700.0, 0.1, 0.0]
+    record = packed(numbers)
+    code = {letter: k for k, letter in enumerate(LETTERS)}
+    pairs = zip(record["letters"][::2], record["letters"][1::2], strict=True)
+    back = [record["step"] * (record["first"] + 64 * code[a] + code[b]) for a, b in pairs]
+    assert back[0] == back[-1] == 0.0
+    assert back == pytest.approx(numbers, abs=0.51 * record["step"]) and record["step"] < 712.5 / 4000.0
+    assert packed([5.0, 5.0])["letters"] == packed([0.0, 0.0])["letters"] == "AAAA"
 
 
 def test_markdown_says_the_same_and_links_the_pictures():
@@ -288,7 +320,7 @@ def test_markdown_keeps_names_as_they_are(name, text):
 def test_scripts_and_styles_are_in_the_package():
     names = [name for part in SCRIPTS.values() for name in part]
     for name in [*names, "report.css", "page.html", "surface.html", "front.html", "bearing.html"]:
-        text = files("doe.report.html").joinpath(name).read_text(encoding="utf-8")
+        text = files("doe.report").joinpath("html", name).read_text(encoding="utf-8")
         assert 0 < len(text.splitlines()) < 400
         assert "</script" not in text or name == "page.html"
 
@@ -329,17 +361,18 @@ def test_cards_carry_units_and_say_what_a_clearance_is():
 
 
 def test_error_bars_end_at_the_frame():
-    plot = Plot((0.0, 10.0), (0.0, 1.0), ("", ""))
-    plot.cross((5.0, 0.5), (2.0, 7.0), "error")
-    places = [[plot.place(*point) for point in ends] for ends in (((3.0, 0.5), (7.0, 0.5)), ((5.0, 0.0), (5.0, 1.0)))]
-    drawn = [" ".join(f"{u:.1f},{v:.1f}" for u, v in ends) for ends in places]
-    assert [re.search(r'points="([^"]*)"', mark)[1] for mark in plot.marks] == drawn
+    bars = error_bars((5.0, 0.5), (2.0, 7.0), ((0.0, 10.0), (0.0, 1.0)))
+    assert bars == [[(3.0, 0.5), (7.0, 0.5)], [(5.0, 0.0), (5.0, 1.0)]]
+    assert error_bars((5.0, 0.5), (None, 0.25), ((0.0, 10.0), (0.0, 1.0))) == [[(5.0, 0.25), (5.0, 0.75)]]
 
 
 def test_beyond_the_edge_each_response_has_direction_and_unit():
     gains = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
     told = Outward("guide_clearance_mm", "upper", 0.25, "µm", "simulation", gains, {"cage_speed_rpm": "max"}).sentence
-    assert "is at its upper bound, 0.25 mm. Extrapolated change per µm beyond it by simulation" in told
+    assert (
+        "The pick is at the upper bound of guide_clearance_mm, 0.25 mm. Extrapolated change per µm beyond it by simulation"
+        in told
+    )
     assert (
         "impact_force_N 0.20 ± 0.40 N less, power_loss_W 0.50 ± 0.10 W more, cage_speed_rpm 3.0 ± 1.0 rpm more" in told
     )

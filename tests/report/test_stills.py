@@ -16,10 +16,10 @@ import pytest
 from matplotlib.image import imread
 from synthetic_study import RESPONSES, motion, summary
 
-from doe.report.sections import sections
+from doe.report.page import sections
 from doe.report.sections.bearing import power_bars
-from doe.report.sections.fits import diagnostic_plots
-from doe.report.sections.parts import FILLS, contributions
+from doe.report.sections.chain import FILLS, contributions
+from doe.report.sections.fit import diagnostic_plots
 from doe.report.still import COLOURS, Still, name_marks, save
 from rbdyn.base.blocks import Figures
 
@@ -27,7 +27,7 @@ POINTS = [(0.0, 10.0), (1.0, 30.0), (4.0, 20.0)]
 # Loads every section of a study, prints what was loaded of matplotlib before and after one picture is drawn.
 LAZY = """
 import sys
-from doe.report.sections import sections
+from doe.report.page import sections
 from rbdyn.base.blocks import Figures
 from synthetic_study import motion, summary
 stills = [each for part in sections(summary(), motion()) for block in part.blocks
@@ -79,7 +79,7 @@ def test_marks_lie_where_their_numbers_are():
 
 
 def test_light_colours_are_those_of_the_style_sheet():
-    sheet = files("doe.report.html").joinpath("report.css").read_text(encoding="utf-8")
+    sheet = files("doe.report").joinpath("html", "report.css").read_text(encoding="utf-8")
     light = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", sheet.partition("@supports")[0]))
     assert {role: light[role] for role in COLOURS} == COLOURS
 

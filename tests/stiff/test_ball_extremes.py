@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import given_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, row_of
 
 FORCE = st.floats(-1.0, 1.0)
 
@@ -52,7 +52,7 @@ def test_stiff_extremes(name, speed):
             model=model,
         )
         parts = row_of(case_)
-        found = balanced(parts.row, parts.control, np.array(load), given_of(case_))
+        found = balanced(parts.row, parts.control, np.array(load), constraint_of(case_))
         if name == "one ball loaded":
             assert np.count_nonzero(found.inner_load > 1e-9) == 1
 
@@ -63,7 +63,7 @@ def test_stiff_where_there_is_no_equilibrium_a_sentence_tells():
     abrupt = {"raceway_control": "inner", "light_load_share": 1e-3}
     row, control = model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model=abrupt)
     lost = solve(row, control, load)
-    assert not lost.found
+    assert not lost.is_equilibrium
     assert "no equilibrium was found" in lost.status and "raise model.light_load_share" in lost.status
     assert not any(np.isnan(part).any() for part in lost if isinstance(part, np.ndarray))
     balanced(*model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model={"raceway_control": "inner"}), load)

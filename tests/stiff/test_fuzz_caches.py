@@ -15,12 +15,11 @@ import pytest
 from cached_entries import ARGUMENTS, FUNCTIONS, fill, fresh, is_whole, remove, spoil
 from conftest import ROOT
 
-from doe.running.lock import at_work, folders_of
-from doe.running.store import Point, Store
+from doe.running.store import Point, Store, at_work, folders_of
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.storage import Kept
-from rbdyn.quasistatic.sweep import run as sweeps
-from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.base.storage import Checkpoint
+from rbdyn.quasistatic import sweep as sweeps
+from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import BallScene
 
 # One process of several that use a folder of compiled code at once, and spoil files that the others read and write.
@@ -141,7 +140,7 @@ def test_fuzz_spoilt_lines_of_finished_parts(fuzz_cases, tmp_path):
     records = {f"key {n}": {"value": n / 7, "text": "é\u2028" * n} for n in range(5)}
     for file, keys in ((path, list(records)), (other, ["another"])):
         for key in keys:
-            Kept(file).put(key, records.get(key, 1))
+            Checkpoint(file).put(key, records.get(key, 1))
     data, other_data = path.read_bytes(), other.read_bytes()
     for case in range(fuzz_cases):
         for file, content in ((path, data), (other, other_data)):
@@ -149,7 +148,7 @@ def test_fuzz_spoilt_lines_of_finished_parts(fuzz_cases, tmp_path):
             file.write_bytes(content)
         way = spoil(draw, path, other)
         try:
-            parts = Kept(path)
+            parts = Checkpoint(path)
         except OSError:
             assert "folder" in way or "link" in way, (case, way)
             continue
@@ -158,7 +157,7 @@ def test_fuzz_spoilt_lines_of_finished_parts(fuzz_cases, tmp_path):
         counts["all" if len(read) == 5 else "some" if read else "none"] += 1
         if path.exists():
             parts.put("key 0", records["key 0"])
-            assert Kept(path).get("key 0") == records["key 0"], (case, way)
+            assert Checkpoint(path).get("key 0") == records["key 0"], (case, way)
     assert min(counts[end] for end in ("all", "some", "none")) > 0, counts
 
 

@@ -16,8 +16,8 @@ from doe.study_file import Study
 from doe.study_file.table import read_table as read_runs_table
 from doe.workflow.runs import design_of
 from doe.workflow.whole import check_study
-from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
-from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.quasistatic.sweep import FORMAT as SWEEP_FORMAT
+from rbdyn.quasistatic.sweep import SweepResult
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 

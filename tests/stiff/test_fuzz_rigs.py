@@ -115,7 +115,7 @@ def check_rig(data: bytes, rig: Rig) -> None:
             elif name == "turns":
                 assert row.turns == float(text) or (blank and row.turns is None)
             elif name == "hold":
-                assert row.held == (text.lower() in ("1", "yes", "true"))
+                assert row.hold == (text.lower() in ("1", "yes", "true"))
             elif name == "signal_kind":
                 assert "cage_speed_rpm" in row.values and texts["signal_file"]
             else:

@@ -13,15 +13,15 @@ from instant_runs import instant_result
 from short_studies import short_study
 
 from doe.clearance import points_of
-from doe.commands.status import print_status
-from doe.running.keeper import agenda_in
-from doe.running.runner import NOTE
+from doe.commands.study import status_blocks
+from doe.running.runner import NOTE, agenda_in
 from doe.running.store import Store
 from doe.study_file import Study
 from doe.workflow.runs import STORE, ordered_runs
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.faults import InputError
 from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.terminal import show
 
 OPTIONS = ({}, {"adaptive": True}, {"robust": True})
 SPOILT = ("", "{}", "[]", "null", "{", '{"stages": 5}', "\x00", '{"command": 1, "stages": []}')
@@ -91,7 +91,7 @@ def test_invariant_status_of_any_history_is_true(tmp_path, fuzz_cases, capsys):
                 record = study_status(study, folder)
             except InputError as error:
                 pytest.fail(f"case {case}: {error}")
-            print_status(record, quiet=False)
+            show(status_blocks(record))
         shown = capsys.readouterr().out
         seen[record["status"]] += 1
         points = record["points"]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rbdyn.accuracy.options import OPTIONS
+from rbdyn.accuracy.variants import OPTIONS
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.scene import Scene

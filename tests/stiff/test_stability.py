@@ -7,9 +7,19 @@ import json
 import pandas as pd
 import pytest
 
-from rbdyn.accuracy import stability, write
-from rbdyn.accuracy.options import with_options
-from rbdyn.accuracy.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
+from rbdyn.accuracy import variants, write
+from rbdyn.accuracy.variants import (
+    CLOSED,
+    OPEN,
+    REFUSED,
+    STOPPED,
+    TIGHTENED,
+    Ending,
+    battery,
+    cases,
+    ending,
+    with_options,
+)
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 
@@ -66,16 +76,16 @@ def test_unit_ways_to_end(rows):
 
 def test_unit_open_balance_is_unexplained(outer, monkeypatch):
     """Unit: a balance that stays open though the tolerance was tightened makes the battery fail."""
-    monkeypatch.setattr(stability, "LARGEST_GAP", 1e-12)
+    monkeypatch.setattr(variants, "LARGEST_GAP", 1e-12)
     row = ending(outer, "as given", ())
     assert row.status == OPEN and row.unexplained and "even at rtol 0.001" in row.reason
-    assert stability.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
+    assert variants.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
 
 
 def test_unit_record_and_files(rows, tmp_path):
     """Unit: JSON without NaN, a line a case in the table, as many cells as headings."""
     listed = list(rows.values())
-    report = stability.report(listed)
+    report = variants.report(listed)
     assert write(report, tmp_path) == ["stability.json", "stability.csv"]
     saved = json.loads((tmp_path / "stability.json").read_text())
     assert saved["format"] == "rbdyn.stability/1" and saved["status"] == "ok"
@@ -113,7 +123,7 @@ def test_command_line_exit_codes(monkeypatch):
 
     for status, code in ((CLOSED, 0), (REFUSED, 0), (OPEN, 1)):
         monkeypatch.setattr(
-            stability, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
+            variants, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
         )
         done = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "--json"])
         assert done.exit_code == code and json.loads(done.stdout)["cases"][0]["status"] == status

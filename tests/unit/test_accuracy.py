@@ -15,7 +15,7 @@ from rbdyn.accuracy import methods, tolerances
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.cli.app import FORMER
 from rbdyn.dynamics.statistics.batch_means import student_half_width
-from rbdyn.plots.error_against_time import SMALLEST_BIAS
+from rbdyn.plots.style import SMALLEST_BIAS
 
 EXAMPLE = "examples/cylindrical_roller.toml"
 
@@ -142,9 +142,9 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--methods", "--slices"), "--methods: is no option any more; write rbdyn accuracy SCENE.toml methods"),
+        (("--methods", "--slices"), "--methods: this option was removed; write rbdyn accuracy SCENE.toml methods"),
         (("--slices",), "run python examples/benchmarks/slicing.py SCENE.toml"),
-        (("--repeats=3", "--coverage"), "--repeats: is no option any more; "),
+        (("--repeats=3", "--coverage"), "--repeats: this option was removed; "),
         (("--trajectory", "0.5"), "compares motions over 0.25 turns"),
         (("--page", "x.md"), "run python examples/benchmarks/measured_page.py FILE"),
         (
@@ -165,7 +165,7 @@ def test_command_accuracy_refuses(command, words, says):
 def test_command_former_options_need_no_scene(command):
     """Command line: what was asked for without a scene is refused by the same sentence; the scripts named are there."""
     bad = command("accuracy", "--page", "x.md")
-    assert bad.returncode == 2 and bad.stderr.startswith("--page: is no option any more")
+    assert bad.returncode == 2 and bad.stderr.startswith("--page: this option was removed")
     named = [words.split()[2] for words in FORMER.values() if words.startswith("run python ")]
     assert len(named) == 7 and all((ROOT / script).exists() for script in named)
 

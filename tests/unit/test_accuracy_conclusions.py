@@ -191,5 +191,5 @@ def test_unit_solvers_are_told_apart_only_by_enough_scenes():
         ]
         return ball_solvers.conclusion([], rows)
 
-    assert "Take quick" in told(20) and "do not separate it from sure" in told(20)
+    assert "Take quick" in told(20) and "do not separate its reliability from sure" in told(20)
     assert "Take sure" in told(1000) and "do not separate" not in told(1000)

@@ -14,7 +14,7 @@ from numba import njit
 
 from rbdyn import BallScene
 from rbdyn.properties.materials import MATERIALS
-from rbdyn.quasistatic.row.ball import ball_forces, gradually, held
+from rbdyn.quasistatic.row.ball import ball_forces, friction_force, smoothstep
 from rbdyn.quasistatic.row.model import row_of
 
 CONTROLS = ("common_cage", "outer", "inner", "half", "hybrid")
@@ -185,7 +185,7 @@ def test_unit_open_contacts_carry_nothing_of_the_race_control():
         assert told == cage and told[7] == 0.0
 
 
-@pytest.mark.parametrize("function", [gradually, gradually.py_func])
+@pytest.mark.parametrize("function", [smoothstep, smoothstep.py_func])
 def test_unit_gradually_is_smooth(function):
     """Unit: from 0 to 1, level at both ends and beyond; its slope is its derivative."""
     assert function(0.0) == (0.0, 0.0) and function(1.0) == (1.0, 0.0) and function(7.0) == (1.0, 0.0)
@@ -195,7 +195,7 @@ def test_unit_gradually_is_smooth(function):
         )
 
 
-@pytest.mark.parametrize("function", [held, held.py_func])
+@pytest.mark.parametrize("function", [friction_force, friction_force.py_func])
 def test_unit_held_is_smooth_and_bounded(function):
     """Unit: all of a force up to 0.8 of the limit, never the limit itself; odd; value and slopes meet at 0.8."""
     for limit in (0.1, 30.0):

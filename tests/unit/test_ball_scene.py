@@ -16,7 +16,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 from rbdyn.scene import balls_only, rollers_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
@@ -41,7 +41,7 @@ BEARING_FAULTS = {
     ),
     "neither angle nor clearance": (SMALL, {"contact_angle_deg": None}, ("contact_angle_deg: missing", "give it or radial_clearance_mm")),
     "more clearance than the grooves hold": (
-        DEEP, {"radial_clearance_mm": 1.1}, ("radial_clearance_mm = 1.1", "cannot hold a ball", "make it less than 1.016"),
+        DEEP, {"radial_clearance_mm": 1.1}, ("radial_clearance_mm = 1.1", "too large for grooves", "make it less than 1.016"),
     ),
     "balls do not fit": (SMALL, {"balls": 60}, ("balls = 60", "do not fit", "take fewer or smaller ones")),
     "a clearance as wide as the ball": (
@@ -72,7 +72,7 @@ def test_unit_faults_of_a_bearing(name):
 
 
 OPERATION_FAULTS = {
-    "load twice": ({"load_N": [1.0, 0.0, 0.0]}, ("operation.load_N and operation.radial_load_N", "give the one or the others")),
+    "load twice": ({"load_N": [1.0, 0.0, 0.0]}, ("operation.load_N and operation.radial_load_N", "give the first or the others")),
     "moment on a ring held straight": ({"moment_Nm": [0.0, 2.0]}, ("operation.moment_Nm = [0.0, 2.0]", "no effect", "operation.tilt = 'free'")),
     "preload twice": (
         {"axial_load_N": None, "preload_N": 50.0, "preload_um": 3.0},
@@ -114,7 +114,7 @@ def test_unit_faults_of_the_operation(name):
         ({"model": {"friction_limit": 20.0}}, ("model.friction_limit = 20", "at most 10")),
         ({"model": {"solver": "guess"}}, ("model.solver = 'guess'", "'convex'")),
         ({"materials": {"ball": "chees"}}, ("materials.ball = 'chees'", "choose one of")),
-        ({"model": {"ring_expansion": True}}, ("bearing.bore_mm: missing", "the inner ring turns", "model.ring_expansion = false")),
+        ({"model": {"ring_expansion": True}}, ("bearing.bore_mm: missing", "the growth of the rotating inner ring", "model.ring_expansion = false")),
         ({"cage": {"mass_g": 3.0}}, ("cage: unknown key",)),
         ({"errors": {"ball_diameter_errors_um": [1.0]}}, ("errors.ball_diameter_errors_um", "1 value for 29 balls")),
     ],
@@ -172,7 +172,7 @@ def test_unit_faults_of_a_double_decker():
     fault = told(lambda data: data["bearing"]["inner"].update(pitch_diameter_mm=larger))
     assert "bearing.outer.pitch_diameter_mm" in fault and "leaves no middle ring" in fault
     fault = told(lambda data: data.update(errors={}))
-    assert fault == "d.toml: errors: form errors are followed for one row of balls only; take the table away"
+    assert fault == "d.toml: errors: runout is computed for a single row of balls only; remove the table"
 
 
 def test_unit_defaults():
@@ -185,10 +185,12 @@ def test_unit_defaults():
     assert (model.light_load_share, model.friction_limit, model.solver) == (0.3, 0.3, "convex")
     assert (operation.inner_speed_rpm, operation.outer_speed_rpm) == (0.0, 0.0)
     assert operation.load == (5.0, 0.0, 0.0) and operation.moment == (0.0, 0.0)
-    assert operation.given == (None, None, None, 0.0, 0.0)
+    assert operation.displacements == (None, None, None, 0.0, 0.0)
     assert plain.material("ball") == plain.material("inner_ring") == plain.material("outer_ring")
-    assert scene(SMALL, operation={"tilt": "free"}).operation.given == (None,) * 5
-    assert scene(SMALL, operation={"axial_load_N": None, "preload_um": 4.0}).operation.given[2] == pytest.approx(4e-6)
+    assert scene(SMALL, operation={"tilt": "free"}).operation.displacements == (None,) * 5
+    assert scene(SMALL, operation={"axial_load_N": None, "preload_um": 4.0}).operation.displacements[
+        2
+    ] == pytest.approx(4e-6)
     assert scene(SMALL, operation={"preload_N": 30.0}).operation.load == (200.0, 0.0, 230.0)
 
 
@@ -273,7 +275,7 @@ def test_command_line_json_keys_of_a_ball_bearing():
     assert record["residual_N"] < 1e-9 * 200.0
     case = BallScene.load(BALLS)
     parts = row_of(case)
-    found = solve(parts.row, parts.control, load_of(case), given_of(case))
+    found = solve(parts.row, parts.control, load_of(case), constraint_of(case))
     assert len(record["balls"]) == case.bearing.balls
     for j, ball in enumerate(record["balls"]):
         assert ball["azimuth_deg"] == pytest.approx(360.0 * j / 29)

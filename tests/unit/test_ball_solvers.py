@@ -18,12 +18,12 @@ from rbdyn.accuracy import ball_solvers
 from rbdyn.accuracy.ball_solvers import problem_of
 from rbdyn.accuracy.report import Progress
 from rbdyn.base.faults import InputError
+from rbdyn.quasistatic import finite_search, full_system
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
-from rbdyn.quasistatic.rivals import finite_search, limited, plain_newton
-from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
-from rbdyn.quasistatic.rivals.full_system import evaluate, forces, system_of, unknowns
+from rbdyn.quasistatic.finite_search import loaded, offset_distances, search_points
+from rbdyn.quasistatic.full_system import evaluate, forces, system_of, unknowns
 from rbdyn.quasistatic.row import equilibrium
-from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 from rbdyn.quasistatic.row.newton import eliminate
 from rbdyn.scene import BallScene
 
@@ -44,7 +44,7 @@ def ours(problem):
 
 def at(problem, solution):
     """The system and its unknowns at a solution."""
-    system = system_of(problem.row, problem.load, problem.given)
+    system = system_of(problem.row, problem.load, problem.fixed)
     lever = problem.row.lever
     return system, unknowns(system, solution.displacement * [1.0, 1.0, 1.0, lever, lever], solution.balls)
 
@@ -82,7 +82,7 @@ def test_invariant_the_convex_solution_leaves_nothing_in_the_full_system(problem
 
 def test_unit_jacobian_by_differences(problem, ours):
     """Tilt free and a couple on the ring: all five components, away from the equilibrium."""
-    free = problem._replace(given=np.full(5, np.nan), load=np.array([200.0, 5.0, 200.0, 0.3, -0.2]))
+    free = problem._replace(fixed=np.full(5, np.nan), load=np.array([200.0, 5.0, 200.0, 0.3, -0.2]))
     system, u = at(free, ours)
     u = u + 1e-7 * np.random.default_rng(5).normal(size=u.size)
     _, jacobian, _, _ = filled(free.control, system, u)
@@ -104,7 +104,7 @@ def test_unit_forces_are_the_same_interpreted(problem, ours):
 
 def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
     """Eliminating the balls from the dense Jacobian gives the stiffness that the O(Z) solver reports."""
-    free = problem._replace(given=np.full(5, np.nan))
+    free = problem._replace(fixed=np.full(5, np.nan))
     system, u = at(free, ours)
     _, jacobian, _, _ = filled(free.control, system, u)
     n = 2 * problem.row.cosine.size
@@ -119,11 +119,11 @@ def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
 @pytest.mark.parametrize(
     "solver",
     [
-        plain_newton.solve,
+        full_system.plain_newton,
         finite_search.solve,
         minpack.SOLVERS["MINPACK hybrid"],
         minpack.SOLVERS["MINPACK LM"],
-        limited.solve,
+        full_system.convex_with_limit,
     ],
 )
 def test_oracle_all_solvers_find_the_same_equilibrium(solver):
@@ -175,8 +175,8 @@ def test_limit_rule_a_refuses_unloaded_balls_only_as_printed():
     deep = ["bearing.contact_angle_deg=0", "operation.axial_load_N=0", "operation.prescribed.z_mm=0.0"]
     problem = problem_of(Scene.load(BALLS, [*deep, "operation.inner_speed_rpm=5000"]))
     lawful, strict = finite_search.solve(*problem), finite_search.solve(*problem, strict=True)
-    assert lawful.found and (lawful.inner_load == 0.0).any()
-    assert not strict.found and "rule a" in strict.status
+    assert lawful.is_equilibrium and (lawful.inner_load == 0.0).any()
+    assert not strict.is_equilibrium and "rule a" in strict.status
     system, u = at(problem, lawful)
     assert not loaded(system, u)
     assert lawful.displacement == pytest.approx(equilibrium.solve(*problem).displacement, rel=1e-6, abs=1e-13)
@@ -193,16 +193,16 @@ def test_unit_the_scene_chooses_the_solver(solver):
 def test_extreme_a_rival_that_fails_says_why():
     """Standing balls under a radial load: those that nothing holds make Newton's matrix singular."""
     found = solve_scene(Scene.load(BALLS, ["model.solver=newton", "operation.inner_speed_rpm=0"]))
-    assert not found.found and "singular" in found.status
+    assert not found.is_equilibrium and "singular" in found.status
     json.dumps(found.as_dict(), allow_nan=False)
     problem = problem_of(Scene.load(BALLS))
     for solver, told in (
-        (plain_newton.solve, "2 steps"),
+        (full_system.plain_newton, "2 steps"),
         (finite_search.solve, "searches"),
         (minpack.SOLVERS["MINPACK hybrid"], "MINPACK"),
     ):
         stopped = solver(*problem, limit=2)
-        assert not stopped.found and told in stopped.status
+        assert not stopped.is_equilibrium and told in stopped.status
         assert all(np.isfinite(part).all() for part in stopped[:10])
         assert np.isfinite(stopped.residual) and stopped.residual > 0.0
 
@@ -217,7 +217,7 @@ def test_unit_battery_poses_what_its_scenes_pose():
         assert all(np.array_equal(a, b) for a, b in zip(model.row, fast.row, strict=True))
         assert model.control == fast.control
         assert np.array_equal(load_of(scene), fast.load)
-        assert np.array_equal(given_of(scene), fast.given, equal_nan=True)
+        assert np.array_equal(constraint_of(scene), fast.fixed, equal_nan=True)
 
 
 def test_unit_battery_is_seeded_and_covers_its_ranges():
@@ -253,7 +253,7 @@ def test_unit_perturbations_leave_the_rest_of_the_scene_alone():
     assert len({problem.load[0] for problem in problems}) == 5
     for problem in problems:
         assert 20.0 <= problem.load[0] <= 2000.0 and 20.0 <= problem.load[2] <= 2000.0
-        assert np.array_equal(problem.given, problem_of(scene).given, equal_nan=True)
+        assert np.array_equal(problem.fixed, problem_of(scene).fixed, equal_nan=True)
         assert problem.row.inner_stiffness == problem_of(scene).row.inner_stiffness
 
 
@@ -294,7 +294,7 @@ def test_command_line_has_the_studies_of_the_kind_of_bearing(command):
     from rbdyn import accuracy
 
     scene = BallScene.load(BALLS)
-    assert accuracy.chosen(None, scene) == accuracy.chosen("methods", scene) == "methods"
+    assert accuracy.study_name(None, scene) == accuracy.study_name("methods", scene) == "methods"
     ended = command("accuracy", BALLS, "coverage")
     assert ended.returncode == 2
     assert ended.stderr.startswith("coverage: is no study of a bearing of kind 'angular_contact_ball'; choose methods")
@@ -304,5 +304,5 @@ def test_unit_two_rows_are_refused():
     file = ROOT / "examples" / "double_decker.toml"
     with pytest.raises(InputError, match="take one of its rows"):
         ball_solvers.study(BallScene.load(file))
-    with pytest.raises(InputError, match=r"model\.solver = 'newton': solves one row"):
+    with pytest.raises(InputError, match=r"model\.solver = 'newton': solves a single row"):
         BallScene.load(file, ["model.solver=newton"])

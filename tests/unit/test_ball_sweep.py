@@ -16,12 +16,10 @@ from rbdyn import equilibrium
 from rbdyn.base.faults import InputError
 from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
+from rbdyn.quasistatic import sweep as sweeps
 from rbdyn.quasistatic.result import reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import LOST
-from rbdyn.quasistatic.sweep import run as sweeps
-from rbdyn.quasistatic.sweep.points import Axis, snake
-from rbdyn.quasistatic.sweep.result import SweepResult
-from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.quasistatic.sweep import Axis, SweepResult, snake, sweep
 from rbdyn.scene import BallScene
 
 EXAMPLE = ROOT / "examples" / "angular_contact_ball.toml"
@@ -76,7 +74,7 @@ def test_unit_a_grid_is_what_single_equilibria_give(grid):
     """Unit: every figure at every point of a grid is that of the scene alone, started from nothing."""
     assert grid.status == "ok" and grid.shape == (3, 4) and grid.cold == 1
     for place in range(12):
-        values = [f"{key}={value}" for key, value in grid.at(place).items()]
+        values = [f"{key}={value}" for key, value in grid.key_values(place).items()]
         assert_as_alone(grid, place, scene_with(*values))
 
 
@@ -154,7 +152,7 @@ def broken():
     def lose(scene, *before):
         found = solve(scene, *before)
         lost = scene.operation.inner_speed_rpm in (10e3, 15e3)
-        return SimpleNamespace(found=False, status=LOST) if lost else found
+        return SimpleNamespace(is_equilibrium=False, status=LOST) if lost else found
 
     solve = sweeps.equilibrium
     with pytest.MonkeyPatch.context() as patch:
@@ -249,7 +247,7 @@ def test_unit_saved_and_loaded(grid, tmp_path):
     assert len(balls) == 12 * 29
     at = balls[(balls[LOAD] == 250.0) & (balls[SPEED] == 35e3)]
     assert at["inner_load_N"].max() == grid.grid("inner_load_max_N")[1, 3]
-    with pytest.raises(RuntimeError, match="run it again"):
+    with pytest.raises(RuntimeError, match="run the sweep again"):
         again.balls()
     for text in ("{}", "[", '{"format": "other"}'):
         (tmp_path / "bad.json").write_text(text)
@@ -326,7 +324,7 @@ def test_oracle_a_sweep_has_the_notes_of_its_points(file, changes, keys, tmp_pat
     found = sweep(scene, keys)
     table, told = found.table()["notes"], 0
     for place, status in enumerate(found.statuses):
-        point = [f"{key}={value}" for key, value in found.at(place).items()]
+        point = [f"{key}={value}" for key, value in found.key_values(place).items()]
         alone = equilibrium(scene_with(*changes, *point, file=file)).as_dict().get("notes", ())
         assert status != "ok" or len(alone) == len([word for word in table[place].split("; ") if word])
         for note in found.notes:

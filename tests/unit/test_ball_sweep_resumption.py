@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from rbdyn.quasistatic.sweep import run as sweeps
-from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.quasistatic import sweep as sweeps
+from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import BallScene
 
 SPEED, LOAD = "operation.inner_speed_rpm", "operation.axial_load_N"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from doe.response_surface.box_cox import backward, box_cox, check_positive, forward, slope
+from doe.response_surface.least_squares import backward, box_cox, check_positive, forward, slope
 
 # Survival times [10 h] of 48 animals: four treatments (rows of three poisons of four animals each).
 # Box and Cox (1964), their first example.
@@ -53,7 +53,7 @@ def test_scale_of_the_response_does_not_matter():
 @pytest.mark.parametrize(
     ("power", "recommended", "words"),
     [
-        (1.0, 1.0, "no transform is called for"),
+        (1.0, 1.0, "no transform is needed"),
         (2.0, 0.5, "fit sqrt(y)"),
         (-1.0, -1.0, "fit 1/y"),
         (-0.25, 1.0, "beyond all usual exponents"),

@@ -12,9 +12,8 @@ from short_studies import short_study
 from doe.study_file import Study
 from doe.workflow.confirmation import Choice, confirmed_from, whirl_sentence
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
-from rbdyn.dynamics.integrators.advance import book_whirl
-from rbdyn.dynamics.integrators.records import WHIRL
-from rbdyn.dynamics.motion.history import history
+from rbdyn.dynamics.integrators.advance import WHIRL, book_whirl
+from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.recording import PLACE_SUMS, SPEED_SUMS
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import Replicate, orbit_radius_share, whirl_notes

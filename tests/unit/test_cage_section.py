@@ -61,9 +61,9 @@ def test_unit_material_and_stated_stiffness():
 @pytest.mark.parametrize(
     ("cage", "sentence"),
     [
-        ({"bar_width_mm": 8.0}, "cage.bar_width_mm = 8: between 10 such bars pockets have 5.666 mm, too narrow for rollers of 9 mm"),
-        ({"bar_thickness_mm": 9.0}, "cage.bar_thickness_mm = 9: a cage between the raceways is thinner than a roller of 9 mm"),
-        ({"bar_length_mm": 4.9}, "cage.bar_length_mm = 4.9: a pocket is no shorter than its roller of 5 mm; lengthen it"),
+        ({"bar_width_mm": 8.0}, "cage.bar_width_mm = 8: 10 such bars leave pockets of 5.666 mm, too narrow for rollers of 9 mm"),
+        ({"bar_thickness_mm": 9.0}, "cage.bar_thickness_mm = 9: must be less than the roller diameter of 9 mm"),
+        ({"bar_length_mm": 4.9}, "cage.bar_length_mm = 4.9: the pocket is shorter than its roller of 5 mm; lengthen it"),
         ({"bar_length_mm": 0.0052}, "if 0.0052 m are meant, write 5.2"),
         ({"bar_width_mm": -1.0}, "cage.bar_width_mm = -1.0: must be greater than 0"),
         ({"side_ring_width_mm": None}, "cage.side_ring_width_mm: missing; the stiffness of a bar needs its whole section"),

@@ -10,7 +10,7 @@ from scipy.stats import kstest, triang, truncnorm, uniform
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.links import given_parts
+from doe.dimension_chain.links import stated_parts
 from doe.dimension_chain.yields import CHUNK, draw, exact_shares, moments, quantile, share_below
 
 SAMPLES = 100_000
@@ -24,17 +24,17 @@ MIXED = [
 
 
 def part(law, **extra):
-    return given_parts(chain([(1, 5.0, 0.02, -0.04, {"distribution": law} | extra)]).link)[0]
+    return stated_parts(chain([(1, 5.0, 0.02, -0.04, {"distribution": law} | extra)]).link)[0]
 
 
 def exact(plain):
     search = Allocation(plain)
-    return exact_shares(search.function, given_parts(plain.link), plain.closing_link)
+    return exact_shares(search.function, stated_parts(plain.link), plain.closing_link)
 
 
 def drawn(plain, samples=SAMPLES, **options):
     search = Allocation(plain)
-    return draw(search.function, given_parts(plain.link), plain.closing_link, samples=samples, seed=2, **options)
+    return draw(search.function, stated_parts(plain.link), plain.closing_link, samples=samples, seed=2, **options)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -13,7 +13,7 @@ import pytest
 from cached_entries import ARGUMENTS, FUNCTIONS, fill, fresh, line
 from numba import types
 
-from rbdyn.base.cache import content_of, with_digest
+from rbdyn.base.digests import content_of, with_digest
 from rbdyn.compiled import kernel
 from rbdyn.compiled.kernel import entry
 
@@ -114,7 +114,7 @@ def test_unit_a_file_in_place_of_the_folder_does_no_harm(tmp_path, caplog):
 
 def test_unit_without_a_home_nothing_is_kept(monkeypatch):
     """Unit: a user without a home directory has no cache, and no fault."""
-    from rbdyn.base.cache import user_cache
+    from rbdyn.base.digests import user_cache
 
     def homeless() -> Path:
         raise RuntimeError("Could not determine home directory.")

@@ -11,8 +11,7 @@ from scipy.stats import qmc
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
 from doe.designs import box_behnken, central_composite, full_factorial, latin_hypercube, sobol
-from doe.designs.evaluation import evaluate, lost_terms, moment_matrix, sample
-from doe.designs.model import model_matrix, model_terms
+from doe.designs.model import evaluate, lost_terms, model_matrix, model_terms, moment_matrix, sample
 from doe.response_surface import fit
 
 QUADRATIC = model_terms(3, "quadratic")

@@ -49,8 +49,8 @@ def test_the_printed_chain_is_refused_with_the_reason_and_the_nearest(tmp_path):
     assert result["yield"]["standard_error"] == pytest.approx(0.5 / SAMPLES, rel=1e-3)
     status = result["status"]
     assert status.startswith("refused: ")
-    assert "-0.0500 to +0.0500 mm where 0.2800 to 0.2900 mm is allowed" in status
-    assert "worst-case tolerance 0.1000 mm where 0.0100 mm is there, yield 0)" in status
+    assert "-0.0500 to +0.0500 mm, outside 0.2800 to 0.2900 mm" in status
+    assert "worst-case tolerance 0.1000 of 0.0100 mm, yield 0;" in status
     assert "pocket width 9.2900 0/-0.0050, roller diameter 9.0000 +0.0050/0" in status
 
 

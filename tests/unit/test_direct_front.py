@@ -34,6 +34,7 @@ def simulations(store: Store) -> Simulations:
     return Simulations(store, None, None, False, lambda title: silent)
 
 
+@pytest.mark.slow
 def test_direct_front_asks_for_the_same_runs_again_and_survives_failures(tmp_path, monkeypatch):
     study = Study.load(short_study(tmp_path))
     front = find_front(study, fit_surfaces(study, read_runs(study, tmp_path / "ccd_table4.csv")))
@@ -164,4 +165,4 @@ def test_former_option_is_refused_by_the_name_of_the_script(command, tmp_path):
     (fault,) = json.loads(ended.stdout)["faults"]
     assert ended.returncode == 2 and fault == ended.stderr.strip()
     script = fault.partition("run python ")[2].split()[0]
-    assert fault.startswith("--direct: is no option any more") and (ROOT / script).samefile(direct_front.__file__)
+    assert fault.startswith("--direct: this option was removed") and (ROOT / script).samefile(direct_front.__file__)

@@ -40,18 +40,18 @@ def test_unit_a_span_names_a_unit_once(ends, words):
     [
         (
             Forecast((38, 55), (3800.0, 5500.0), (35.0, 150.0), 2, steps=True),
-            "38 to 55 runs of 3800 to 5500 shaft turns in all are left: 2 at once, they take 35 s to 2.5 min with all steps to the "
+            "38 to 55 runs of 3800 to 5500 shaft turns in all remain, 2 at once: 35 s to 2.5 min with all steps to the "
             "report",
         ),
         (
             Forecast((1, 1), (120.0, 120.0), (12.0, 15.0), 4, 96.0, remedy="reduce numerics.turns"),
-            "1 run of 120 shaft turns in all is left: 4 at once, it takes 12 to 15 s, up to 96 s where figures drift",
+            "1 run of 120 shaft turns in all remains, 4 at once: 12 to 15 s, up to 96 s if figures drift",
         ),
         (
             Forecast((8, 8), (960.0, 960.0), (250.0, 400.0), 2, remedy="reduce numerics.turns"),
-            "8 runs of 960 shaft turns in all are left: 2 at once, they take 4.2 to 6.7 min; reduce numerics.turns to shorten it",
+            "8 runs of 960 shaft turns in all remain, 2 at once: 4.2 to 6.7 min; reduce numerics.turns to shorten it",
         ),
-        (Forecast((0, 0), (0.0, 0.0), (8.0, 30.0), 2, steps=True), "no run is left; the steps to the report take 8 to 30 s"),
+        (Forecast((0, 0), (0.0, 0.0), (8.0, 30.0), 2, steps=True), "no run remains; the steps to the report take 8 to 30 s"),
     ],
 )  # fmt: skip
 def test_unit_a_forecast_is_one_sentence(left, sentence):
@@ -76,7 +76,7 @@ def test_unit_a_range_narrows_as_runs_are_measured_and_widens_with_their_scatter
 def test_unit_stages_to_the_end_count_with_what_they_run_at_least_and_at_most():
     """Unit: what is done or stored of a stage is not left; steps without runs take longer on a busy machine."""
     design = Stage.of("design runs", 20, 10.0)
-    design.done, design.stored = 5, 8
+    design.finished_runs, design.stored_runs = 5, 8
     stages = [design, Stage("front", besides_s=6.0), Stage.of("confirmation", 5, 30.0, fewest=2, most=8)]
     agenda = Agenda("doe study", {}, "", 2, stages)
     assert agenda.runs_left == (12 + 2, 12 + 8)

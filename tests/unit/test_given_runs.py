@@ -6,13 +6,12 @@ import csv
 
 import numpy as np
 import pytest
-from instant_runs import instantly
+from instant_runs import instantly, unillustrated
 from short_studies import SHORT, short_study, silent
 
-from doe import clearance
-from doe.report.study.files import write
+from doe.report.files import write
 from doe.study_file import Study
-from doe.workflow.runs import actual_of, check_given, design_of, evaluation, ordered_runs, run_design
+from doe.workflow.runs import actual_of, check_augment, design_of, evaluation, ordered_runs, run_design
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
@@ -44,8 +43,7 @@ def table_of(points, *more):
 
 def test_runs_of_a_study_are_kept_and_not_simulated_again(tmp_path, monkeypatch):
     ran = instantly(monkeypatch.setattr)
-    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
-    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
+    unillustrated(monkeypatch.setattr)
     first = Study.load(short_study(tmp_path))
     text = (tmp_path / "study.toml").read_text(encoding="utf-8")
     (tmp_path / "study.toml").write_text(text[: text.index("[reference]")], encoding="utf-8")
@@ -102,9 +100,9 @@ def test_impossible_tables_are_named(tmp_path, old, new, words):
 
 def test_a_study_does_not_read_what_it_writes(tmp_path):
     study = augmented(tmp_path, lines=PLACED.replace("made.csv", "out/design_runs.csv"))
-    check_given(study, tmp_path / "elsewhere")
-    with pytest.raises(InputError, match=r"the study writes its own runs there; copy it next to the study"):
-        check_given(study, tmp_path / "out")
+    check_augment(study, tmp_path / "elsewhere")
+    with pytest.raises(InputError, match=r"the study writes its own runs to this file; copy it next to the study"):
+        check_augment(study, tmp_path / "out")
 
 
 def test_a_row_that_is_no_whole_number_is_named(tmp_path):

@@ -101,7 +101,7 @@ def test_closed_form_a_load_that_flattens_a_roller(make_scene):
     limit = 2.0 * (4.5e-3 / float(half_width(contact, 1.0))) ** 2
     make_scene(f"operation.radial_load_N={0.999 * limit}")
     with pytest.raises(
-        InputError, match=r"operation.radial_load_N = .*: a roller of 9 mm would be flattened over 9 mm"
+        InputError, match=r"operation.radial_load_N = .*: a roller of 9 mm would have a contact 9 mm wide"
     ):
         make_scene(f"operation.radial_load_N={1.001 * limit}")
 

@@ -8,18 +8,18 @@ import instant_runs
 import numpy as np
 import pytest
 from coarse_search import coarsely
-from instant_runs import instantly
+from instant_runs import instantly, unillustrated
 from short_studies import silent
 from test_study_adaptive import ROLLERS, with_kinds, written
 
 from doe import clearance
-from doe.adaptive.emulators import embedded, settled
-from doe.report.study.files import write
+from doe.adaptive.emulators import coordinates, without_inactive
+from doe.report.files import write
 from doe.study_file import Study
 from doe.study_file.sections import Tolerances
 from doe.workflow.adaptive import check_adaptive, region_in_units
-from doe.workflow.goals import tolerances_of
-from doe.workflow.pick import widest_of
+from doe.workflow.front import tolerances_of
+from doe.workflow.pick import widest_tolerances_of
 from doe.workflow.runs import Runs, check_runs, design_of
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import run_study
@@ -46,7 +46,7 @@ def test_an_inactive_factor_is_one_point_for_all_its_values(tmp_path):
     region = region_in_units(study)
     assert region.inactive == ((0, 1, (1,)),)
     points = np.array([[0.3, side, -0.2, level] for level in (-1.0, 1.0) for side in (-1.0, 0.5)])
-    outer, roller = np.split(embedded(settled(points, region.levels, region.inactive), region.levels), 2)
+    outer, roller = np.split(coordinates(without_inactive(points, region.levels, region.inactive), region.levels), 2)
     assert np.array_equal(roller[0], roller[1])
     assert not np.array_equal(outer[0], outer[1])
     drawn = region.snap(points)
@@ -58,8 +58,8 @@ def test_an_inactive_factor_is_one_point_for_all_its_values(tmp_path):
 def test_the_design_leaves_out_what_only_an_inactive_factor_told_apart(tmp_path):
     """Of 8 corners, 6 star and 6 centre points 4, 4 and 6 are left; their scenes keep the key as the scene has it."""
     study = Study.load(guided_study(tmp_path))
-    assert [len(design_of(study.at(at)).coded) for at in study.every_level] == [20, 14]
-    there = study.at((1,))
+    assert [len(design_of(study.with_levels(at)).coded) for at in study.every_level] == [20, 14]
+    there = study.with_levels((1,))
     design = design_of(there)
     assert design.kind == ("cube",) * 4 + ("axial",) * 4 + ("centre",) * 6
     assert not design.coded[:, 1].any()
@@ -77,7 +77,7 @@ def test_an_optimal_design_spends_no_run_on_an_inactive_factor(tmp_path):
     )
     rest = 'alpha = "rotatable"\ncentre_replicates = 6\n'
     study = Study.load(guided_study(tmp_path, (kind + rest, 'kind = "d_optimal"\nruns = 11\n')))
-    design = design_of(study.at((1,)))
+    design = design_of(study.with_levels((1,)))
     assert len(design.coded) == 11 and not design.coded[:, 1].any()
     assert len(np.unique(design.coded, axis=0)) == 9, "the best for a quadratic in two factors are their 3^2"
 
@@ -94,8 +94,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
         return replace(found, impact_force=replace(found.impact_force, value=share * found.impact_force.value))
 
     monkeypatch.setattr(instant_runs, "instant_result", result)
-    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
-    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
+    unillustrated(monkeypatch.setattr)
     study = Study.load(guided_study(tmp_path, ('tolerance_aware = "quantile" ', 'tolerance_aware = "none" ')))
     check_adaptive(study, True)
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
@@ -104,7 +103,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
     assert (outcome.front.points[:, 1] == 0.15).all()
     assert all("B" not in term for surface in outcome.surfaces for term in surface.terms)
     record = write(outcome, tmp_path)
-    words = "guidance = roller (baseline: outer) and no guide_clearance_mm, which means nothing there"
+    words = "guidance = roller (baseline: outer) and no guide_clearance_mm, which has no meaning there"
     assert words in record["adaptive"]["sentence"]
     assert record["adaptive"]["emulators"]["categories"][0]["inactive"] == [[], [1]]
     there = [each for each in record["adaptive"]["points"] if each["factors"]["guidance"] == "roller"]
@@ -153,7 +152,7 @@ def test_closed_form_tolerance_beside_a_whole_number(tmp_path):
     values = np.outer(coded[:, 1], [3.0, -0.2, 10.0]) + np.array([10.0, 1.0, 50.0]) + noise
     surfaces = fit_surfaces(study, Runs(coded, study.actual(coded), values, np.full_like(values, np.nan)))
     settings = Tolerances(distribution="uniform", samples=100_000)
-    found = widest_of(study, surfaces, study.actual(np.array([0.0, -0.5, 0.0])), settings)
+    found = widest_tolerances_of(study, surfaces, study.actual(np.array([0.0, -0.5, 0.0])), settings)
     assert np.isnan(found.half_widths[0])
     assert found.half_widths[1] == pytest.approx(0.25 / 0.9 * 0.05, rel=0.01)
     assert found.half_widths[2] == pytest.approx(found.half_widths[1] * 0.005 / 0.02)
@@ -162,12 +161,11 @@ def test_closed_form_tolerance_beside_a_whole_number(tmp_path):
 def test_a_whole_number_has_no_tolerance(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
     coarsely(monkeypatch.setattr)
-    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
-    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
+    unillustrated(monkeypatch.setattr)
     outer = ('["outer", "inner"]', '["outer", "roller"]\ninactive = {roller = ["guide_clearance_mm"]}')
     study = Study.load(with_kinds(tmp_path, outer))
     assert tolerances_of(study)[0] == 0.0
-    assert tolerances_of(study.at((1,)))[:2].tolist() == [0.0, 0.0]
+    assert tolerances_of(study.with_levels((1,)))[:2].tolist() == [0.0, 0.0]
     record = write(run_study(study, tmp_path, 1, lambda title: silent, adaptive=True), tmp_path)
     assert set(record["tolerances"]) <= {"guide_clearance_mm", "pocket_clearance_mm"}
     assert record["tolerances"]["pocket_clearance_mm"]["half_width"] >= 0.0

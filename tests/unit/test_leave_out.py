@@ -20,14 +20,13 @@ from footprint import added_modules, parameter_bytes
 
 import rbdyn.contact
 import rbdyn.dynamics
-from rbdyn.accuracy.options import OPTIONS, with_options
+from rbdyn.accuracy.variants import OPTIONS, with_options
 from rbdyn.contact.cage_film import journal_film_force, wall_film
 from rbdyn.contact.hertz_line import sum_of_slices
 from rbdyn.contact.rolling_resistance import film_forces
 from rbdyn.contact.traction import asperity_load_share, bicubic
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.guide_land import journal_wrench
-from rbdyn.dynamics.forces.pocket import dry_walls, film_on_wall
+from rbdyn.dynamics.forces.cage import dry_walls, film_on_wall, journal_wrench
 from rbdyn.dynamics.forces.race_lanes import open_contact
 from rbdyn.dynamics.forces.races import turned_multiple
 from rbdyn.dynamics.forces.schedule import segment
@@ -109,9 +108,8 @@ MODULES = {
 NOT_NEEDED = (
     "pandas", "matplotlib", "pymoo", "sklearn", "doe", "rich",
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
-    "rbdyn.accuracy", "rbdyn.accuracy.options", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
-    "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion.history", "rbdyn.dynamics.forces.observe",
-    "rbdyn.dynamics.motion.history", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
+    "rbdyn.accuracy", "rbdyn.accuracy.variants", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
+    "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion", "rbdyn.dynamics.forces.observe",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 
@@ -171,6 +169,7 @@ def test_unit_an_option_is_a_type_of_law(outer, optional):
         assert left_out or name == "contact law of ISO/TS 16281", name
 
 
+@pytest.mark.slow
 def test_unit_only_the_laws_of_a_scene_are_compiled(make_scene):
     """Compile: of all bodies of all laws, only those of types in the bearing are; so for a scene with every law off."""
     scenes = [BARE, ()]
@@ -262,18 +261,3 @@ def test_command_line_imports_what_the_scene_needs():
     loaded = set(output.splitlines()[-1].split())
     assert "rbdyn.dynamics.simulate" in loaded and '"status": "ok"' in output
     assert sorted(loaded & set(NOT_NEEDED)) == []
-
-
-def test_unit_the_plain_path_is_the_general_one():
-    """Agreement: ``interpreted_leave_out``, in a process where nothing is compiled."""
-    fresh(
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:xdist",
-        HELPERS / "interpreted_leave_out.py",
-        interpreted=True,
-    )

@@ -31,9 +31,9 @@ CENTRES = slice_centres(31, LENGTH)
 RELIEF = logarithmic_relief(CENTRES, 9e-3, LENGTH)
 ON_BAR = hertz_line.LineContactOnBar(3.73e8, 5e7)
 CUT = {
-    "profiled": hertz_line.sliced(PLAIN["palmgren"], RELIEF, CENTRES, 0.0, 0.0),
-    "tilted": hertz_line.sliced(PLAIN["houpert"], np.zeros(31), CENTRES, 1e-3, 0.4),
-    "profiled and tilted, logarithmic": hertz_line.sliced(
+    "profiled": hertz_line.slice_contact(PLAIN["palmgren"], RELIEF, CENTRES, 0.0, 0.0),
+    "tilted": hertz_line.slice_contact(PLAIN["houpert"], np.zeros(31), CENTRES, 1e-3, 0.4),
+    "profiled and tilted, logarithmic": hertz_line.slice_contact(
         PLAIN["logarithmic, inner"], crowned_relief(CENTRES, 1.0), CENTRES, -2e-3, -1.0
     ),
 }
@@ -179,8 +179,8 @@ def test_unit_open_contact_carries_nothing(contact):
 def test_unit_slices_of_a_cylinder_sum_to_one(name, slices):
     """Unit: without a profile any number of slices gives the same load, stiffness and energy, to round-off."""
     positions = slice_centres(slices, LENGTH)
-    level = hertz_line.sliced(PLAIN[name], np.zeros(slices), positions, 0.0, 0.0)
-    tilted = hertz_line.sliced(PLAIN[name], np.zeros(slices), positions, 1e-3, 0.0)
+    level = hertz_line.slice_contact(PLAIN[name], np.zeros(slices), positions, 0.0, 0.0)
+    tilted = hertz_line.slice_contact(PLAIN[name], np.zeros(slices), positions, 1e-3, 0.0)
     for overlap in (1e-9, 1e-6, 1e-5):
         whole = (*compiled_line(PLAIN[name], overlap, 1.0, 0.0), compiled_whole_energy(PLAIN[name], overlap))
         # Ninety degrees from where the tilt is largest, the rings are parallel.
@@ -192,7 +192,7 @@ def test_unit_slices_of_a_cylinder_sum_to_one(name, slices):
 def test_oracle_slices_of_a_tilted_cylinder():
     """Oracle: a tilt that opens one end loads a length c of the roller: Q = (9/19) K/l theta^(10/9) c^(19/9)."""
     tilt, stiffness = 2e-3, PLAIN["palmgren"].stiffness
-    contact = hertz_line.sliced(PLAIN["palmgren"], np.zeros(2001), slice_centres(2001, LENGTH), tilt, 0.0)
+    contact = hertz_line.slice_contact(PLAIN["palmgren"], np.zeros(2001), slice_centres(2001, LENGTH), tilt, 0.0)
     for touching in (1e-3, 2e-3, 3e-3):
         # The overlap of the middle, where the end of the loaded length just touches.
         overlap = tilt * (touching - 0.5 * LENGTH)
@@ -206,7 +206,7 @@ def test_literature_31_slices_are_enough():
     """Literature: ISO/TS 16281 asks for 30 slices: 31 and 301 agree to 1 % under load, profiled or tilted."""
     for tilt in (0.0, 1e-3):
         coarse, fine = (
-            hertz_line.sliced(
+            hertz_line.slice_contact(
                 PLAIN["palmgren"],
                 logarithmic_relief(slice_centres(n, LENGTH), 9e-3, LENGTH),
                 slice_centres(n, LENGTH),

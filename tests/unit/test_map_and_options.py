@@ -15,9 +15,8 @@ import pytest
 from conftest import lacking
 
 from rbdyn import accuracy
-from rbdyn.accuracy.options import OPTIONS, option_costs, study, with_options
-from rbdyn.base.faults import InputError
-from rbdyn.base.ranges import axis_values
+from rbdyn.accuracy.variants import OPTIONS, option_costs, study_options, with_options
+from rbdyn.base.faults import InputError, axis_values
 from rbdyn.cli.app import _write_map as write
 from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
 from rbdyn.scene import Scene
@@ -159,7 +158,7 @@ def test_command_line_killed_map_resumes(command, tmp_path):
         process.send_signal(number)
         _, said = process.communicate()
         assert process.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130), said
-    assert said.strip() == f"interrupted; what was finished is kept in {out / POINTS}: start again to go on"
+    assert said.strip() == f"interrupted; finished parts are saved in {out / POINTS}; start the command again to resume"
     assert 3 <= lines(out / POINTS) < 6
     assert command(*arguments, "--out", out).returncode == 0
     one, two = (json.loads((folder / "map.json").read_text()) for folder in (tmp_path / "whole", out))
@@ -174,7 +173,7 @@ def test_command_line_killed_map_resumes(command, tmp_path):
     stopped.send_signal(signal.SIGINT)
     shown, said = stopped.communicate()
     assert (stopped.returncode, json.loads(shown)["status"]) == (130, "interrupted")
-    assert said.strip().splitlines()[-1] == "interrupted; nothing was kept"
+    assert said.strip().splitlines()[-1] == "interrupted; nothing was saved"
 
 
 def lines(path: Path) -> int:
@@ -228,13 +227,14 @@ def test_unit_option_costs(outer, tmp_path):
     assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
     # The same types of laws: the compiled code is shared, so both cost the same but for noise.
     assert row.difference_ns == row.with_ns - row.without_ns
-    found = study(outer, options=options)
+    found = study_options(outer, options=options)
     assert accuracy.write(found, tmp_path) == ["options.json", "options.csv"]
     assert found.record["format"] == "rbdyn.options/1"
     saved = found.record["options"][0]
     assert saved["option"] == row.option and saved["with_ns"] > 0.0
 
 
+@pytest.mark.slow
 def test_unit_footprint_of_options(outer):
     """Unit: an option of the plain scene's law types holds what that does; a clock adds its number, modules and code."""
     options = {name: OPTIONS[name] for name in ("contact law of ISO/TS 16281", "rotating load, with clock")}

@@ -9,7 +9,7 @@ from surface_intervals import interval
 
 from doe.designs import central_composite
 from doe.response_surface import describe, fit
-from doe.response_surface.model_error import ModelError, correlation, draw_fields
+from doe.response_surface.adequacy import ModelError, correlation, draw_fields
 
 POINTS = central_composite(3, centre_replicates=6).coded
 KEYWORDS = {"name": "y", "model": "quadratic", "centre": np.zeros(3), "step": np.ones(3)}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from doe.clearance import FRAMES, ORBIT_POINTS, motion_record
-from rbdyn.dynamics.motion.history import history
+from rbdyn.dynamics.motion import history
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rbdyn
-from rbdyn.dynamics.motion.history import history
+from rbdyn.dynamics.motion import history
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -25,10 +25,11 @@ def benchmark():
     return module
 
 
-@pytest.fixture
-def scenes(benchmark, tmp_path):
+@pytest.fixture(scope="module")
+def scenes(benchmark, tmp_path_factory):
     """Every scene of the benchmark, by name."""
-    return {case.name: benchmark.scene_of(case, benchmark.Size(2, 0.2, 0.0), tmp_path) for case in benchmark.CASES}
+    folder = tmp_path_factory.mktemp("scenes")
+    return {case.name: benchmark.scene_of(case, benchmark.Size(2, 0.2, 0.0), folder) for case in benchmark.CASES}
 
 
 def test_unit_cells_hold_by_what_is_known_of_their_bias(benchmark):

@@ -14,7 +14,7 @@ from rbdyn.dynamics.parameters.model import _rheology, roller_bearing
 from rbdyn.dynamics.parameters.state import start_state
 from rbdyn.dynamics.parameters.validity import light_load_notes
 from rbdyn.life.rollers import minimum_loads
-from rbdyn.properties.lubricants import oil_at
+from rbdyn.properties.materials import oil_at
 from rbdyn.properties.oils import (
     BASE_OILS,
     GOLD_SPREAD,
@@ -84,7 +84,7 @@ def test_literature_viscosity_at_other_temperatures(celsius):
 def test_literature_jet_oil():
     """Literature: Mobil Jet Oil II has the constants of D341 that public code quotes for it, 9.3116 and 3.6661."""
     assert JET_OIL_II.viscosity == pytest.approx((9.3116, 3.6661), rel=2e-4)
-    assert JET_OIL_II.at(15.0).density == 1003.5
+    assert JET_OIL_II.at_temperature(15.0).density == 1003.5
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,9 @@ def test_literature_jet_oil():
 def test_literature_pressure_coefficient(base, first, second, within):
     """Literature: Gold's form lies below alpha = 1/(a1 + a2 T) as measured on oils of VG 100, within the spread stated."""
     oil = grade_oil(100.0, BASE_OILS[base])
-    ratio = [oil.at(c).pressure_coefficient * (first + second * (c + 273.15)) for c in (40.0, 60.0, 80.0, 100.0)]
+    ratio = [
+        oil.at_temperature(c).pressure_coefficient * (first + second * (c + 273.15)) for c in (40.0, 60.0, 80.0, 100.0)
+    ]
     assert all(1.0 - within < each < 1.0 for each in ratio)
 
 
@@ -108,7 +110,7 @@ def test_literature_gold_constants():
     assert gold["mineral"] == (0.9904, 0.1390) and gold["PAO"] == (0.7382, 0.1335)
     assert gold["ester"] == (0.6605, 0.1360) and gold["PAG"] == (0.5489, 0.1485)
     plain = Walther.through((40.0, 100.0), (100.0, 11.07))
-    assert grade_oil(100.0, BASE_OILS["mineral"]).at(100.0).pressure_coefficient == pytest.approx(
+    assert grade_oil(100.0, BASE_OILS["mineral"]).at_temperature(100.0).pressure_coefficient == pytest.approx(
         0.9904e-8 * plain.viscosity(100.0) ** 0.1390, rel=1e-3
     )
 
@@ -119,9 +121,13 @@ def test_unit_slope_is_the_derivative(base):
     for grade in (10.0, 100.0, 460.0):
         oil = grade_oil(grade, BASE_OILS[base])
         for celsius in (-20.0, 40.0, 150.0):
-            quotient = (oil.at(celsius - 1e-3).viscosity - oil.at(celsius + 1e-3).viscosity) / 2e-3
-            assert oil.at(celsius).viscosity_slope == pytest.approx(quotient, rel=1e-6)
-            assert all(math.isfinite(value) and value > 0.0 for value in dataclasses.astuple(oil.at(celsius)))
+            quotient = (
+                oil.at_temperature(celsius - 1e-3).viscosity - oil.at_temperature(celsius + 1e-3).viscosity
+            ) / 2e-3
+            assert oil.at_temperature(celsius).viscosity_slope == pytest.approx(quotient, rel=1e-6)
+            assert all(
+                math.isfinite(value) and value > 0.0 for value in dataclasses.astuple(oil.at_temperature(celsius))
+            )
 
 
 def test_unit_data_sheet_of_a_grade_is_that_grade():
@@ -130,7 +136,7 @@ def test_unit_data_sheet_of_a_grade_is_that_grade():
     points = [[celsius, grade.viscosity.viscosity(celsius)] for celsius in (80.0, 20.0)]
     told = {"oil": "data_sheet", "base_oil": "PAO", "viscosities_C_mm2_s": points, "density_kg_m3": grade.density}
     found = lubricant(**told).in_service
-    assert dataclasses.astuple(found) == pytest.approx(dataclasses.astuple(grade.at(70.0)), rel=1e-9)
+    assert dataclasses.astuple(found) == pytest.approx(dataclasses.astuple(grade.at_temperature(70.0)), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -163,13 +169,13 @@ def test_unit_unknown_oils(text):
     [
         (
             {"oil": "MIL-L-7808", "base_oil": "PAO"},
-            "lubricant.base_oil = PAO: lubricant.oil = 'MIL-L-7808' sets that by itself",
+            "lubricant.base_oil = PAO: contradicts lubricant.oil = 'MIL-L-7808', which implies it",
         ),
         ({"oil": "Mobil Jet Oil II", "density_kg_m3": 900.0}, "lubricant.density_kg_m3 = 900.0"),
-        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "sets that by itself; leave it out or name another"),
+        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "which implies it; leave out one of them"),
         ({"oil": "data_sheet"}, "lubricant.density_kg_m3: missing"),
         ({"oil": "data_sheet"}, "lubricant.viscosities_C_mm2_s: missing"),
-        ({"oil": "data_sheet", "viscosity_index": 95.0}, "lubricant.viscosity_index = 95.0: lubricant.oil"),
+        ({"oil": "data_sheet", "viscosity_index": 95.0}, "lubricant.viscosity_index = 95.0: contradicts lubricant.oil"),
         (
             {"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0], [100.0, 32.0]], "density_kg_m3": 880.0},
             "must fall",
@@ -210,7 +216,7 @@ def test_unit_traction_follows_the_oil(make_scene):
         make_scene("lubricant.oil='ISO VG 32'", "traction.limiting_shear_ratio=0.06").traction.limiting_shear_ratio
         == 0.06
     )
-    with pytest.raises(InputError, match=r"no constants of ISO VG 32 are known; add traction\.rheology_oil"):
+    with pytest.raises(InputError, match=r"has no constants of ISO VG 32; set traction\.rheology_oil"):
         make_scene("lubricant.oil='ISO VG 32'", "traction.model=thermal_newtonian")
 
 
@@ -226,7 +232,7 @@ def test_unit_estimates_are_told_and_scenes_go_there_and_back(make_scene):
         word in told for word in ("ISO VG 100 (PAG)", "D341", "index of 210", "by Gold, within 25 %", "by base oil")
     )
     (alike,) = lubricant(oil="MIL-L-85734").estimates
-    assert "is taken as MIL-L-23699" in alike
+    assert "is treated as MIL-L-23699" in alike
     (known,) = lubricant(viscosity_mPas=9.0, pressure_coefficient_1_GPa=15.0).estimates
     assert "D341" not in known and "Gold" not in known
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.cli.app import app
-from rbdyn.dynamics.forces.guide_land import OuterGuide
+from rbdyn.dynamics.forces.cage import OuterGuide
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.simulate import clearance_report
 from rbdyn.scene import Scene
@@ -179,7 +179,7 @@ def test_literature_bronze_and_peek_at_24000_rpm():
     [
         (
             {"cage": "peek"},
-            ("cage.guide_clearance_mm = 0.15", "heat -138.0 um", "leave -3.6 um", "land_film_floor_um = 3"),
+            ("cage.guide_clearance_mm = 0.15", "temperature -138.0 um", "leave -3.6 um", "land_film_floor_um = 3"),
         ),
         (
             {"cage": "peek", "cage__hoop_modulus_share": 1.0},
@@ -205,7 +205,7 @@ def test_literature_bronze_and_peek_at_24000_rpm():
         ),
         (
             {"cage": "peek", "cage__guidance": "roller", "cage__pocket_radial_clearance_mm": 0.08},
-            ("cage.pocket_radial_clearance_mm = 0.08: the circle of pockets grows", "against that of the rollers"),
+            ("cage.pocket_radial_clearance_mm = 0.08: the pocket circle grows", "relative to the roller circle"),
         ),
     ],
 )

@@ -7,8 +7,7 @@ import pytest
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import runge_kutta as rk
-from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.records import ACCEPTED, FINISHED
+from rbdyn.dynamics.integrators.advance import ACCEPTED, FINISHED, advance
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 

@@ -7,8 +7,8 @@ import pytest
 
 import rbdyn
 from rbdyn.base import forecast
-from rbdyn.dynamics import run as pace
-from rbdyn.dynamics.run import Pace
+from rbdyn.dynamics import ensemble
+from rbdyn.dynamics.ensemble import Pace
 from rbdyn.dynamics.simulate import simulate
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")
@@ -29,11 +29,11 @@ def test_unit_what_is_left_is_stated_with_runs_turns_and_time(make_scene):
     scene = make_scene("bearing.roller_profile=logarithmic")
     one, (first,) = watched(scene, looks, growth=8.0)
     assert re.fullmatch(
-        r"10 runs of 1200 shaft turns in all are left: 2 at once, they take \d+ to \d+ min, up to [\d.]+ h where figures drift; "
+        r"10 runs of 1200 shaft turns in all remain, 2 at once: \d+ to \d+ min, up to [\d.]+ h if figures drift; "
         r"reduce model.slices, numerics.turns or numerics.replicates to shorten it",
         first,
     )
-    low, high = one.predicted
+    low, high = one.prediction
     assert low < 24 * 60 < high / 8.0 < 1.5 * 24 * 60
 
 
@@ -41,9 +41,9 @@ def test_unit_companions_and_rounds_of_runs_count(make_scene):
     """Unit: three runs on two threads are two rounds; a companion is one more, of 0.6 to 1.5 times a run."""
     looks = [(0, 10.0, 10.0, 10_000, 10**7)]
     (plain, _), (more, _) = (watched(make_scene(), looks, 3, 100.0, companions=count) for count in (0, 1))
-    assert plain.predicted[0] < 200.0 < plain.predicted[1]
-    assert more.predicted[0] / plain.predicted[0] == pytest.approx(1.3, rel=0.02)
-    assert more.predicted[1] / plain.predicted[1] == pytest.approx(1.75, rel=0.03)
+    assert plain.prediction[0] < 200.0 < plain.prediction[1]
+    assert more.prediction[0] / plain.prediction[0] == pytest.approx(1.3, rel=0.02)
+    assert more.prediction[1] / plain.prediction[1] == pytest.approx(1.75, rel=0.03)
 
 
 def test_unit_runs_that_have_ended_are_not_left(make_scene):
@@ -53,16 +53,16 @@ def test_unit_runs_that_have_ended_are_not_left(make_scene):
     one._look_s = 40.0
     for look in looks:
         one.look(*look)
-    assert stated[0].startswith("6 runs of 720 shaft turns in all are left")
+    assert stated[0].startswith("6 runs of 720 shaft turns in all remain")
 
 
 def test_unit_a_run_that_was_lengthened_leaves_the_others_their_turns(make_scene):
     """Unit: of two runs of 10 turns one was lengthened to 40 at a second a turn; one companion of 10 turns is left after the other."""
     looks = [(0, 40.0, 40.0, 10_000, 10**7)]
     one, stated = watched(make_scene(), looks, 2, 10.0, threads=1, growth=8.0, companions=1)
-    assert stated[0].startswith("2 runs of 20 shaft turns in all are left: 1 at once, they take ")
+    assert stated[0].startswith("2 runs of 20 shaft turns in all remain, 1 at once: ")
     # Ten turns of a run, and ten of a companion of 0.6 to 1.5 times the time, after the 40 s.
-    assert one.predicted[0] < 40.0 + 16.0 < 40.0 + 25.0 < one.predicted[1]
+    assert one.prediction[0] < 40.0 + 16.0 < 40.0 + 25.0 < one.prediction[1]
 
 
 def test_unit_a_budget_states_the_time_that_it_stands_for(make_scene):
@@ -82,7 +82,7 @@ def test_unit_short_runs_say_nothing(make_scene):
     assert watched(scene, [(0, 12.0, 0.0, 10_000, 10**9)])[1] == []
     silent = Pace(scene, None, 10, 120.0, 2)
     silent.look(0, 12.0, 0.001, 10_000, 10**9)
-    assert silent.predicted is None
+    assert silent.prediction is None
 
 
 def test_unit_the_time_is_stated_again_where_it_exceeds_the_most(make_scene):
@@ -91,7 +91,7 @@ def test_unit_the_time_is_stated_again_where_it_exceeds_the_most(make_scene):
     assert len(watched(make_scene(), steady)[1]) == 1
     slower = [(0, 10.0, 10.0, 10_000, 10**9), (0, 40.0, 12.0, 20_000, 10**9), (0, 90.0, 20.0, 30_000, 10**9)]
     one, stated = watched(make_scene(), slower)
-    assert len(stated) == 2 and one.predicted == watched(make_scene(), slower[:1])[0].predicted
+    assert len(stated) == 2 and one.prediction == watched(make_scene(), slower[:1])[0].prediction
 
 
 def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog):
@@ -101,11 +101,11 @@ def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog
     monkeypatch.setattr(forecast, "NOTABLE_S", 1e9)
     plain = simulate(scene, notice=stated.append)
     assert stated == [] and "predicted_most_s" not in plain.cost
-    monkeypatch.setattr(pace, "FIRST_LOOK_S", 0.0)
+    monkeypatch.setattr(ensemble, "FIRST_LOOK_S", 0.0)
     monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)
-    assert "shaft turns in all are left" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
+    assert "shaft turns in all remain" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
     assert (again.impact_force, again.power_loss) == (plain.impact_force, plain.power_loss)
     assert 0.0 < again.cost["predicted_least_s"] <= again.cost["predicted_most_s"]
 

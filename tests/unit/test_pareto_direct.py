@@ -8,8 +8,8 @@ from direct_search import compare_with_surrogate, direct_front
 from pareto_cases import LOWER, UPPER, bowls, noisy_bowls
 
 from doe.pareto import Goals, front, hypervolume
+from doe.pareto.front import noisy_hypervolume
 from doe.pareto.search import dominance, error_aware_dominance, order, ranks
-from doe.pareto.simulated import noisy_hypervolume
 
 GOALS = Goals.of(["min", "min"])
 BUDGET = {"evaluations": 800, "population": 40, "baseline": [0.7, 0.4, 0.1]}

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from rbdyn.contact import film_thickness as line
-from rbdyn.contact import point_film as films
-from rbdyn.contact.hertz_point import ball_on_race, peak_pressure
-from rbdyn.properties.lubricants import oil_at
-from rbdyn.properties.materials import MATERIALS, equivalent_modulus
+from rbdyn.contact import point_contact as films
+from rbdyn.contact.point_contact import ball_on_race, peak_pressure
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus, oil_at
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 OIL = oil_at("MIL-L-23699", 80.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from doe.report.steps.calibrate import write_sample
+from doe.report.sections.calibration import write_sample
 from doe.unknown.inputs import values_of
 from doe.workflow.input_sets import read_case, read_sample
 from rbdyn.base.faults import InputError

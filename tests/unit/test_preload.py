@@ -18,7 +18,7 @@ from rbdyn.life import balls as life
 from rbdyn.life import turning_rings
 from rbdyn.quasistatic import preload, result
 from rbdyn.quasistatic.bearing import equilibrium
-from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -98,7 +98,7 @@ def test_clearance_sweep_meets_the_scene_drawn_with_that_clearance():
 @given(st.floats(0.0, 30e-6))
 def test_invariant_wear_leaves_the_grooves_where_they_are(wear):
     """Invariant: groove radii and the radial distance of their centres stay; the clearance grows by twice the wear."""
-    fresh, used = scene().bearing, preload.worn(scene(), wear).bearing
+    fresh, used = scene().bearing, preload.wear_scene(scene(), wear).bearing
     for groove in ("inner_groove_factor", "outer_groove_factor"):
         radius = getattr(fresh, groove) * fresh.ball_diameter_mm
         assert getattr(used, groove) * used.ball_diameter_mm == pytest.approx(radius, rel=1e-12)
@@ -141,9 +141,9 @@ def test_unit_bad_sweeps_are_named():
     with pytest.raises(ValueError, match="prescribed"):
         preload.over_preload(scene(axial=0.0, preload_um=5.0), [0.0, 1.0, 2.0])
     with pytest.raises(ValueError, match="wear"):
-        preload.worn(scene(), -1e-6)
+        preload.wear_scene(scene(), -1e-6)
     with pytest.raises(ValueError, match="wear"):
-        preload.worn(scene(), 5e-3)
+        preload.wear_scene(scene(), 5e-3)
 
 
 SINGLE = EXAMPLES / "angular_contact_ball.toml", ("bearing.bore_mm=40.0", "bearing.outside_diameter_mm=52.0")
@@ -210,7 +210,7 @@ def test_invariant_a_row_of_a_study_is_the_equilibrium_at_its_value(study, file,
         alone = {
             "preload": lambda force: whole.changed({"operation.preload_N": force}),
             "clearance": lambda gap: whole.changed({"bearing.radial_clearance_mm": 1e-3 * gap}),
-            "wear": lambda loss: preload.worn(whole, 1e-6 * loss),
+            "wear": lambda loss: preload.wear_scene(whole, 1e-6 * loss),
         }[study](value)
         assert sweep_figures(table, place) == pytest.approx(equilibrium_figures(alone), rel=1e-7, abs=1e-9)
 

@@ -46,7 +46,7 @@ def test_unit_public_functions_take_the_path_of_a_scene(short_file):
     [
         (5, "scene = 5: must be a Scene or the path of a scene file"),
         (None, "scene = None: must be a Scene or the path"),
-        ({}, "scene = {}: must be a Scene or the path of a scene file; Scene.from_dict makes one of tables"),
+        ({}, "scene = {}: must be a Scene or the path of a scene file; Scene.from_dict takes tables"),
         (b"a.toml", "must be a Scene or the path"),
         (["x" * 1000], "must be a Scene or the path"),
         ("nowhere.toml", "nowhere.toml: no such file"),

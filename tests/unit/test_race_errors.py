@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbdyn.base.faults import InputError, validated
 from rbdyn.quasistatic.runout.model import errors_of
-from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, random_waviness, rolling, waviness
+from rbdyn.quasistatic.runout.turn import ball_path, perfect, random_waviness, rolling, waviness
 from rbdyn.scene.ball import FormErrors, misfits
 
 Z = 7
@@ -38,7 +38,7 @@ def test_invariant_rolling_without_slip(gamma, outer):
 
 def test_unit_ball_without_pitch_circle_is_refused():
     """Unit: a ball as large as its pitch circle is refused by name."""
-    with pytest.raises(ValueError, match="must be smaller"):
+    with pytest.raises(ValueError, match="make the ball smaller"):
         rolling(0.1, 0.1, 0.0)
 
 
@@ -90,7 +90,7 @@ def test_invariant_even_orders_change_the_diameter_and_odd_ones_do_not(order):
 def test_unit_random_waviness_is_as_high_as_asked():
     """Unit: the drawn form has the height asked for, the orders asked for, and repeats with its seed."""
     form = random_waviness(2, 40, 1.5e-6, 1.0, np.random.default_rng(3))
-    trace = form.at(np.linspace(0.0, 2.0 * math.pi, 20_000))
+    trace = form.deviation(np.linspace(0.0, 2.0 * math.pi, 20_000))
     assert np.ptp(trace) == pytest.approx(1.5e-6, rel=2e-3)
     assert list(form.order[[0, -1]]) == [2, 40]
     again = random_waviness(2, 40, 1.5e-6, 1.0, np.random.default_rng(3))
@@ -111,7 +111,7 @@ def test_unit_errors_of_a_scene():
     """Unit: a scene's table becomes SI errors; adding one error leaves what the others drew."""
     scene = validated(FormErrors, TABLE, "scene")
     errors = errors_of(scene, Z)
-    assert errors.inner_roundness.at(np.array([math.pi / 2]))[0] == pytest.approx(0.5e-6)
+    assert errors.inner_roundness.deviation(np.array([math.pi / 2]))[0] == pytest.approx(0.5e-6)
     assert errors.outer_roundness.height == pytest.approx(1.6e-6)
     assert [ball.order.tolist() for ball in errors.sphericity[:3]] == [[2, 4], [4], [2, 4]]
     assert 0.0 < errors.ball_diameter.std() < 0.3e-6
@@ -143,9 +143,9 @@ def test_unit_errors_that_do_not_go_with_the_balls():
         "ball_sphericity": [{"order": 2, "amplitude_um": 0.1, "balls": [9]}],
     }
     found = list(misfits(validated(FormErrors, table, "scene"), Z, 12.7, 70.0))
-    assert [any(word in sentence for sentence in found) for word in ("one a ball", "ball 9 of 7", "hundredth")] == [
-        True
-    ] * 3
+    assert [
+        any(word in sentence for sentence in found) for word in ("one value for each ball", "ball 9 of 7", "hundredth")
+    ] == [True] * 3
     assert not list(misfits(validated(FormErrors, TABLE, "scene"), Z, 12.7, 70.0))
     coarse = validated(FormErrors, {"ball_sphericity": [{"order": 20, "amplitude_um": 0.1}], "steps": 100}, "scene")
     assert "take at least 111" in next(misfits(coarse, Z, 12.7, 70.0))

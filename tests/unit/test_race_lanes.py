@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
 from rbdyn.compiled.kernel import alike, either, kernel
-from rbdyn.contact.hertz_line import LineContact, sliced
+from rbdyn.contact.hertz_line import LineContact, slice_contact
 from rbdyn.contact.traction import TractionSurface
-from rbdyn.dynamics.forces.pocket import NoPocket, pocket_contact, pocket_gap
+from rbdyn.dynamics.forces.cage import NoPocket, pocket_contact, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import share_vectors
 from rbdyn.dynamics.forces.races import RoundRace
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -49,7 +49,7 @@ def test_unit_alike_and_either(outer):
         assert compiled_either(first, bearing.outer, bearing.inner) == expected
         assert either(first, bearing.outer, bearing.inner) == expected
     assert type(compiled_either(True, bearing.outer, bearing.inner).form) is RoundRace
-    cut = sliced(LineContact(1e9), np.zeros(3), np.zeros(3), 0.0, 0.0)
+    cut = slice_contact(LineContact(1e9), np.zeros(3), np.zeros(3), 0.0, 0.0)
     for one, other in ((cut, cut), (LineContact(1.0), RoundRace()), (cut, LineContact(1.0))):
         assert not compiled_alike(one, other) and not alike(one, other)
     assert compiled_either(True, LineContact(1.0), RoundRace()) == either(True, LineContact(1.0), RoundRace()) == ()

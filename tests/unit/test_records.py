@@ -77,7 +77,7 @@ def test_invariant_saved_results_load_as_they_were(outer_result, tmp_path):
     """Invariant: results of rollers and of balls, found and not, and points of a map, are the same once saved and loaded."""
     results = [outer_result, *(equilibrium(BallScene.load(file)) for file in (SINGLE, DOUBLE))]
     results.append(equilibrium(BallScene.load(SINGLE, ["operation.radial_load_N=1e7"])))
-    assert not results[-1].found and "balls" not in results[-1].as_dict()
+    assert not results[-1].is_equilibrium and "balls" not in results[-1].as_dict()
     for result in results:
         result.save(tmp_path / "result.json")
         assert type(result).load(tmp_path / "result.json").as_dict() == result.as_dict()

@@ -6,7 +6,7 @@ import heapq
 
 import pytest
 
-from rbdyn.base.terminal import Remaining, clock_words
+from rbdyn.base.forecast import Remaining, clock_words
 
 
 def ends_of(runs: int, seconds: float, workers: int, compile_s: float) -> list[float]:
@@ -77,7 +77,7 @@ def test_unit_bar_shows_the_time_left_of_runs_longer_than_half_a_minute(monkeypa
     import io
     import sys
 
-    from rbdyn.base import terminal as remaining
+    from rbdyn.base import command as remaining
 
     class Screen(io.StringIO):
         def isatty(self) -> bool:

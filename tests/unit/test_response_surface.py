@@ -11,7 +11,7 @@ import statsmodels.formula.api as smf
 from statsmodels.stats.anova import anova_lm
 
 from doe.designs import central_composite, to_coded
-from doe.report.steps.fit import fit_record
+from doe.report.sections.fit import fit_record
 from doe.response_surface import describe, fit
 
 TABLE = Path(__file__).parents[2] / "examples" / "ccd_table4.csv"

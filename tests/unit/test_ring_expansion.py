@@ -18,7 +18,7 @@ from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials, material_of
-from rbdyn.scene.mounting import Mounting, misfits
+from rbdyn.scene.operation import Mounting, misfits
 
 STEEL = MATERIALS["bearing_steel"]
 OMEGA = 24000.0 * math.pi / 30.0

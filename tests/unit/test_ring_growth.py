@@ -240,7 +240,7 @@ def test_unit_contradictory_rings_are_refused():
     cases = (
         ({"bearing": {"bore_mm": 29.0}}, "mounting.bore_mm = 30"),
         ({"bearing": {"clearance_change_um": -5.0}}, "clearance_change_um = -5"),
-        ({"model": {"ring_expansion": True, "ring_expansion_form": "paper"}}, "knows no fits"),
+        ({"model": {"ring_expansion": True, "ring_expansion_form": "paper"}}, "has no fits"),
         ({"mounting": {"bore_mm": 37.0}}, "mounting.bore_mm = 37"),
     )
     for tables, words in cases:

@@ -78,6 +78,7 @@ def test_unit_times_are_measured_and_written(found, tmp_path, drawn):
     assert len((tmp_path / "scaling.csv").read_text().splitlines()) == 5
 
 
+@pytest.mark.slow
 def test_unit_memory_of_a_process(outer):
     """Unit: forty times the turns take no more memory, but for what the allocator happens to hold."""
     prepare(outer, roller_bearing(outer))  # compiling takes memory too

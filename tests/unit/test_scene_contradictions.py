@@ -23,7 +23,7 @@ ADDED_FAULTS = {
     ),
     "profile short of the contact": (
         {**PROFILED, "bearing.profile_table_mm_um": [[0.0, 0.0], [1.0, 1.0]]},
-        ("bearing.profile_table_mm_um: ends at 1 mm", "the contact of 1.75 mm", "carry the table on"),
+        ("bearing.profile_table_mm_um: ends at 1 mm", "the contact of 1.75 mm", "extend the table"),
     ),
     "points that are not pairs": (
         {**PROFILED, "bearing.profile_table_mm_um": [[0.0, 0.0], [1.0, 1.0, 2.0]]},
@@ -56,11 +56,11 @@ ADDED_FAULTS = {
     ),
     "tilt that leaves no contact": (
         {"bearing.tilt_mrad": 20.0, "operation.radial_load_N": 0.1},
-        ("bearing.tilt_mrad = 20", "even under 0.1 N", "of 3.5 mm", "lessen the tilt"),
+        ("bearing.tilt_mrad = 20", "even under 0.1 N", "of 3.5 mm", "reduce the tilt"),
     ),
     "errors of too few rollers": (
         {"bearing.roller_diameter_errors_um": [1.0, 2.0]},
-        ("bearing.roller_diameter_errors_um: 2 values for 10 rollers", "one a roller"),
+        ("bearing.roller_diameter_errors_um: 2 values for 10 rollers", "one value for each roller"),
     ),
     "errors and their spread": (
         {"bearing.roller_diameter_errors_um": [0.0] * 10, "bearing.roller_diameter_spread_um": 1.0},
@@ -82,7 +82,7 @@ ADDED_FAULTS = {
     "restitution above one": ({"model.land_restitution": 1.2}, ("land_restitution = 1.2", "at most 1")),
     "film in a pocket that is off": (
         {"model.pocket": "off", "model.pocket_film": True},
-        ("model.pocket = 'off' and model.pocket_film = true contradict", "drop the film or the 'off'"),
+        ("model.pocket = 'off' and model.pocket_film = true contradict", "leave out one of them"),
     ),
     "film floor above the pocket's clearance": (
         {"model.pocket_film": True, "model.pocket_film_floor_um": 150.0},
@@ -90,7 +90,7 @@ ADDED_FAULTS = {
     ),
     "pocket contact longer than the roller": (
         {"cage.pocket_contact_length_mm": 5.5},
-        ("cage.pocket_contact_length_mm = 5.5", "no more than the roller of 5 mm", "shorten it"),
+        ("cage.pocket_contact_length_mm = 5.5", "longer than the roller of 5 mm", "shorten it"),
     ),
     "pocket contact of no length": (
         {"cage.pocket_contact_length_mm": 0.0},
@@ -102,11 +102,11 @@ ADDED_FAULTS = {
     ),
     "values that miss times": (
         {"operation.schedule": {**SCHEDULE, "inner_speed_rpm": [1.0, 2.0, 3.0]}},
-        ("operation.schedule.inner_speed_rpm: 3 values for 2 times", "one a time"),
+        ("operation.schedule.inner_speed_rpm: 3 values for 2 times", "one value for each time"),
     ),
     "schedule of nothing": (
         {"operation.schedule": {"time_s": [0.0, 1.0]}},
-        ("operation.schedule: schedules nothing", "inner_speed_rpm or radial_load_N"),
+        ("operation.schedule: has neither speed nor load", "inner_speed_rpm or radial_load_N"),
     ),
     "schedule that is no table": ({"operation.schedule": ""}, ("operation.schedule = ''", "table of keys")),
     "wave of no order": (
@@ -115,7 +115,7 @@ ADDED_FAULTS = {
     ),
     "neither ring turns": (
         {"operation.inner_speed_rpm": 0.0, "operation.outer_speed_rpm": 0.05},
-        ("operation.inner_speed_rpm = 0", "or turn the outer ring"),
+        ("operation.inner_speed_rpm = 0", "or set operation.outer_speed_rpm"),
     ),
     "support of no stiffness": (
         {"support.stiffness_N_m": 0.0, "support.damping_N_s_m": 0.0},

@@ -15,15 +15,14 @@ from short_studies import EXAMPLES, SHORT, short_study, silent
 
 from doe import clearance
 from doe.adaptive.acquisition import Region
-from doe.adaptive.emulators import Face
+from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
-from doe.report.sections.searches import in_few_runs
-from doe.report.steps.front import SURE, held_sentence
-from doe.report.study.files import write
+from doe.report.files import write
+from doe.report.sections.search import SURE, in_few_runs, limiting_sentence
 from doe.study_file import Study
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
-from doe.workflow.goals import goals_of
+from doe.workflow.surfaces import goals_of
 from doe.workflow.whole import run_study
 from rbdyn.base.blocks import Figures
 
@@ -60,9 +59,9 @@ def dominated(costs: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> float:
 def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     """Oracle: levels counted; of the front foretold, of the surfaces' front as it is drawn, of the search's fresh runs."""
     study, outcome, record, _ = studied
-    goals, emulators = goals_of(study), outcome.adaptive.found.emulators
+    goals, emulators = goals_of(study), outcome.adaptive.search.emulators
     told = record["adaptive"]["compared"]
-    costs = goals.costs(outcome.adaptive.found.predictions)
+    costs = goals.costs(outcome.adaptive.search.predictions)
     front = [row for row in costs if not ((costs <= row).all(axis=1) & (costs < row).any(axis=1)).any()]
     scale = np.min(front, axis=0), np.max(front, axis=0)
     assert list(told["ideal"].values()) == pytest.approx(scale[0])
@@ -70,9 +69,9 @@ def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     drawn = np.array([study.rounded(point) for point in outcome.front.points])
     on_surfaces, _ = emulators.predict((drawn - study.centre) / record["adaptive"]["emulators"]["half_range"])
     for mine, costs in (
-        (told["search"][-1], goals.costs(outcome.adaptive.found.predictions)),
+        (told["search"][-1], goals.costs(outcome.adaptive.search.predictions)),
         (told["surfaces"], goals.costs(on_surfaces)),
-        (told["fresh"]["hypervolume"], outcome.adaptive.found.front.costs),
+        (told["fresh"]["hypervolume"], outcome.adaptive.search.front.costs),
     ):
         assert mine == pytest.approx(dominated(costs, *scale), rel=0.03)
     assert len(told["search"]) == len(record["adaptive"]["history"])
@@ -82,7 +81,7 @@ def test_the_page_draws_the_fronts_and_the_scale_is_that_of_the_history(studied)
     _, _, record, folder = studied
     page = (folder / "report.html").read_text(encoding="utf-8")
     (picture,) = re.findall(r'<svg[^>]*aria-label="Hypervolume of the search.*?</svg>', page, re.DOTALL)
-    assert picture.count('<g class="surrogate">') == 1 and "found in few runs, simulated" in page
+    assert picture.count('<g class="surrogate">') == 1 and "front of the search in few runs, simulated" in page
     history = [each["hypervolume"] for each in record["adaptive"]["history"]]
     assert record["adaptive"]["compared"]["search"] == pytest.approx(history, rel=1e-12)
 
@@ -98,10 +97,10 @@ def test_the_picture_has_every_run_by_its_reason(studied):
     for picture in places:
         for why in {*reasons, "fresh"}:
             count = len(adaptive["front"]) if why == "fresh" else reasons.count(why)
-            (marks,) = re.findall(f'<g class="{why}">(.*?)</g>', picture)
+            (marks,) = re.findall(f'<g class="{why}"[^>]*>(.*?)</g>', picture)
             assert len(re.findall("<(?:use|path) [^>]*><title>", marks)) == count, why
         assert picture.count('<g class="pick">') == 1
-    dots = re.findall(r"<title>(\d+) runs: ([\d.]+)</title>", progress[0].partition('<g class="fresh">')[0])
+    dots = re.findall(r"<title>(\d+) runs: ([\d.]+)</title>", progress[0].partition('<g class="fresh"')[0])
     assert [int(runs) for runs, _ in dots] == [each["runs"] for each in adaptive["history"]]
     assert [float(y) for _, y in dots] == pytest.approx(adaptive["compared"]["search"], abs=6e-4)
 
@@ -113,9 +112,9 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
         assert f"{name[:-3].replace('_', ' ')} {value:.4g} mm" in answer
     for name, gain in record["gains"].items():
         assert f"{name} {abs(gain['percent']):.2f} %" in answer
-    assert f"because {record['adaptive']['stopped']}: {record['adaptive']['runs']} runs" in spent
+    assert f"because {record['adaptive']['stopped']}. It took {record['adaptive']['runs']} runs" in spent
     assert held == record["adaptive"]["held"] and held.startswith("What limits the pick: ")
-    fresh = outcome.adaptive.found
+    fresh = outcome.adaptive.search
     claimed = np.hypot(fresh.bias, fresh.spread)
     assert all(f"{times:.1f}" in trust for times in claimed)
     assert ("as their stated uncertainty allows" in trust) == bool((claimed <= SURE).all())
@@ -138,7 +137,7 @@ def foretelling(predict, faces=()):
     )  # fmt: skip
     half = 1.681792830507429 * study.step
     edges = np.column_stack([study.centre - half, study.centre + half])
-    return study, SimpleNamespace(found=found, study=study, front=found.front, edges=edges), study.centre, half
+    return study, SimpleNamespace(search=found, study=study, front=found.front, edges=edges), study.centre, half
 
 
 def test_what_pulls_at_a_factor_and_what_turns_there():
@@ -159,7 +158,7 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
         limits=[Limit("power_loss_W", "<=", 6.0, 5.0, 0.1, 0.8), Limit("impact_force_N", "<=", 0.02, 0.0, 0.01, 0.8)],
         chains={"guide": SimpleNamespace(refused=False), "pocket": SimpleNamespace(refused=True)},
     )  # fmt: skip
-    told = held_sentence(outcome)
+    told = limiting_sentence(outcome)
     assert "where impact_force_N turns" in told
     assert (
         "whirl_deviation_ratio would improve with a larger value and impact_force_N would improve with a smaller value"
@@ -169,7 +168,7 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
     assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
     assert "dimension chain pocket cannot" in told and "guide cannot" not in told
     outcome.pick.point = centre - half
-    assert "at the edge of the design region; set allowed" in held_sentence(outcome), "its own pick lay elsewhere"
+    assert "at the edge of the design region; set allowed" in limiting_sentence(outcome), "its own pick lay elsewhere"
     factors = [each.model_copy(update={"allowed": (0.01, 0.5)}) for each in study.file.factor]
     outcome.study = replace(study, file=study.file.model_copy(update={"factor": factors}))
-    assert "where the region searched ends" in held_sentence(outcome), "it might have grown"
+    assert "at the edge of the searched region" in limiting_sentence(outcome), "it might have grown"

@@ -10,13 +10,14 @@ from scipy.stats import qmc
 from short_studies import short_study
 
 from doe.adaptive.emulators import Runs, fit_emulators
-from doe.pareto.simulated_tolerance import Neighbourhood
+from doe.pareto.tolerance import Neighbourhood
 from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.front import DRAWS
-from doe.workflow.goals import goals_of, region_of
 from doe.workflow.pick import draws_about
+from doe.workflow.runs import region_of
+from doe.workflow.surfaces import goals_of
 
 
 def bent(coded):

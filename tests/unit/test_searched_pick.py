@@ -7,7 +7,7 @@ import pytest
 
 from doe.pareto import Goals
 from doe.pareto.manufacture import Quadratic, ToleranceBox
-from doe.pareto.simulated_tolerance import Neighbourhood, pick_among, simulated_aware
+from doe.pareto.tolerance import Neighbourhood, pick_among, simulated_aware
 
 GOALS = Goals.of(["min", "min"])
 FLAT = [Quadratic(1.0, np.zeros(2), np.zeros((2, 2))), Quadratic(2.0, np.zeros(2), np.zeros((2, 2)))]

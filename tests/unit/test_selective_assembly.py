@@ -11,9 +11,8 @@ from scipy.special import ndtri
 from scipy.stats import truncnorm
 
 from doe.dimension_chain import solve
-from doe.dimension_chain.links import given_parts
-from doe.dimension_chain.selective_assembly import class_edges
-from doe.dimension_chain.yields import share_below
+from doe.dimension_chain.links import stated_parts
+from doe.dimension_chain.yields import class_edges, share_below
 from rbdyn.base.faults import InputError
 
 EQUAL = [(1, 9.3, 0.0, -0.012), (-1, 9.0, 0.012, 0.0)]
@@ -66,7 +65,7 @@ def test_unequal_spreads_leave_parts_without_a_mate_in_classes_of_one_width():
     wide, narrow = {"capability": 1.0}, {"capability": 2.0}
     links = [(1, 9.3, 0.0, -0.012, wide), (-1, 9.0, 0.012, 0.0, narrow)]
     found = matched(links, (0.28, 0.296), classes=4)
-    parts = given_parts(chain(links).link)
+    parts = stated_parts(chain(links).link)
     shares = [class_shares(part, class_edges(part, 4, "width")) for part in parts]
     # Large mates with large: classes in the order of size on both.
     assert found.matched == pytest.approx(np.minimum(*shares).sum(), abs=0.004)
@@ -95,7 +94,7 @@ def test_the_other_links_come_as_they_come():
     st.sampled_from(["width", "probability"]),
 )
 def test_classes_share_out_the_whole_production(law, classes, by):
-    part = given_parts(chain([(1, 5.0, 0.02, -0.04, {"distribution": law})]).link)[0]
+    part = stated_parts(chain([(1, 5.0, 0.02, -0.04, {"distribution": law})]).link)[0]
     edges = class_edges(part, classes, by)
     assert (edges[0], edges[-1]) == pytest.approx((4.96, 5.02))
     assert np.all(np.diff(edges) > 0)

@@ -14,11 +14,10 @@ from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
-from rbdyn.dynamics.integrators.method import explicit_method
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import CAGE_SHARES, absolute_tolerance, start_state
 from rbdyn.dynamics.recording import Recording, record
-from rbdyn.dynamics.run import Run, with_numerics
+from rbdyn.dynamics.run import Run, explicit_method, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import (

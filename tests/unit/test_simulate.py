@@ -22,7 +22,7 @@ from rbdyn.dynamics.forces.equations import (
     POWERS,
     SHAFT,
 )
-from rbdyn.dynamics.motion.history import history
+from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate

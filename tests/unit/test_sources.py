@@ -8,8 +8,8 @@ import tokenize
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from rbdyn.base import sources
-from rbdyn.base.sources import SITE, code_behind, compiled_digest, source_digest, what_runs
+from rbdyn.base import digests
+from rbdyn.base.digests import SITE, code_behind, compiled_digest, source_digest, what_runs
 
 MODULES = sorted(path for name in ("rbdyn", "doe") for path in (SITE / name).rglob("*.py"))
 SKIPPED = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
@@ -56,7 +56,7 @@ def copy(tmp_path, monkeypatch):
         target = tmp_path / path.relative_to(SITE)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(path.read_text())
-    monkeypatch.setattr(sources, "SITE", tmp_path)
+    monkeypatch.setattr(digests, "SITE", tmp_path)
 
     def edit(module, old, new):
         path = tmp_path / module
@@ -80,7 +80,7 @@ def copy(tmp_path, monkeypatch):
         ("rbdyn/scene/bearing.py", "Harmonics of the outer raceway", "Waves of the outer raceway"),
         ("rbdyn/scene/bearing.py", '"""Geometry of a cylindrical roller bearing.', '"""Drawing.'),
         ("rbdyn/cli/app.py", '"', "'"),
-        ("doe/report/words.py", '"', "'"),
+        ("doe/report/sections/record.py", '"', "'"),
     ],
 )
 def test_unit_words_and_pictures_invalidate_nothing(copy, module, old, new):
@@ -94,7 +94,7 @@ def test_unit_words_and_pictures_invalidate_nothing(copy, module, old, new):
     ("module", "old", "new"),
     [
         ("rbdyn/compiled/elementary.py", "0.5 * f * f", "0.25 * f * f"),
-        ("rbdyn/dynamics/integrators/kutta_pair.py", "return ", "return 1.0 * "),
+        ("rbdyn/dynamics/integrators/runge_kutta.py", "return ", "return 1.0 * "),
         ("rbdyn/contact/damping.py", "(1.0 + 1.5 * damping", "(1.0 + 1.6 * damping"),
     ],
 )
@@ -117,7 +117,7 @@ def test_unit_a_default_runs_again_but_compiles_nothing(copy):
 def kernels():
     """Modules in which anything is compiled."""
     names = [".".join(path.relative_to(SITE).with_suffix("").parts) for path in MODULES]
-    return code_behind([n for n, path in zip(names, MODULES, strict=True) if sources._KERNELS.search(path.read_text())])
+    return code_behind([n for n, path in zip(names, MODULES, strict=True) if digests._KERNELS.search(path.read_text())])
 
 
 def test_invariant_compiled_code_knows_no_scene():
@@ -135,5 +135,5 @@ def test_invariant_every_compiled_function_is_hashed():
                     found.add(each.py_func.__module__)
                 if isinstance(bodies := getattr(each, "bodies", None), dict):
                     found |= {body.__module__ for body in bodies.values()}
-    assert len(found) > 30
+    assert len(found) > 15
     assert found <= set(kernels())

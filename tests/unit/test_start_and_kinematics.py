@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from rbdyn.contact.hertz_line import LineContactOnBar
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
+from rbdyn.dynamics.forces.cage import InnerGuide, NoFilm, NoGuide, OuterGuide
 from rbdyn.dynamics.forces.equations import mechanical_energy
-from rbdyn.dynamics.forces.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
 from rbdyn.dynamics.parameters import state as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import scales, start_state, static_share

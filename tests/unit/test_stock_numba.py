@@ -109,6 +109,7 @@ def test_unit_a_cache_that_numba_cannot_serve_is_stated(tmp_path, monkeypatch, c
     assert name in sentence and numba.__version__ in sentence and not (tmp_path / "cache").exists()
 
 
+@pytest.mark.slow
 def test_unit_both_ways_give_the_same_bits():
     """Unit: laws, choices, settled sums and every elementary function, by parts here and by stock numba in another process."""
     from small_kernels import answers

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from doe.running import lock
-from doe.running.store import Failure, Point, Store, grouped
+from doe.running.store import Failure, Point, Store, grouped, is_locked
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.storage import digest_of
 
@@ -97,7 +96,7 @@ def test_what_is_no_store_of_this_version_is_refused_and_left_alone(path, statem
 
 
 def test_folder_in_place_of_the_file_or_no_folder_is_told_as_such(path):
-    with pytest.raises(InputError, match=r"study\.sqlite: .*see that its folder is there"):
+    with pytest.raises(InputError, match=r"study\.sqlite: .*make sure that its folder exists"):
         Store(path / "nowhere" / path.name)
     path.mkdir()
     with pytest.raises(InputError, match=r"study\.sqlite: is a folder where a file of runs belongs; move it away"):
@@ -269,7 +268,7 @@ def working(path: Path) -> subprocess.Popen:
 
 def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, monkeypatch):
     """Who it is and what to do; a reader sees what it does; once it is killed nothing of it is left."""
-    monkeypatch.setattr(lock, "PATIENCE_S", 0.1)
+    monkeypatch.setattr("doe.running.store.LOCK_PATIENCE_S", 0.1)
     process = working(path)
     with pytest.raises(InputError) as refused:
         Store(path)
@@ -290,14 +289,14 @@ def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, m
 def test_stores_of_one_process_share_its_lock_until_the_last_is_closed(path):
     one, two = Store(path), Store(path)
     one.close()
-    assert lock.is_held(path)
+    assert is_locked(path)
     two.put("key 1", result(1))
     two.close()
-    assert not lock.is_held(path) and not lock.is_held(path.with_name("none"))
+    assert not is_locked(path) and not is_locked(path.with_name("none"))
     process = working(path)
-    assert lock.is_held(path)
+    assert is_locked(path)
     process.communicate()
-    assert not lock.is_held(path)
+    assert not is_locked(path)
 
 
 def test_notes_tell_whether_their_process_lives(path):

@@ -17,13 +17,13 @@ from matplotlib.image import imread
 from short_studies import SHORT, rows, short_study, silent, stored
 
 from doe import clearance
-from doe.report.steps.front import front_record
-from doe.report.study.files import write
+from doe.report.files import write
+from doe.report.sections.front import front_record
 from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import find_front
 from doe.workflow.runs import read_runs, run_design
-from doe.workflow.status import finished as is_finished
+from doe.workflow.status import finished_record as is_finished
 from doe.workflow.status import inputs_digest
 from doe.workflow.surfaces import fit_surfaces, reference_runs
 from doe.workflow.whole import run_study
@@ -71,7 +71,7 @@ def test_a_finished_study_is_not_done_again(finished):
     outcome, folder, _ = finished
     command = [sys.executable, "-m", "doe", "study", str(outcome.study.path), "--out", str(folder)]
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "finished before, nothing has changed since" in shown
+    assert "Finished before, nothing has changed since" in shown
     assert f"Why this point: {outcome.pick.reason}." in shown
     asked = inputs_digest(outcome.study)
     assert is_finished(folder, asked)["pick"] == dict(
@@ -130,15 +130,15 @@ def test_centre_runs_differ_by_seed_only(finished):
 def test_stands_beside_the_published_table(finished):
     outcome, _, _ = finished
     theirs = reference_runs(outcome.study)
-    assert [row.response for row in outcome.beside] == outcome.study.responses
-    for row in outcome.beside:
+    assert [row.response for row in outcome.published_comparisons] == outcome.study.responses
+    for row in outcome.published_comparisons:
         column = outcome.study.responses.index(row.response)
         ranks = [np.argsort(np.argsort(runs.values[:, column])) for runs in (outcome.runs, theirs)]
         assert row.rank_correlation == pytest.approx(np.corrcoef(ranks)[0, 1], abs=2e-2)  # some of theirs are equal
         assert row.verdict.startswith(row.response)
         assert row.why
     # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
-    impact = outcome.beside[0]
+    impact = outcome.published_comparisons[0]
     assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
     assert all(effect.theirs > 0.0 and effect.theirs_significant for effect in impact.effects.values())
 
@@ -161,6 +161,7 @@ def test_same_bits_for_any_number_of_workers(finished, tmp_path):
     assert np.array_equal(alone.values, outcome.runs.values)
 
 
+@pytest.mark.slow
 def test_killed_study_loses_no_finished_run(finished, tmp_path):
     # Long enough that the kill comes in the middle of it.
     path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=15,"))
@@ -187,7 +188,7 @@ def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_pat
     with pytest.raises(RunError) as refused:
         run_design(study, tmp_path, None, silent)
     sentence = str(refused.value)
-    assert sentence.startswith("only 0 of 20 design runs went well, of which the response models need 11: ")
+    assert sentence.startswith("only 0 of 20 design runs succeeded, but the response models need 11: ")
     # One cause, told once with all its runs.
     assert sentence.count("raise numerics.step_budget_per_turn") == 1
     assert "design run 1, design run 2, " in sentence

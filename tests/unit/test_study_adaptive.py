@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from coarse_search import coarsely
 from doe_command import doe
-from instant_runs import instantly
+from instant_runs import instantly, unillustrated
 from short_studies import SHORT, short_study, silent
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.steps.front import adaptive_record, spent_sentence
-from doe.report.study.files import write
+from doe.report.files import write
+from doe.report.sections.search import adaptive_record, spent_sentence
 from doe.running.store import Store
 from doe.study_file import Study
 from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
@@ -135,7 +135,7 @@ def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption
     for other in (three, again, half):
         assert np.array_equal(one.front.points, other.front.points)
         assert np.array_equal(one.front.values, other.front.values)
-        assert repr(one.found.history) == repr(other.found.history)
+        assert repr(one.search.history) == repr(other.search.history)
 
 
 def test_runs_that_fail_are_told_and_left_out(tmp_path, monkeypatch):
@@ -238,8 +238,7 @@ def guided(monkeypatch):
 
 def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
     guided(monkeypatch)
-    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
-    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
+    unillustrated(monkeypatch.setattr)
     study = Study.load(with_kinds(tmp_path))
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
     assert outcome.study.categories == {"guidance": "inner"}
@@ -282,7 +281,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
             [],
             "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 6 fresh runs at the end do not fit; give at",
         ),
-        ("former", ["--direct"], "--direct: is no option any more; run python examples/benchmarks/direct_front.py "),
+        ("former", ["--direct"], "--direct: this option was removed; run python examples/benchmarks/direct_front.py "),
     ):
         path = written(tmp_path / folder, budget=30)
         ended = doe("study", str(path), "--adaptive", *more, "--out", str(tmp_path / folder / "out"))

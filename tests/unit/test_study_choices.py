@@ -52,7 +52,7 @@ def test_points_that_a_drawing_cannot_tell_apart_are_confirmed_once(tmp_path):
     front = find_front(study, surfaces)
     chosen = choices(study, front, None)
     assert next(iter(chosen)) == "pick"
-    assert "after manufacture" in chosen["pick"].reason
+    assert "at the ends of their tolerances" in chosen["pick"].reason
     assert {"without_tolerances", "desirability", "weights"} <= set(chosen) and "knee" not in chosen
     points = [tuple(choice.point) for choice in chosen.values()]
     assert len(set(points)) == len(points)
@@ -79,7 +79,7 @@ def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
     [
         (('name = "guide"', 'name = "giude"'), "no chain is named giude"),
         (('file = "bearing_chains.toml"', ""), "give the links, or the file that has them"),
-        (('file = "bearing_chains.toml"', 'file = "bearing_chains.toml"\nallocate = { grades = true }'), "one or the other"),
+        (('file = "bearing_chains.toml"', 'file = "bearing_chains.toml"\nallocate = { grades = true }'), "leave out the file or these"),
     ],
 )  # fmt: skip
 def test_bad_chains_are_refused(tmp_path, replace, words):

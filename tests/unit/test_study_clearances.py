@@ -10,7 +10,7 @@ from instant_runs import instantly
 from short_studies import SHORT, short_study, silent
 
 from doe import clearance
-from doe.report.study.summary import answer_text, summary
+from doe.report.files import answer_text, summary
 from doe.study_file import Study
 from doe.workflow.whole import check_study, operating_clearances, run_study, scenes_of
 from rbdyn.base.faults import InputError, MethodError

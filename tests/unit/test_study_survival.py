@@ -157,10 +157,12 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
 def test_second_process_on_a_folder_is_refused_and_the_first_goes_on(tmp_path):
     """One sentence that names the process, exit code 2; the first ends as if nobody had asked."""
     study, out = short_study(tmp_path), tmp_path / "out"
-    first = start(study, out, 0.1, 1, "--whole")
+    first = start(study, out, 0.05, 1, "--whole")
     wait_for(lambda: (out / STORE).exists() and len(seeds_run(out / STORE)) > 0)
-    second = start(study, out, 0.1, 1, "--whole")
+    first.send_signal(signal.SIGSTOP)  # however long the second takes to start, the first is at work
+    second = start(study, out, 0.05, 1, "--whole")
     shown, said = second.communicate(timeout=100)
+    first.send_signal(signal.SIGCONT)
     assert (
         second.returncode == 2 and f"process {first.pid} on " in said and "works on it; wait until it has ended" in said
     )
@@ -248,7 +250,7 @@ def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
     shown, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert json.loads(shown) == {"status": "interrupted"}
-    assert said.strip() == f"interrupted; what was finished is kept in {out / STORE}: start again to go on"
+    assert said.strip() == f"interrupted; finished parts are saved in {out / STORE}; start the command again to resume"
     status = study_status(Study.load(study), out)
     assert status["points"]["running"] == 0 and status["status"] == "unfinished"
     assert 3 <= status["points"]["done"] == len(seeds_run(out / STORE)) < 20

@@ -11,10 +11,10 @@ from doe.designs import central_composite
 from doe.pareto.manufacture import interval_of_share, percent, random_offsets
 from doe.pareto.tolerance import widest_tolerances
 from doe.response_surface import fit, model_matrix
-from doe.response_surface.model_error import correlation
+from doe.response_surface.adequacy import correlation
 from doe.study_file import Study
 from doe.study_file.sections import Tolerances
-from doe.workflow.pick import widest_of
+from doe.workflow.pick import widest_tolerances_of
 from doe.workflow.runs import design_of
 from doe.workflow.surfaces import (
     Simulated,
@@ -128,7 +128,7 @@ def test_closed_form_of_the_interval_of_one_linear_limit():
         return np.array([(parts[:, 0] + error <= 1.0).sum() for error in errors])
 
     found = widest_tolerances(
-        lambda parts: parts[:, :1], [0.0], [1.0], [1.0], lower=[-10.0], upper=[10.0], names=["x"], distribution="uniform", drawn=kept,
+        lambda parts: parts[:, :1], [0.0], [1.0], [1.0], lower=[-10.0], upper=[10.0], names=["x"], distribution="uniform", count_on_draws=kept,
     )  # fmt: skip
     half = found.half_widths[0]
     share = (1.0 + (1.0 - errors) / half).clip(0.0, 2.0) / 2.0
@@ -145,7 +145,7 @@ def stated_and_true(study, random, noise, samples):
     units = {"centre": study.centre, "step": study.step}
     surfaces = [fit(coded, column, name=name, **units) for name, column in zip(study.responses, values.T, strict=True)]
     point = study.actual(np.array([-0.5, 0.9, -0.8]))
-    found = widest_of(study, surfaces, point, Tolerances(samples=samples))
+    found = widest_tolerances_of(study, surfaces, point, Tolerances(samples=samples))
     base, nominal = (np.array([each.predict(study.coded(at)) for each in surfaces]) for at in (study.baseline, point))
     keep = np.where(base > nominal, 0.5 * (base - nominal), base - nominal)
     parts = study.coded(point + found.half_widths * random_offsets(20_000, 3, "normal", 99))

@@ -9,7 +9,7 @@ from surface_intervals import new_run_interval
 
 from doe.designs import central_composite
 from doe.designs.model import model_terms
-from doe.report.steps.fit import fit_record
+from doe.report.sections.fit import fit_record
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
 from doe.workflow.runs import Runs
@@ -113,7 +113,7 @@ def test_minimum_outside_the_runs_is_said_to_be_there():
     surface = surface_of(((POINTS - [4.0, 0.0, 0.0]) ** 2).sum(axis=1) + noise(7, deviation=0.01))
     assert surface.canonical["inside"] is False
     assert surface.canonical["distance"] == pytest.approx(4.0, abs=0.1)
-    assert "outside the region of the runs, a minimum" in sentence(surface, "stationary point")
+    assert "outside the region of the runs, is a minimum" in sentence(surface, "stationary point")
 
 
 def test_known_variances_that_hold_are_agreed_with():
@@ -135,12 +135,12 @@ def test_a_surface_that_misses_more_than_the_known_variance_says_so():
     bent = 10 + 3 * np.sin(2 * POINTS[:, 0]) + noise(9, deviation=0.05)
     surface = surface_of(bent, standard_errors=np.full(20, 0.05), weighting="replicates")
     assert surface.known_variance.p < 1e-6
-    assert "misses more than that explains" in sentence(surface, "chi-square")
+    assert "exceeds the known variance" in sentence(surface, "chi-square")
     assert "agree" in sentence(surface, "repeated runs")
 
 
 @pytest.mark.parametrize(
-    ("told", "words"), [(0.01, "more varies from run to run"), (20.0, "too wide"), (1.0, "can be relied on")]
+    ("told", "words"), [(0.01, "more than their replicates show"), (20.0, "too large"), (1.0, "are reliable")]
 )
 def test_scatter_of_repeated_runs_is_set_beside_their_replicates(told, words):
     surface = surface_of(100 + noise(10), standard_errors=np.full(20, told))
@@ -244,7 +244,10 @@ def test_blocks_are_told_and_left_out_of_the_surface():
         ({"weighting": "replicates"}, "needs the errors of the runs"),
         ({"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, 0.0, 1.0)}, "error of run 5 is 0"),
         ({"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, np.nan, 1.0)}, "run 5 is nan"),
-        ({"block": np.arange(20) % 11}, "20 runs are too few .* at least 21 .*10 terms, 10 for the blocks"),
+        (
+            {"block": np.arange(20) % 11},
+            "20 runs are too few .* at least 21, one more than its terms and block effects",
+        ),
         ({"block": (POINTS[:, 0] > 0).astype(int), "model": "linear"}, None),
         ({"block": np.r_[np.zeros(14, int), np.ones(6, int)]}, None),
     ],

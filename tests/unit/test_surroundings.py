@@ -14,19 +14,25 @@ from scipy.integrate import quad, solve_ivp
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.bodies import (
     BalancedCage,
+    Gravity,
     HeldRing,
+    NoGravity,
+    SteadyDrive,
     SupportedRing,
+    TwoSpeedDrive,
     UnbalancedCage,
+    action,
     cage_acceleration,
     cage_kinetic_energy,
+    height_energy,
+    load_potential,
+    load_power,
     mass_centre,
     support_energy,
     support_motion,
 )
-from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action, load_potential, load_power
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps, value_at
-from rbdyn.dynamics.forces.surroundings import Gravity, NoGravity, height_energy
-from rbdyn.dynamics.integrators.records import NOW
+from rbdyn.dynamics.integrators.advance import NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run

@@ -8,7 +8,7 @@ from conftest import ROOT
 from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
-from doe.report.steps.fit import fit_record
+from doe.report.sections.fit import fit_record
 from doe.study_file import Study
 from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
@@ -50,8 +50,9 @@ def test_invariant_emulators_have_the_same_bits_on_any_number_of_threads():
     assert all(other == one for other in others)
 
 
-def test_invariant_spread_and_samples_have_the_same_bits_on_any_number_of_threads():
+def test_invariant_spread_and_samples_have_the_same_bits_on_any_number_of_threads(monkeypatch):
     """Invariant: spread over unknown inputs, shares of the variance, and a posterior sample."""
+    monkeypatch.setattr("doe.unknown.propagation.REFITS", 3)
     points, values = runs_of(3, 256, 4)
     runs = Runs(points, values, np.full(256, 0.0025), np.full(256, 7))
     matrix = np.random.default_rng(4).random((4, 400))

@@ -27,7 +27,7 @@ from rbdyn.contact.traction import (
     traction_surface,
 )
 from rbdyn.dynamics.parameters.model import film_report, race_traction
-from rbdyn.properties.lubricants import oil_at
+from rbdyn.properties.materials import oil_at
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES, smallest_traction
 
@@ -159,7 +159,7 @@ def test_unit_bad_tables_are_refused():
     """Unit: loads out of order and coefficients that are not positive make no table."""
     curve = curve_of(RHEOLOGY["eyring"])
     for loads in ((10.0, 20.0), (10.0, 0.0), (math.inf, 1.0), (math.nan, 1.0)):
-        with pytest.raises(ValueError, match="make no table"):
+        with pytest.raises(ValueError, match="must be positive and rise"):
             traction_surface(curve, *loads, FASTEST)
     with pytest.raises(ValueError, match="positive and finite"):
         traction_surface(lambda u, q: 0.0 * u * q, LARGEST, SMALLEST, FASTEST)

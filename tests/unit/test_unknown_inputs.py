@@ -76,7 +76,7 @@ def defaults_outside(scene: Scene) -> dict[str, Any]:
     outside = {}
     for each in documented_of(scene):
         value, base = value_of(scene, each.key), 1.0 if each.times is None else value_of(scene, each.times)
-        chosen = each.law == "choices" and (each.asked or value in (each.values or ()))
+        chosen = each.law == "choices" and (each.on_request or value in (each.values or ()))
         perfect = value == 0.0 and each.law == "log_uniform"  # a part without the error that the range is of
         if value is None or chosen or perfect:
             continue
@@ -170,7 +170,7 @@ def test_set_replaces_single_keys_of_its_default() -> None:
     assert _uncertain(set=[]).set == _uncertain().set == list(RUNS)
     assert _uncertain(set=found).set[: len(RUNS) - 1] == found[: len(RUNS) - 1]
     assert _uncertain(set=['"numerics".turns = 60']).set == [*found[:-2], '"numerics".turns = 60']
-    with pytest.raises(InputError, match="replaces what stands before it in this list"):
+    with pytest.raises(InputError, match="replaces an earlier assignment of this list"):
         _uncertain(set=["numerics.turns=60", "numerics.turns=70"])
 
 
@@ -214,7 +214,10 @@ def test_unknown_inputs_are_no_part_of_a_run() -> None:
         ),
         ({"cage.mass_g": {"law": "log_uniform", "low": 0.0, "high": 2.0}}, "needs a positive one"),
         ({"cage.mass_g": {"law": "triangular", "low": 0.0, "mode": 3.0, "high": 2.0}}, "mode = 3: not between"),
-        ({"model.drag": {"law": "choices", "values": ["off", "cylinder"], "weights": [1.0]}}, "not one for each"),
+        (
+            {"model.drag": {"law": "choices", "values": ["off", "cylinder"], "weights": [1.0]}},
+            "must have one number for each",
+        ),
         (
             {"model.drag": {"law": "choices", "values": ["off", "cylinder"], "times": "cage.mass_g"}},
             "no numbers to multiply",

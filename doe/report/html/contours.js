@@ -3,7 +3,7 @@
 const contours = (() => {
   // Segments [[x, y], [x, y]] in grid steps; the saddle's two lines are told apart by the mean of its corners.
   function segments(z, level) {
-    const found = [], n = z.length;
+    const segments = [], n = z.length;
     for (let i = 0; i + 1 < n; i++)
       for (let j = 0; j + 1 < n; j++) {
         const corner = [z[i][j], z[i + 1][j], z[i + 1][j + 1], z[i][j + 1]];
@@ -15,13 +15,13 @@ const contours = (() => {
           const share = a / (a - b), from = at[k], to = at[(k + 1) % 4];
           cuts.push([from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]);
         }
-        if (cuts.length === 2) found.push(cuts);
+        if (cuts.length === 2) segments.push(cuts);
         if (cuts.length === 4) {
           const joined = (corner[0] < level) === ((corner[0] + corner[1] + corner[2] + corner[3]) / 4 < level);
-          found.push(joined ? [cuts[0], cuts[1]] : [cuts[0], cuts[3]], joined ? [cuts[2], cuts[3]] : [cuts[2], cuts[1]]);
+          segments.push(joined ? [cuts[0], cuts[1]] : [cuts[0], cuts[3]], joined ? [cuts[2], cuts[3]] : [cuts[2], cuts[1]]);
         }
       }
-    return found;
+    return segments;
   }
 
   // Each line is labelled near a diagonal of the map, where neither a point nor another label is in the way.
@@ -63,9 +63,9 @@ const contours = (() => {
 
   // The map; gives back the way from pixels to shares of the two axes.
   function draw(canvas, s) {
-    const made = page.sharp(canvas);
-    if (!made) return null;
-    const {pen, width, height} = made, n = s.z.length, ink = page.colour("ink");
+    const sheet = page.sharp(canvas);
+    if (!sheet) return null;
+    const {pen, width, height} = sheet, n = s.z.length, ink = page.colour("ink");
     const left = 62, top = 14, wide = width - left - 80, high = height - top - 50;
     const place = (i, j) => [left + wide * i / (n - 1), top + high * (1 - j / (n - 1))];
     const share = value => (value - s.low) / (s.high - s.low);

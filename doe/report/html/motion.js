@@ -2,7 +2,17 @@
 // Plays the motion at the points side by side: button, moment, speed, magnification of the clearances.
 (() => {
   const {data, by} = page, SECONDS_A_TURN = 6;
-  const shown = Object.entries(data.motion).map(([name, motion]) => {
+  const LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+  // Numbers in two letters each, the inverse of `packed` in doe/report/page.py.
+  const code = Object.fromEntries([...LETTERS].map((letter, k) => [letter, k]));
+  const numbers = ({step, first, letters}) => Float64Array.from(
+    {length: letters.length / 2}, (_, k) => step * (first + 64 * code[letters[2 * k]] + code[letters[2 * k + 1]]));
+  const unpacked = record => Object.fromEntries(
+    Object.entries(record).map(([key, value]) => [key, value && value.letters ? numbers(value) : value]));
+
+  const shown = Object.entries(data.motion).map(([name, record]) => {
+    const motion = unpacked(record);
     const canvas = page.element("canvas", "", {role: "img", "aria-label": `Moving cross-section of the bearing at the ${name}, with its forces`});
     const figure = page.element("figure", "");
     figure.append(page.element("figcaption", `${name}: ${motion.title}`), canvas);

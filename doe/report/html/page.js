@@ -66,19 +66,19 @@ const page = (() => {
   const named = each => each.unit ? `${each.words} [${each.unit}]` : each.words;
 
   function element(tag, words, attributes = {}) {
-    const made = document.createElement(tag);
-    made.textContent = words;
-    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    return made;
+    const node = document.createElement(tag);
+    node.textContent = words;
+    for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+    return node;
   }
 
   // Multiples of 1, 2 or 5 times a power of ten within a range.
-  function ticks(low, high, wanted = 5) {
-    const raw = (high - low) / wanted, decade = 10 ** Math.floor(Math.log10(raw)), found = [];
+  function ticks(low, high, count = 5) {
+    const raw = (high - low) / count, decade = 10 ** Math.floor(Math.log10(raw)), values = [];
     const step = [1, 2, 5, 10].map(digit => digit * decade).find(each => each >= raw * (1 - 1e-9));
-    for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) found.push(n * step);
-    found.text = value => value.toFixed(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0));
-    return found;
+    for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) values.push(n * step);
+    values.text = value => value.toFixed(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0));
+    return values;
   }
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", later);

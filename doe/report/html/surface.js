@@ -14,9 +14,9 @@ const surface_3d = (() => {
   }
 
   function draw(canvas, s, view) {
-    const made = page.sharp(canvas);
-    if (!made) return null;
-    const {pen, width, height} = made, see = eye(view);
+    const sheet = page.sharp(canvas);
+    if (!sheet) return null;
+    const {pen, width, height} = sheet, see = eye(view);
     const size = Math.min((width - 70) / 2.95, (height - 50) / 2.5);
     const screen = (x, y, z) => {
       const [right, up, near] = see(x, y, z);

@@ -53,8 +53,8 @@
       {x: run.factors[x], y: run.factors[y], z: run.value, here: run.alike && here(run.factors), surface: on(run.factors)}));
     const marks = Object.entries(data.marks).map(([name, factors]) => (
       {x: factors[x], y: factors[y], shape: shapes[name], here: here(factors), surface: on(factors)}));
-    const told = searched ? searched.responses[one.name].values : points.map(each => each.z);
-    const heights = [...heights_of.flat(2), ...told].filter(Number.isFinite);
+    const run_values = searched ? searched.responses[one.name].values : points.map(each => each.z);
+    const heights = [...heights_of.flat(2), ...run_values].filter(Number.isFinite);
     const low = Math.min(...heights), high = Math.max(...heights);
     return {
       bounds: one.bounds || [], x: ends[x], y: ends[y], z, points, marks, low, high: high > low ? high : low + 1,

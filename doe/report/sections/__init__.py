@@ -1,8 +1,7 @@
-"""What a report says, as blocks that terminal, Markdown and HTML render.
+"""What a report says of each subject: its JSON record from results, and its blocks from that record.
 
-- ``record``: reading of summary.json, any part of which may be missing
-- ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``contents``: the sections, in this order
-- ``plot``: pictures of the front that scripts mark points in
+- ``record``: reading a record, any part of which may be missing; numbers for people
+- ``answer``: what an engineer acts on; what was asked, what was confirmed
+- ``design``, ``fit``, ``front`` with ``front_pictures``, ``search``, ``chain``, ``bearing``: the steps in the order of a report
+- ``unknown``, ``calibration``: what unknown inputs do, and what measurements say about them
 """
-
-from doe.report.sections.contents import sections

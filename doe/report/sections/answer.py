@@ -1,23 +1,47 @@
-"""The answer an engineer acts on, what was asked, and what simulation confirmed."""
+"""The answer an engineer acts on, the settings of the study, and the points that simulation confirmed.
+
+The sections are blocks of the record of a study; the ``..._record`` functions write that record from results.
+"""
 
 from collections.abc import Mapping, Sequence
+from string import ascii_uppercase
 from typing import Any
 
-from doe.report.sections.parts import chain_blocks
-from doe.report.sections.record import Factor, Record, factors, nearest, part, responses
-from doe.report.words import SENSES, change, half_width, of_hundred, rounded_down, share_with_interval
+from doe.report.sections.chain import chain_blocks
+from doe.report.sections.record import (
+    SENSES,
+    Factor,
+    Record,
+    change,
+    factors,
+    half_width,
+    nearest,
+    of_hundred,
+    part,
+    responses,
+    rounded_down,
+    share_with_interval,
+)
+from doe.study_file import Study
+from doe.workflow.confirmation import Confirmed, Gain, Limit, every_limit, limits_of, statement
+from doe.workflow.front import known_tolerances
+from doe.workflow.runs import region_of
+from doe.workflow.surfaces import PredictedGain
+from doe.workflow.whole import StudyResult
+from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Section, Table, Tile, Tiles
+from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, quantity, shown, with_error
 
-# What a clearance of the scene is, by its key.
+# Meaning of a clearance of the scene, by its key.
 CLEARANCES = {
-    "bearing.radial_clearance_mm": "in the bearing diametral",
-    "cage.guide_clearance_mm": "of the cage in its guide diametral",
-    "cage.pocket_clearance_mm": "in the pocket its width less the roller diameter",
-    "cage.pocket_radial_clearance_mm": "at the pocket's lips radial",
+    "bearing.radial_clearance_mm": "diametral in the bearing",
+    "cage.guide_clearance_mm": "diametral between cage and guide",
+    "cage.pocket_clearance_mm": "width of the pocket less the roller diameter",
+    "cage.pocket_radial_clearance_mm": "radial at the lips of the pocket",
 }
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
-LIMITS_NOTE = "A limit is kept or broken where it is by more than the error, else undecided. The probability is that of keeping it by that error."
+LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
 LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
@@ -27,22 +51,22 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def verdict(summary: Record) -> list[Block]:
-    """Whether the pick is better over the unknown inputs, and what became of the limits: the first that is to be read."""
+    """The first that is to be read: whether the pick is better over the unknown inputs and keeps its limits."""
     sentences = [*(part(summary, "robust", "sentences") or []), part(summary, "limits_sentence") or ""]
     return [Paragraph(sentence, "statement") for sentence in sentences]
 
 
 def advice(summary: Record) -> list[Block]:
-    """Clearances, gains, whether they are real, limits, why this point, what lies beyond, and the parts to make."""
-    searched = part(summary, "adaptive", "sentences") or [""]
+    """Clearances, gains with their verdicts, limits, the reason for this point, the trend beyond the region, and the parts."""
+    search = part(summary, "adaptive", "sentences") or [""]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     why = f"Why this point: {reason}." if reason else ""
     return [
-        Paragraph(searched[0], "statement"),
-        Bullets(searched[1:]),
+        Paragraph(search[0], "statement"),
+        Bullets(search[1:]),
         *_clearances(summary),
         _gains(summary),
-        Paragraph(statement(summary), "statement"),
+        Paragraph(gains_statement(summary), "statement"),
         Paragraph(part(summary, "whirl_sentence") or "", "statement"),
         _robust_points(summary),
         _limits_judged(summary),
@@ -53,49 +77,49 @@ def advice(summary: Record) -> list[Block]:
 
 
 def _parts_to_make(summary: Record) -> list[Block]:
-    """Every dimension chain; what only a careful reader asks for stands in a section of its own."""
+    """Every dimension chain; its full detail is in a section of its own."""
     chains = part(summary, "chains") or {}
     whole = [block for name, chain in chains.items() for block in chain_blocks(name, chain)]
     return [block for block in whole if block.detail < Detail.ALL]
 
 
 def _clearances(summary: Record) -> list[Block]:
-    """The pick with its tolerances next to the baseline, what its clearances are, and the bearing's class."""
+    """The pick with its tolerances next to the baseline, the meaning of its clearances, and the class of the bearing."""
     pick = part(summary, "pick") or {}
-    tiles = [_tile(summary, each, pick) for each in factors(summary) if each.name in pick]
-    plays = [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]
-    means = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
-    if means and part(summary, "operating_clearances_mm"):
-        means += " Those in operation are what fits, heat and rotation leave."
-    tolerated = part(summary, "tolerances_sentence")
+    tiles = [_tile(summary, factor, pick) for factor in factors(summary) if factor.name in pick]
+    plays = [CLEARANCES[factor.key] for factor in factors(summary) if factor.key in CLEARANCES]
+    meaning = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
+    if meaning and part(summary, "operating_clearances_mm"):
+        meaning += " Clearances in operation include the effects of fits, heat and rotation."
+    sentence = part(summary, "tolerances_sentence")
     return [
         Tiles("Chosen clearances", "pick", tiles),
-        Paragraph(means, "small"),
+        Paragraph(meaning, "small"),
         Paragraph(part(summary, "clearance_class") or "", "small"),
-        Paragraph(f"Tolerances: {tolerated}" if tolerated else ""),
+        Paragraph(f"Tolerances: {sentence}" if sentence else ""),
     ]
 
 
 def _robust_points(summary: Record) -> Table:
-    """Pick and points of the robust front over the unknown inputs: the gain that they keep, and in how many cases it is one."""
-    names = [each["name"] for each in responses(summary)]
+    """Pick and points of the robust front: the gain that holds over the unknown inputs, and in how many cases there is one."""
+    names = [response["name"] for response in responses(summary)]
     rows = [
         [
             point["name"].removeprefix("robust "),
-            *(each.text(part(point, "factors", each.name), 1) for each in factors(summary)),
-            *(_kept(part(point, "gains", name), part(point, "better", name)) for name in names),
-            _kept(None, point["all"]),
+            *(factor.text(part(point, "factors", factor.name), 1) for factor in factors(summary)),
+            *(_gain_and_share(part(point, "gains", name), part(point, "better", name)) for name in names),
+            _gain_and_share(None, point["all"]),
         ]
         for point in part(summary, "robust", "front", "confirmed") or []
     ]
-    header = ("", *(label(each.name) for each in factors(summary)), *(quantity(name)[0] for name in names), "all")
-    note = "Gain over the baseline that is kept over the unknown inputs, and in how many of 100 cases it is one."
+    header = ("", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names), "all")
+    note = "Gain over the baseline that holds over the unknown inputs, and in how many of 100 cases there is a gain."
     return Table("Over the unknown inputs", header, rows, note)
 
 
-def _kept(gain: float | None, share: Sequence[float] | None) -> str:
-    kept = "" if gain is None else f"{100.0 * gain:.1f} %, "
-    return "" if share is None else f"{kept}{of_hundred(share)}"
+def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
+    gain_text = "" if gain is None else f"{100.0 * gain:.1f} %, "
+    return "" if share is None else f"{gain_text}{of_hundred(share)}"
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
@@ -109,16 +133,16 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
     }
     return Tile(
-        factor.words, factor.text(pick[factor.name]), factor.unit, [each for each in further.items() if each[1]]
+        factor.words, factor.text(pick[factor.name]), factor.unit, [entry for entry in further.items() if entry[1]]
     )
 
 
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
-    """Half-width of the tolerance of a factor: the one found for the pick, else the one asked for."""
+    """Half-width of the tolerance of a factor: the widened one of the pick, else the one that the study states."""
     return part(summary, "tolerances", factor.name, "half_width") or factor.tolerance
 
 
-def statement(summary: Record) -> str:
+def gains_statement(summary: Record) -> str:
     """Whether the gain is real, in words."""
     if summary.get("statement"):
         return str(summary["statement"])
@@ -126,7 +150,7 @@ def statement(summary: Record) -> str:
     if not verdicts:
         return ""
     counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in VERDICTS if verdict in verdicts]
-    return f"Of {len(verdicts)} responses, by more than their 95 % errors or within them: {', '.join(counts)}."
+    return f"Of {len(verdicts)} responses, compared with their 95 % errors: {', '.join(counts)}."
 
 
 def _gains(summary: Record) -> Table:
@@ -174,7 +198,7 @@ def _limits_judged(summary: Record) -> Table:
 
 
 def _limits_of(point: Record) -> list[Record]:
-    """Limits at a confirmed point, a lower and an upper one of a response each by itself where the record tells both."""
+    """Limits at a confirmed point, the lower and the upper one of a response apart where the record has both."""
     every: list[Record] | None = point.get("every_limit")
     return every or [{"response": name, **limit} for name, limit in (point.get("limits") or {}).items()]
 
@@ -190,23 +214,22 @@ def _judged(limit: Record) -> tuple[str, str]:
 
 
 def sign_of(gain: Record) -> str:
-    """With a sign that is told without colour."""
+    """The verdict of a gain with a sign that needs no colour."""
     return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Factors, responses and scene as they were given."""
+    """Factors, responses and scene as the study states them."""
     record = part(summary, "asked")
     if not record:
         return None
-    given = factors(summary)
     blocks: list[Block] = []
     effort = [
         f"{shown(record[key])} {words}"
         for key, words in (
-            ("replicates", "replicates a design run"),
-            ("turns", "counted shaft turns each"),
-            ("confirmation_replicates", "replicates to confirm a point"),
+            ("replicates", "replicates per design run"),
+            ("turns", "counted shaft turns per replicate"),
+            ("confirmation_replicates", "replicates per confirmed point"),
         )
         if record.get(key) is not None
     ]
@@ -216,21 +239,21 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Paragraph(text[0].upper() + text[1:] + "."))
     rows = [
         (
-            f"{each.letter}: {label(each.name)}",
-            each.key or "",
-            each.text(each.centre),
-            shown(each.step),
-            f"{each.text(each.low)} to {each.text(each.high)}" if each.low is not None else "",
-            shown(each.resolution),
-            f"± {shown(each.tolerance)}" if each.tolerance else "",
+            f"{factor.letter}: {label(factor.name)}",
+            factor.key or "",
+            factor.text(factor.centre),
+            shown(factor.step),
+            f"{factor.text(factor.low)} to {factor.text(factor.high)}" if factor.low is not None else "",
+            shown(factor.resolution),
+            f"± {shown(factor.tolerance)}" if factor.tolerance else "",
         )
-        for each in given
+        for factor in factors(summary)
     ]
     header = ("factor", "key of the scene", "centre", "step", "region", "resolution", "tolerance")
     blocks.append(Table("Factors", header, rows, text_columns=(1,)))
-    wishes = [(label(each["name"]), *_wish(each)) for each in responses(summary)]
+    goals = [(label(response["name"]), *_goal(response)) for response in responses(summary)]
     columns = ("response", "goal", "limits", "weight", "model")
-    blocks.append(Table("Responses", columns, wishes, text_columns=(1, 4)))
+    blocks.append(Table("Responses", columns, goals, text_columns=(1, 4)))
     if scene := record.get("scene"):
         settings = [
             (f"{table}.{key}", shown(value, 6))
@@ -243,9 +266,9 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     return Section("asked", "What was asked", blocks)
 
 
-def _wish(response: Record) -> tuple[str, str, str, str]:
-    asked = str(response.get("goal") or "")
-    goal = {"min": "small", "max": "large", "none": "watched"}.get(asked, asked)
+def _goal(response: Record) -> tuple[str, str, str, str]:
+    goal_key = str(response.get("goal") or "")
+    goal = {"min": "small", "max": "large", "none": "watched"}.get(goal_key, goal_key)
     if response.get("target") is not None:
         goal = f"at {shown(response['target'])}"
     limits = [
@@ -257,36 +280,41 @@ def _wish(response: Record) -> tuple[str, str, str, str]:
 
 
 def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """Simulated responses at every confirmed point next to what the surfaces predicted."""
+    """Simulated responses at every confirmed point compared with those that the surfaces predicted."""
     points = part(summary, "confirmation")
     if not points:
         return None
-    given = [
-        each
-        for each in factors(summary)
-        if any(part(point, "factors", each.name) is not None for point in points.values())
+    inputs = [
+        factor
+        for factor in factors(summary)
+        if any(part(point, "factors", factor.name) is not None for point in points.values())
     ]
-    names = [each["name"] for each in responses(summary)]
-    header = ["point", *(label(each.name) for each in given), *map(label, names)]
+    names = [response["name"] for response in responses(summary)]
+    header = ["point", *(label(factor.name) for factor in inputs), *map(label, names)]
     rows = [
         [
             name.replace("_", " "),
-            *(each.text(part(point, "factors", each.name)) for each in given),
+            *(factor.text(part(point, "factors", factor.name)) for factor in inputs),
             *(_value(part(point, "responses", response)) for response in names),
         ]
         for name, point in points.items()
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
-    if predicted := part(summary, "front", "predicted_gains"):
+    if predictions := part(summary, "front", "predicted_gains"):
         # The surfaces predict the gains of their own pick, which another may have overtaken.
         name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
-        found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
+        simulated = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(each), change(gain), change(found.get(each) or {}), sign_of(found.get(each) or {})]
-            for each, gain in predicted.items()
+            [
+                label(response),
+                change(gain),
+                change(simulated.get(response) or {}),
+                sign_of(simulated.get(response) or {}),
+            ]
+            for response, gain in predictions.items()
         ]
         columns = ("response", "on the surfaces", "simulated", "verdict")
-        caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
+        caption = f"Gains predicted by the surfaces and simulated, {name.replace('_', ' ')}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     blocks.append(changes(summary))
     blocks.append(limits(summary))
@@ -297,19 +325,19 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 def changes(summary: Record) -> Table:
     """Gains over the baseline at every confirmed point that has any."""
-    names = [each["name"] for each in responses(summary)]
+    names = [response["name"] for response in responses(summary)]
     rows = [
         [
             name.replace("_", " "),
-            *(each.text(part(point, "factors", each.name)) for each in factors(summary)),
-            *(_signed(point["gains"].get(each)) for each in names),
+            *(factor.text(part(point, "factors", factor.name)) for factor in factors(summary)),
+            *(_signed(point["gains"].get(response)) for response in names),
         ]
         for name, point in (part(summary, "confirmation") or {}).items()
         if point.get("gains")
     ]
     caption = "Changes from the baseline at every confirmed point"
     note = "▲ better, ▼ worse, ● within its 95 % error."
-    header = ("point", *(label(each.name) for each in factors(summary)), *(quantity(each)[0] for each in names))
+    header = ("point", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names))
     return Table(caption, header, rows, note, detail=Detail.USUAL)
 
 
@@ -318,23 +346,107 @@ def _signed(gain: Record | None) -> str:
     return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
 
 
-def _value(found: Record | None) -> str:
-    return with_error(found.get("value"), half_width(found)) if found else ""
+def _value(quantity: Record | None) -> str:
+    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
 
 
 def tolerances(summary: Record) -> Table:
     """The widest tolerances that keep the gain."""
-    found = part(summary, "tolerances") or {}
-    names = {each.name for each in factors(summary)}
+    widths = part(summary, "tolerances") or {}
+    names = {factor.name for factor in factors(summary)}
     rows = [
         (
             label(name),
-            f"± {rounded_down(each.get('half_width') or 0.0)}",
-            "" if each.get("probability") is None else share_with_interval(each["probability"], each.get("interval")),
-            label(each.get("limited_by") or ""),
+            f"± {rounded_down(width.get('half_width') or 0.0)}",
+            ""
+            if width.get("probability") is None
+            else share_with_interval(width["probability"], width.get("interval")),
+            label(width.get("limited_by") or ""),
         )
-        for name, each in found.items()
-        if name in names and isinstance(each, Mapping)
+        for name, width in widths.items()
+        if name in names and isinstance(width, Mapping)
     ]
     header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
+
+
+def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
+    """Every confirmed point by name, with its gains over the baseline and whether they are real."""
+    return {
+        name: {
+            "factors": outcome.study.by_factor(point.point),
+            "reason": point.reason,
+            "responses": _quantities(outcome.study, point),
+            "power_terms_W": dict(point.power_terms),
+            "limits": limits_record(limits_of(outcome.study, point)),
+            "every_limit": [
+                {"response": limit.response, **_limit(limit)} for limit in every_limit(outcome.study, point)
+            ],
+        }
+        | ({} if point.friction_check is None else {"friction_check": dict(point.friction_check)})
+        | {
+            key: record(outcome.gains[name])
+            for key, record in (("gains", gains_record), ("statement", statement))
+            if name in outcome.gains
+        }
+        for name, point in outcome.confirmed.items()
+    }
+
+
+def judged_limits_record(outcome: StudyResult) -> dict[str, Any]:
+    """Limits at the pick, each with the ``odds`` [p, low, high] that the pick keeps all limits of that response over the unknown
+    inputs; None where that was not asked for."""
+    odds = {} if outcome.robust is None else outcome.robust.odds
+    record = limits_record(outcome.limits)
+    return {name: {**limit, "odds": list(odds[name]) if name in odds else None} for name, limit in record.items()}
+
+
+def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
+    """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
+    return {limit.response: _limit(limit) for limit in limits}
+
+
+def _limit(limit: Limit) -> dict[str, Any]:
+    values = {key: getattr(limit, key) for key in ("bound", "sense", "value", "verdict")}
+    return values | {"error": finite(limit.error), "probability": finite(limit.probability)}
+
+
+def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
+    """JSON of gains, simulated or predicted, by response."""
+    return {gain.response: gain.as_dict() for gain in gains}
+
+
+def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
+    columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
+    return {
+        response: {"value": value, "statistical_error": finite(statistical), "numerical_error": finite(numerical)}
+        for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
+    }
+
+
+def point_record(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+    """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
+    return {
+        "factors": study.by_factor(point),
+        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
+        "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
+    }
+
+
+def asked_record(study: Study) -> dict[str, Any]:
+    """Factors with their ranges and responses with their goals."""
+    reach, widths = region_of(study), known_tolerances(study)
+    low, high = (study.actual(side * reach) for side in (-1.0, 1.0))
+    return {
+        "factors": [
+            {
+                "letter": letter,
+                **factor.model_dump(include={"name", "key", "centre", "step", "resolution"}),
+                "low": float(low[index]),
+                "high": float(high[index]),
+                "tolerance": widths.get(factor.name),
+            }
+            for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
+        ],
+        "responses": [response.model_dump() for response in study.file.response],
+    }

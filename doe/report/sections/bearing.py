@@ -1,4 +1,4 @@
-"""Where the power goes, and how the bearing moves, at baseline and pick."""
+"""Power loss by cause, and the motion of the bearing, at baseline and pick."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,31 +17,31 @@ ROW = 34.0  # height of the bars of a term [pt]
 
 def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Power by term at the confirmed points, baseline and pick as bars."""
-    found = {
+    points = {
         name.replace("_", " "): point["power_terms_W"]
         for name, point in (part(summary, "confirmation") or {}).items()
         if point.get("power_terms_W")
     }
-    if not found:
+    if not points:
         return None
-    every = list(dict.fromkeys(term for terms in found.values() for term in terms))
-    # What is nil everywhere belongs to laws that the scene leaves out.
-    terms = [term for term in every if any(each.get(term) for each in found.values())]
-    first = next(iter(found.values()))
+    every = list(dict.fromkeys(term for terms in points.values() for term in terms))
+    # Terms of laws that the scene leaves out are zero everywhere.
+    terms = [term for term in every if any(watts.get(term) for watts in points.values())]
+    first = next(iter(points.values()))
     terms.sort(key=lambda term: -abs(first.get(term) or 0.0))
-    rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in found.values())] for term in terms]
-    notes = ["Terms that are nil everywhere are left out."] if len(terms) < len(every) else []
+    rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in points.values())] for term in terms]
+    notes = ["Terms that are zero everywhere are left out."] if len(terms) < len(every) else []
     notes += _maker(part(summary, "confirmation") or {})
     blocks: list[Block] = []
-    compared = {name: found[name] for name in ("baseline", "pick") if name in found}
-    if compared:
-        blocks.append(Figures([power_bars(terms, compared).svg], "Power loss by where it arises."))
-    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows, " ".join(notes)))
+    bars = {name: points[name] for name in ("baseline", "pick") if name in points}
+    if bars:
+        blocks.append(Figures([power_bars(terms, bars).svg], "Power loss by cause."))
+    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in points)], rows, " ".join(notes)))
     return Section("power", "Power by term", blocks)
 
 
 def _maker(confirmed: Mapping[str, Any]) -> list[str]:
-    """A sentence on the maker's friction of the points, where the scene states a designation."""
+    """A sentence on the friction by the maker's model, where the scene states a designation."""
     checks = {name: point.get("friction_check") or {} for name, point in confirmed.items()}
     shares = [f"{name.replace('_', ' ')} {check['ratio']:.2f}" for name, check in checks.items() if check.get("ratio")]
     if not shares:
@@ -57,13 +57,13 @@ def _watts(value: float | None) -> str:
 def motion(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Orbits of the cage centre, and the moving bearing."""
     blocks: list[Block] = []
-    orbits = {name: each for name, each in motion.items() if part(each, "cage_orbit_um", "x")}
+    orbits = {name: run for name, run in motion.items() if part(run, "cage_orbit_um", "x")}
     if orbits:
         path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
         caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
-        drawn = [orbit(name, each, whole).svg for whole in (True, False) for name, each in orbits.items()]
-        blocks.append(Figures(drawn, caption))
-    if any(part(each, "moving") for each in motion.values()):
+        pictures = [orbit(name, run, whole).svg for whole in (True, False) for name, run in orbits.items()]
+        blocks.append(Figures(pictures, caption))
+    if any(part(run, "moving") for run in motion.values()):
         blocks.append(Widget("bearing"))
     return Section("motion", "Motion of the bearing", blocks)
 
@@ -79,7 +79,9 @@ def orbit(name: str, motion: Record, whole: bool) -> Still:
 def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | None, axis: "Axes") -> None:
     if radius:
         angles = [math.radians(step) for step in range(0, 361, 3)]
-        axis.plot([radius * math.cos(each) for each in angles], [radius * math.sin(each) for each in angles], **GUIDE)
+        axis.plot(
+            [radius * math.cos(angle) for angle in angles], [radius * math.sin(angle) for angle in angles], **GUIDE
+        )
     axis.plot(x, y, linewidth=0.5)
     for place, mark, colour, words in ((0, "^", "orange", "start"), (-1, "s", "vermilion", "end")):
         (point,) = axis.plot(
@@ -90,20 +92,20 @@ def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | N
     axis.set(xlabel=f"{title}: along the load [µm]", ylabel="across [µm]")
 
 
-def power_bars(terms: Sequence[str], found: Mapping[str, Record]) -> Still:
+def power_bars(terms: Sequence[str], points: Mapping[str, Record]) -> Still:
     """A row of bars a term, one for each point."""
-    words = f"Power loss by term, {' and '.join(found)}"
+    words = f"Power loss by term, {' and '.join(points)}"
     return Still(
-        words, partial(_power_bars, terms, found), width=640.0, height=56.0 + ROW * len(terms), left=110.0
+        words, partial(_power_bars, terms, points), width=640.0, height=56.0 + ROW * len(terms), left_margin=110.0
     )  # fmt: skip
 
 
-def _power_bars(terms: Sequence[str], found: Mapping[str, Record], axis: "Axes") -> None:
-    thick = 0.8 / len(found)
+def _power_bars(terms: Sequence[str], points: Mapping[str, Record], axis: "Axes") -> None:
+    thick = 0.8 / len(points)
     looks = (("steel", "edge"), ("blue", "blue"))
-    for place, ((name, each), (fill, edge)) in enumerate(zip(found.items(), looks, strict=False)):
-        values = [each.get(term) or 0.0 for term in terms]
-        rows = [row + thick * (place - 0.5 * (len(found) - 1)) for row in range(len(terms))]
+    for place, ((name, watts), (fill, edge)) in enumerate(zip(points.items(), looks, strict=False)):
+        values = [watts.get(term) or 0.0 for term in terms]
+        rows = [row + thick * (place - 0.5 * (len(points) - 1)) for row in range(len(terms))]
         bars = axis.barh(rows, values, thick, color=COLOURS[fill], edgecolor=COLOURS[edge], linewidth=0.8, label=name)
         axis.bar_label(bars, [f"{value:.4g}" for value in values], padding=3, fontsize=SMALL, color=COLOURS["quiet"])
     axis.set_yticks(range(len(terms)), [term.replace("_", " ") for term in terms])

@@ -1,35 +1,40 @@
-"""Reading a summary, any optional part of which may be missing or null."""
+"""Reading the record of a study, any part of which may be missing or null, and writing its numbers for people.
+
+Names and plain numbers are written by ``rbdyn.base.words``; here are gains, tolerances, shares and probabilities.
+"""
 
 import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-from doe.report.words import probability
-from rbdyn.base.blocks import Table
-from rbdyn.base.words import label, quantity, shown
+from doe.pareto.manufacture import Interval, percent
+from rbdyn.base.blocks import Block, Bullets, Note, Paragraph, Table, says
+from rbdyn.base.words import improvement, label, quantity, shown
 
 Record = Mapping[str, Any]
-# Characters above which a value is a sentence, to be broken.
+# Limits by their sense in a record.
+SENSES = {"<=": "≤", ">=": "≥"}
+# Characters above which a value is a sentence, which may take several lines.
 LONG = 40
-# The efficiencies of a design go by a capital letter.
+# The efficiencies of a design are named by a capital letter.
 EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
 
 def part(record: Record, *keys: str) -> Any:
     """The value under nested keys; None where any is missing or null."""
-    found: Any = record
+    value: Any = record
     for key in keys:
-        if not isinstance(found, Mapping):
+        if not isinstance(value, Mapping):
             return None
-        found = found.get(key)
-    return found
+        value = value.get(key)
+    return value
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor as asked. Without a study next to it, only its name is known."""
+    """A factor as its study states it; without a study only its name is known."""
 
     name: str
     letter: str
@@ -52,7 +57,7 @@ class Factor:
 
     @property
     def decimals(self) -> int:
-        """Of the resolution of the drawing, or three digits of the step."""
+        """Decimals of the resolution of the drawing, or of a hundredth of the step."""
         scale = self.resolution or (self.step / 100.0 if self.step else None)
         return 4 if not scale else min(max(-math.floor(math.log10(scale) + 1e-9), 0), 9)
 
@@ -63,18 +68,18 @@ class Factor:
 
 def factors(summary: Record) -> list[Factor]:
     """Factors in the study's order."""
-    given = part(summary, "asked", "factors")
-    if given:
-        return [Factor(**{key: each.get(key) for key in Factor.__dataclass_fields__}) for each in given]
+    rows = part(summary, "asked", "factors")
+    if rows:
+        return [Factor(**{key: row.get(key) for key in Factor.__dataclass_fields__}) for row in rows]
     names = part(summary, "design", "factors") or list(part(summary, "pick") or {})
     return [Factor(name, "ABCDEFGH"[place]) for place, name in enumerate(names)]
 
 
 def responses(summary: Record) -> list[dict[str, Any]]:
-    """Responses in the study's order: name, goal and what else was asked of them."""
-    given = part(summary, "asked", "responses")
-    if given:
-        return [dict(each) for each in given]
+    """Responses in the study's order: name, goal and their other settings."""
+    rows = part(summary, "asked", "responses")
+    if rows:
+        return [dict(row) for row in rows]
     return [{"name": name} for name in part(summary, "design", "responses") or part(summary, "gains") or []]
 
 
@@ -86,52 +91,134 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
             yield from scalars(value, f"{name}, ")
         elif value is not None and not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
             yield (
-                EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name),
+                EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name),
                 probability(value) if key == "p" else shown(value),
             )
 
 
 def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
-    """Everything in nested tables, a row each."""
+    """Everything in nested tables, a row for each value."""
     rows = list(scalars(record or {}))
     prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
     return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
 
 
 def allocation(chain: Record) -> dict[str, Any]:
-    """Parts of a dimension chain whose dimensions are known."""
-    needed = {"nominal_mm", "upper_mm", "lower_mm"}
-    return {name: each for name, each in (chain.get("allocation") or {}).items() if needed <= set(each)}
+    """Parts of a dimension chain whose record holds their dimensions."""
+    dimensions = {"nominal_mm", "upper_mm", "lower_mm"}
+    return {name: row for name, row in (chain.get("allocation") or {}).items() if dimensions <= set(row)}
 
 
 def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:
-    """Name of the candidate whose factors lie nearest to a place in coded units; None without any.
+    """Name of the candidate whose factors are nearest to a place in coded units; None without any.
 
     A pick is simulated at the resolution of the drawing, so its factors are not those of the front to the digit.
     """
 
-    def apart(name: str) -> float:
-        far = [
-            abs(candidates[name]["factors"][each.name] - (place or {})[each.name]) / (each.step or 1.0)
-            for each in factors(summary)
+    def distance(name: str) -> float:
+        steps = [
+            abs(candidates[name]["factors"][factor.name] - (place or {})[factor.name]) / (factor.step or 1.0)
+            for factor in factors(summary)
         ]
-        return math.hypot(*far)
+        return math.hypot(*steps)
 
-    names = {each.name for each in factors(summary)}
-    whole = [name for name, each in candidates.items() if names <= set(each.get("factors") or {})]
-    return min(whole, key=apart) if place and names <= set(place) and whole else None
+    names = {factor.name for factor in factors(summary)}
+    whole = [name for name, point in candidates.items() if names <= set(point.get("factors") or {})]
+    return min(whole, key=distance) if place and names <= set(place) and whole else None
 
 
 def fits(summary: Record) -> dict[str, Any]:
     """Fitted surfaces by response."""
-    fitted = part(summary, "fit", "responses") or {}
-    return {name: each for name, each in fitted.items() if each.get("coefficients")}
+    surfaces = part(summary, "fit", "responses") or {}
+    return {name: surface for name, surface in surfaces.items() if surface.get("coefficients")}
 
 
-def known(value: Any) -> Any:
-    """The same record without what is undefined: null and NaN; in lists, where places count, they are None."""
+def drop_undefined(value: Any) -> Any:
+    """The same record without null and NaN; in lists, where places count, they become None."""
     if isinstance(value, Mapping):
-        return {key: found for key, each in value.items() if (found := known(each)) is not None}
+        return {key: clean for key, item in value.items() if (clean := drop_undefined(item)) is not None}
     if isinstance(value, list | tuple):
-        return [known(each) for each in value]
+        return [drop_undefined(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
+    """Blocks with something to say: quantities by their words in sentences, tables without empty columns."""
+    names = [*(factor.name for factor in factors(summary)), *(response["name"] for response in responses(summary))]
+    # The longest first, for a name may begin with another.
+    words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
+    return [_spelt(block, words) for block in blocks if says(block)]
+
+
+def _spelt(block: Block, words: Mapping[str, str]) -> Block:
+    def spelt(text: str) -> str:
+        for name, spoken in words.items():
+            text = text.replace(name, spoken)
+        return text
+
+    match block:
+        case Paragraph(text) | Note(text):
+            return replace(block, text=spelt(text))
+        case Bullets(items):
+            return replace(block, items=[spelt(item) for item in items])
+        case Table():
+            return block.without_empty_columns()
+    return block
+
+
+def probability(value: float | None) -> str:
+    """A p-value, four decimals at most."""
+    if value is None or not math.isfinite(value):
+        return ""
+    return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
+
+
+def rounded_down(width: float) -> str:
+    """A half width in two digits and no wider: 0.001875 as '0.0018'."""
+    if width <= 0.0:
+        return "0"
+    digit = math.floor(math.log10(width)) - 1
+    return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
+
+
+def of_hundred(share: Sequence[float]) -> str:
+    """'87 (80 to 92)' of a share with the ends of its interval: in how many of 100 cases."""
+    value, low, high = (100.0 * number for number in share)
+    return f"{value:.0f} ({low:.0f} to {high:.0f})"
+
+
+def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
+    """'95.0 % (71.3 to 99.8 %)' of a share with the ends of its interval."""
+    ends = "" if interval is None else f" ({Interval(*interval).words})"
+    return f"{percent(share)} %{ends}"
+
+
+def half_width(record: Mapping[str, Any]) -> float | None:
+    """95 % half-width of a quantity: its error, or its statistical and numerical error together.
+
+    None where the statistical error is unknown, as for ``Quantity.stated_error``.
+    """
+    if record.get("error") is not None:
+        return float(record["error"])
+    statistical = record.get("statistical_error")
+    return None if statistical is None else math.hypot(statistical, record.get("numerical_error") or 0.0)
+
+
+def change(gain: Mapping[str, Any]) -> str:
+    """'11.16 ± 0.65 % less' of a gain; nothing where it is unknown."""
+    value = gain.get("percent")
+    return "" if value is None else improvement(value, gain.get("error_percent"), gain.get("goal", "min"))
+
+
+def moved(part: Mapping[str, Any]) -> str:
+    """'+0.0200' of a part whose nominal was moved, else nothing."""
+    return f"{part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
+
+
+def dimension(part: Mapping[str, Any]) -> str:
+    """'9.2900 0/-0.0050' of a part's nominal and deviations."""
+
+    def deviation(value: float) -> str:
+        return "0" if value == 0.0 else f"{value:+.4f}"
+
+    return f"{part['nominal_mm']:.4f} {deviation(part['upper_mm'])}/{deviation(part['lower_mm'])}"

@@ -1,6 +1,55 @@
-"""``rbdyn manual``: one page that opens from disk, made of prose and of what the source says of itself.
+"""``rbdyn keys``, every key of a scene, and ``rbdyn manual``, one page that opens from disk.
 
-- ``prose``: the chapters in Markdown, in the order of their file names; those of a higher floor stand there
-- ``command``: the command, which asks the higher floors for their ``page.Part`` by an entry point
-- ``docstrings``: equations and library; ``page``: keys, commands and all of it as HTML
+- ``prose``: the chapters in Markdown, in the order of their file names
+- ``page``: chapters, keys, commands, equations and library as HTML, from docstrings and from the commands themselves
+
+Packages that build on ``rbdyn`` add their part by an entry point; their prose is in them.
 """
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import BaseModel
+
+from rbdyn.base.command import Json, folder_option, guarded, hand_over
+from rbdyn.scene.keys import AsSchema, Word, run
+
+# Entry points of such packages: functions that return a ``Part``.
+GROUP = "rbdyn.manual"
+
+
+def manual(
+    context: typer.Context,
+    out: Annotated[Path, folder_option("Write manual.html here.")] = Path("manual"),
+    as_json: Json = False,
+) -> None:
+    """Write the manual as one page that opens from disk: own bearing, keys, commands, equations, what is left out."""
+    with guarded(as_json):
+        from importlib.metadata import entry_points
+
+        from rbdyn.cli.manual.page import page
+        from rbdyn.result import whole_file
+        from rbdyn.scene.keys import Part
+
+        out.mkdir(parents=True, exist_ok=True)  # before the page, which takes seconds
+        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())
+        text = page([own, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
+        path = out / "manual.html"
+        with whole_file(path) as new:
+            new.write_text(text, encoding="utf-8")
+        hand_over(lambda: {"status": "ok", "page": str(path)}, as_json, lambda: None, out, [path.name])
+
+
+def describe_keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
+    """Explain every key of a scene: its meaning, its unit, range and default."""
+    with guarded(as_json):
+        run(kinds(), word, as_schema, as_json)
+
+
+def kinds() -> dict[str, type[BaseModel]]:
+    """The kinds of scenes."""
+    from rbdyn.scene import Scene
+    from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+
+    return {"roller bearing": Scene, "ball bearing": SingleRowScene, "double-decker": DoubleDeckerScene}

@@ -18,14 +18,14 @@ from rbdyn.base.words import filled_page
 from rbdyn.scene.keys import Key, Part, keys, lines
 
 Named = ast.ClassDef | ast.FunctionDef
-# An equation, its number, or the year of what it is from.
+# An equation, its number, or the year of its source.
 EQUATION = re.compile(r"\S = \S|\beqs? \d|\bSources?: |\b(18|19|20)\d\d\b")
-# How a docstring begins what it says of a parameter.
+# Begin of the text on a parameter in a docstring.
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : ", re.MULTILINE)
 
 
 class Source(NamedTuple):
-    """A module: what it says, and its lines, for comments stand next to the fields of a class."""
+    """A module: its tree, and its lines for the comments next to the fields of a class."""
 
     tree: ast.Module
     lines: list[str]
@@ -36,19 +36,19 @@ Trees = Mapping[str, Source]
 
 def trees_of(packages: Iterable[str]) -> dict[str, Source]:
     """Every module of the packages by its dotted name, in order of the names."""
-    found = {}
+    trees = {}
     for package in packages:
         root = Path(str(getattr(find_spec(package), "origin", None))).parent
-        for path in (each for each in root.rglob("*.py") if each.name != "__main__.py"):
+        for path in (path for path in root.rglob("*.py") if path.name != "__main__.py"):
             parts = (package, *path.relative_to(root).with_suffix("").parts)
             name = ".".join(part for part in parts if part != "__init__")
             text = path.read_text(encoding="utf-8")
-            found[name] = Source(_unquoted(ast.parse(text)), text.splitlines())
-    return dict(sorted(found.items()))
+            trees[name] = Source(_unquoted(ast.parse(text)), text.splitlines())
+    return dict(sorted(trees.items()))
 
 
 def _unquoted(tree: ast.Module) -> ast.Module:
-    """The tree with types as such where they stand in quotes."""
+    """The tree with quoted types as types."""
     for node in ast.walk(tree):
         for key in ("annotation", "returns"):
             quoted = getattr(node, key, None)
@@ -58,26 +58,26 @@ def _unquoted(tree: ast.Module) -> ast.Module:
 
 
 def equations(trees: Trees, package: str) -> Iterator[str]:
-    """Every module that has an equation or names a source: its docstring, and those in it that have or name one."""
+    """Every module with an equation or a source: its docstring, and those in it with an equation or a source."""
     yield f"## `{package}`"
     for name, tree in _within(trees, package):
-        named = (each for each in ast.walk(tree) if isinstance(each, Named))
-        told = [each for each in named if EQUATION.search(ast.get_docstring(each) or "")]
+        nodes = (node for node in ast.walk(tree) if isinstance(node, Named))
+        sources = [node for node in nodes if EQUATION.search(ast.get_docstring(node) or "")]
         whole = ast.get_docstring(tree) or ""
-        if told or EQUATION.search(whole):
+        if sources or EQUATION.search(whole):
             yield f"### `{name}`\n\n{markdown(whole)}"
-            for each in sorted(told, key=lambda each: each.lineno):
-                yield f"#### `{each.name}`\n\n{_signature(each, trees[name].lines)}{_text(each)}"
+            for node in sorted(sources, key=lambda node: node.lineno):
+                yield f"#### `{node.name}`\n\n{_signature(node, trees[name].lines)}{_text(node)}"
 
 
 def library(trees: Trees, package: str) -> Iterator[str]:
-    """The names that a package and the packages in it hand on, with signatures and docstrings, each where it comes first."""
+    """Public names of a package and the packages in it, with signatures and docstrings, each once."""
     yield f"## `{package}`"
-    seen = set()
+    listed = set()
     for name, tree in _within(trees, package):
-        homes = [_home(trees, name, each) for each in _handed_on(tree, package)]
-        fresh = [each for each in homes if each is not None and (each[0], each[1].name) not in seen]
-        seen |= {(module, node.name) for module, node in fresh}
+        homes = [_home(trees, name, public) for public in _handed_on(tree, package)]
+        fresh = [home for home in homes if home is not None and (home[0], home[1].name) not in listed]
+        listed |= {(module, node.name) for module, node in fresh}
         if fresh:
             yield f"### `{name}`\n\n{markdown(ast.get_docstring(tree) or '')}"
             for module, node in fresh:
@@ -86,7 +86,7 @@ def library(trees: Trees, package: str) -> Iterator[str]:
 
 
 def markdown(docstring: str) -> str:
-    """A docstring as Markdown: lists of parameters and blocks of code in its way of writing them."""
+    """A docstring as Markdown, with its lists of parameters and blocks of code."""
     return PARAMETER.sub(r"- ``\1``: ", re.sub("::$", ":", docstring, flags=re.MULTILINE))
 
 
@@ -95,12 +95,12 @@ def _within(trees: Trees, package: str) -> Iterator[tuple[str, ast.Module]]:
 
 
 def _public(node: ast.Module | ast.ClassDef) -> list[Named]:
-    named = (each for each in node.body if isinstance(each, Named))
-    return [each for each in named if not each.name.startswith("_") and ast.get_docstring(each)]
+    children = (child for child in node.body if isinstance(child, Named))
+    return [child for child in children if not child.name.startswith("_") and ast.get_docstring(child)]
 
 
 def _handed_on(tree: ast.Module, package: str) -> list[str]:
-    """Names in ``__all__``; without one, what a package that holds only imports imports from itself."""
+    """Names in ``__all__``; without it, names that a package of imports alone imports from itself."""
     for node in tree.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             return list(ast.literal_eval(node.value))
@@ -111,7 +111,7 @@ def _handed_on(tree: ast.Module, package: str) -> list[str]:
 
 
 def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
-    """Where a name is defined that a module defines or imports; None outside the house, and for a plain value."""
+    """Module and definition of a name in a module; None outside these packages, and for a plain value."""
     for node in ast.walk(trees[module].tree) if module in trees else ():
         if isinstance(node, Named) and node.name == name:
             return module, node
@@ -121,12 +121,12 @@ def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
 
 
 def _signature(node: Named, lines: list[str]) -> str:
-    """What is called, as code; of a class its fields, with what stands next to them."""
+    """Signature of a function as code; fields of a class with their comments."""
     if isinstance(node, ast.FunctionDef):
         return f"```python\n{node.name}({ast.unparse(node.args)}){_gives(node)}\n```\n\n"
-    fields = (each for each in node.body if isinstance(each, ast.AnnAssign))
-    held = (line for each in fields for line in lines[each.lineno - 1 : each.end_lineno])
-    return "```python\n{}\n```\n\n".format("\n".join((f"class {node.name}", *held)))
+    fields = (child for child in node.body if isinstance(child, ast.AnnAssign))
+    code = (line for field in fields for line in lines[field.lineno - 1 : field.end_lineno])
+    return "```python\n{}\n```\n\n".format("\n".join((f"class {node.name}", *code)))
 
 
 def _gives(node: ast.FunctionDef) -> str:
@@ -139,14 +139,14 @@ def _text(node: Named) -> str:
 
 def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
     """Public methods and properties of a class and of those that it extends, an item each."""
-    seen = set()
+    listed = set()
     waiting = [(module, node)]
-    for place, each in waiting:
-        if isinstance(each, ast.ClassDef):
-            waiting += filter(None, (_home(trees, place, ast.unparse(base)) for base in each.bases))
-            for member in _public(each):
-                if member.name not in seen and isinstance(member, ast.FunctionDef):
-                    seen.add(member.name)
+    for home, parent in waiting:
+        if isinstance(parent, ast.ClassDef):
+            waiting += filter(None, (_home(trees, home, ast.unparse(base)) for base in parent.bases))
+            for member in _public(parent):
+                if member.name not in listed and isinstance(member, ast.FunctionDef):
+                    listed.add(member.name)
                     read = any("property" in ast.unparse(decorator) for decorator in member.decorator_list)
                     call = member.name + ("" if read else f"({ast.unparse(member.args)})") + _gives(member)
                     says = _text(member).replace("\n", "\n  ")
@@ -154,12 +154,12 @@ def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
 
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
-# Headings deeper than this stand on the page and in the search, not in the contents.
+# Headings deeper than this are on the page and in the search, not in the contents.
 DEEPEST = 3
 
 
 class Heading(NamedTuple):
-    """A heading as it stands in the contents."""
+    """A heading in the contents."""
 
     level: int
     key: str
@@ -185,7 +185,7 @@ def page(parts: Sequence[Part]) -> str:
 
 
 def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
-    """Name and Markdown of each chapter, in the order of the file names; some go on with what is generated."""
+    """Name and Markdown of each chapter, in the order of the file names; some continue with generated text."""
     trees = trees_of(part.package for part in parts)
     generated = {
         "keys": keys_of,
@@ -223,46 +223,46 @@ def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
 
 
 def _code(renderer: RendererProtocol, tokens: Sequence[Token], place: int, *_: Any) -> str:
-    """Code within a line, whose options a line never breaks."""
+    """Code within a line; no line breaks inside an option."""
     return "<code>{}</code>".format(OPTION.sub(r"<span>\1</span>", escape(tokens[place].content)))
 
 
 def _entry(headings: Sequence[Heading]) -> str:
-    """A chapter in the contents, with what is in it folded."""
-    shown = (each for each in headings if each.level <= DEEPEST)
-    title, *inner = (f'<a class="l{each.level}" href="#{each.key}">{each.html}</a>' for each in shown)
+    """A chapter in the contents, with its headings folded."""
+    entries = (heading for heading in headings if heading.level <= DEEPEST)
+    title, *inner = (f'<a class="l{entry.level}" href="#{entry.key}">{entry.html}</a>' for entry in entries)
     return f"<li><details><summary>{title}</summary>{''.join(inner)}</details></li>" if inner else f"<li>{title}</li>"
 
 
 def keys_of(part: Part) -> Iterator[str]:
-    """A heading a kind of file, a table and a key, and what the key means."""
+    """A heading for each kind of file, table and key, and what the key means."""
     tables: dict[tuple[str, str], list[Key]] = {}
     for key in keys(part.kinds):
         tables.setdefault((key.file, key.key.rpartition(".")[0]), []).append(key)
     kind = ""
-    for (file, table), found in tables.items():
+    for (file, table), members in tables.items():
         if file != kind:
             kind = file
             yield f"## {file.capitalize()}"
         yield f"### {file}, " + (f"table `{table}`" if table else "outside all tables")
-        for key in found:
+        for key in members:
             head = lines(key)[0].removeprefix(f"{key.key}: ")
-            # Its description, and what else a key says behind it.
-            told = (plain(str(each)) for each in (head, *key[Key._fields.index("description") :]))
-            yield "\n\n".join((f"#### `{key.key}`", *told))
+            # Its description, and the fields of a key after it.
+            texts = (plain(str(field)) for field in (head, *key[Key._fields.index("description") :]))
+            yield "\n\n".join((f"#### `{key.key}`", *texts))
 
 
 def commands_of(part: Part) -> Iterator[str]:
-    """A heading a command: its usage, what it does, its options."""
+    """A heading for each command: its usage, purpose and options."""
     for name, command in part.commands.commands.items():
         whole = f"{part.package} {name}"
         context = typer.Context(command, info_name=whole)
         usage = " ".join(command.get_usage(context).removeprefix("Usage: ").split())
-        records = filter(None, (each.get_help_record(context) for each in command.params))
+        records = filter(None, (parameter.get_help_record(context) for parameter in command.params))
         options = "\n".join(f"- `{option}`: {plain(says)}" for option, says in records)
         yield f"## `{whole}`\n\n```sh\n{usage}\n```\n\n{plain(command.help)}\n\n{options}"
 
 
 def plain(text: str) -> str:
-    """Text in which Markdown sees no emphasis."""
+    """Text without emphasis in Markdown."""
     return text.replace("*", r"\*")

@@ -1,15 +1,19 @@
-"""Rigid bodies: rings, of which the outer one may stand on a flexible, damped support, and the cage, balanced or not.
+"""Bodies: how rings and cage move, what turns and loads the rings, and what the surroundings do to all bodies.
 
-A cage whose centre of mass lies off its geometric centre: the state holds the geometric centre x. With the centre of mass at
-x + e u(angle), Newton and Euler about it give a = F/m - e d^2u/dt^2 and J d(speed)/dt = M - e u x F, where M is the moment of the
-forces about x.
+The outer ring is fixed, or on a flexible support with a damper. The centre of mass of a cage may lie off its geometric
+centre x, which the state holds. With the centre of mass at x + e u(angle), Newton and Euler give
+
+    a = F/m - e d^2u/dt^2,   J d(speed)/dt = M - e u x F
+
+with the moment M of the forces about x. The drives here are steady; ``schedule`` has those that change with time. The
+surroundings are the drag of the oil-air mixture on orbiting rollers, and gravity or the steady part of a manoeuvre.
 """
 
+import math
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import law
 from rbdyn.dynamics.forces.state import SUPPORT_VX, SUPPORT_VY, SUPPORT_X, SUPPORT_Y
-from rbdyn.dynamics.forces.surroundings import add_weight, height_energy
 
 
 class RingMotion(NamedTuple):
@@ -25,7 +29,7 @@ class RingMotion(NamedTuple):
 
 
 class HeldRing(NamedTuple):
-    """Outer ring whose centre stays."""
+    """Outer ring whose centre is fixed."""
 
 
 @law
@@ -40,7 +44,7 @@ def _(ring, y, speed, cosine, sine):
 
 @law
 def support_motion(ring, gravity, force_x, force_y, y, row, dy):
-    """Write the outer ring's derivatives under the forces [N] on it; returns the power lost in the damper [W]."""
+    """Write the outer ring's rates under the forces [N] on it; returns the power lost in the damper [W]."""
 
 
 @support_motion.body(HeldRing)
@@ -61,7 +65,7 @@ def _(ring, gravity, y):
 class SupportedRing(NamedTuple):
     """Outer ring (with its share of the housing) on a squirrel cage with a damper."""
 
-    start: int  # where its coordinates stand in the state
+    start: int  # place of its first coordinate in the state
     mass: float  # [kg]
     stiffness: float  # [N/m]
     damping: float  # [N s/m]
@@ -158,3 +162,166 @@ def _(cage, x, y, cosine, sine):
 @mass_centre.body(UnbalancedCage)
 def _(cage, x, y, cosine, sine):
     return x + cage.offset * cosine, y + cage.offset * sine
+
+
+class Action(NamedTuple):
+    """Ring speeds [rad/s], the force on the inner ring [N], directions of the marks on the rings."""
+
+    inner_speed: float
+    outer_speed: float
+    load_x: float
+    load_y: float
+    inner_cos: float
+    inner_sin: float
+    outer_cos: float
+    outer_sin: float
+
+
+class SteadyDrive(NamedTuple):
+    """Inner ring at constant speed under a constant load along x, outer ring at rest."""
+
+    inner_speed: float
+    load_x: float
+
+
+class TwoSpeedDrive(NamedTuple):
+    """Both rings at constant speeds under a constant load along x."""
+
+    inner_speed: float
+    outer_speed: float
+    load_x: float
+
+
+@law
+def action(drive, y):
+    """The action at a state."""
+
+
+@action.body(SteadyDrive)
+def _(drive, y):
+    return Action(drive.inner_speed, 0.0, drive.load_x, 0.0, 1.0, 0.0, 1.0, 0.0)
+
+
+@action.body(TwoSpeedDrive)
+def _(drive, y):
+    return Action(drive.inner_speed, drive.outer_speed, drive.load_x, 0.0, 1.0, 0.0, 1.0, 0.0)
+
+
+@law
+def tick(drive, acting, row, dy):
+    """Write the derivatives of the clock, where there is one."""
+
+
+@tick.body(SteadyDrive, TwoSpeedDrive)
+def _(drive, acting, row, dy):
+    pass
+
+
+@law
+def load_power(drive, acting, vx, vy):
+    """Power [W] that the load gives to the inner ring, where it has no potential."""
+
+
+@load_power.body(SteadyDrive, TwoSpeedDrive)
+def _(drive, acting, vx, vy):
+    return 0.0
+
+
+@law
+def load_potential(drive, ring_x):
+    """Potential energy [J] of a constant load; zero where its work is booked as power."""
+
+
+@load_potential.body(SteadyDrive, TwoSpeedDrive)
+def _(drive, ring_x):
+    return -drive.load_x * ring_x
+
+
+AIR_DENSITY = 1.2  # [kg/m^3] at 20 C and 1 bar
+
+
+class NoDrag(NamedTuple):
+    """Rollers in a vacuum."""
+
+
+class CylinderDrag(NamedTuple):
+    """Cylinder in cross-flow: F = factor |v| v."""
+
+    factor: float  # rho_e C_d A/2 [kg/m]
+
+
+def cylinder_drag(
+    oil_density: float, oil_fraction: float, coefficient: float, diameter: float, length: float
+) -> CylinderDrag:
+    """Drag of a roller in a mixture of density X rho_oil + (1 - X) rho_air, with A = D L."""
+    density = oil_fraction * oil_density + (1.0 - oil_fraction) * AIR_DENSITY
+    return CylinderDrag(0.5 * density * coefficient * diameter * length)
+
+
+@law
+def drag_forces(drag, rollers, y, row, dy):
+    """Write the drag on each roller into row ``row`` of ``dy``; returns the power lost [W]."""
+
+
+@drag_forces.body(NoDrag)
+def _(drag, rollers, y, row, dy):
+    for i in range(2 * rollers, 4 * rollers):
+        dy[row, i] = 0.0
+    return 0.0
+
+
+@drag_forces.body(CylinderDrag)
+def _(drag, rollers, y, row, dy):
+    for j in range(rollers):
+        vx, vy = y[2 * rollers + j], y[3 * rollers + j]
+        per_speed = drag.factor * math.sqrt(vx * vx + vy * vy)
+        dy[row, 2 * rollers + j] = -per_speed * vx
+        dy[row, 3 * rollers + j] = -per_speed * vy
+    # A sum in a loop of its own leaves the one above free to vectorise.
+    power = 0.0
+    for j in range(2 * rollers, 3 * rollers):
+        power -= dy[row, j] * y[j] + dy[row, rollers + j] * y[rollers + j]
+    return power
+
+
+class NoGravity(NamedTuple):
+    """Weightless."""
+
+
+class Gravity(NamedTuple):
+    """Acceleration x, y [m/s^2]."""
+
+    x: float
+    y: float
+
+
+@law
+def add_weight(gravity, first, count, row, dy):
+    """Add gravity to the accelerations of ``count`` bodies: x from ``first`` on in row ``row`` of ``dy``, then y."""
+
+
+@add_weight.body(NoGravity)
+def _(gravity, first, count, row, dy):
+    pass
+
+
+@add_weight.body(Gravity)
+def _(gravity, first, count, row, dy):
+    for i in range(first, first + count):
+        dy[row, i] += gravity.x
+        dy[row, i + count] += gravity.y
+
+
+@law
+def height_energy(gravity, mass, x, y):
+    """Potential energy [J] of a mass [kg] at x, y [m]."""
+
+
+@height_energy.body(NoGravity)
+def _(gravity, mass, x, y):
+    return 0.0
+
+
+@height_energy.body(Gravity)
+def _(gravity, mass, x, y):
+    return -mass * (gravity.x * x + gravity.y * y)

@@ -1,7 +1,8 @@
-"""Equations of motion: forces gathered into accelerations, the power each loss takes, and the energy that balances it.
+"""Equations of motion: forces gathered into accelerations, the power of each loss, and the energy that balances it.
 
-Newton for rollers, cage and rings in Cartesian coordinates (Chen et al. 2022, eq 19-21 in the plane; free of their
-centrifugal terms because the frame does not turn), Euler for spins. The rings turn at prescribed speeds.
+Newton for rollers, cage and rings in Cartesian coordinates, Euler for spins: Chen et al. 2022, eq 19-21 in the plane,
+without their centrifugal terms because the frame does not turn. The rings turn at prescribed speeds. At rest, the load on
+the inner ring decides how its rollers sit between the races and share it.
 """
 
 import math
@@ -12,26 +13,30 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
-from rbdyn.contact.hertz_line import line_energy
+from rbdyn.contact.hertz_line import line_energy, line_load
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import (
     RingMotion,
+    action,
+    add_weight,
     cage_acceleration,
     cage_kinetic_energy,
+    drag_forces,
+    height_energy,
+    load_potential,
+    load_power,
     mass_centre,
     outer_motion,
     support_energy,
     support_motion,
+    tick,
 )
-from rbdyn.dynamics.forces.drive import action, load_potential, load_power, tick
-from rbdyn.dynamics.forces.guide_land import guide_energy, guide_forces
-from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_energy, pocket_gap
+from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
-from rbdyn.dynamics.forces.surroundings import add_weight, drag_forces, height_energy
 
-# Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
-# without a potential, and last the inner race's part of the rolling resistance.
+# Powers lost, in the order of the power vector. The input by the shafts and by loads without a potential follows, and
+# last the inner race's part of the rolling resistance.
 LOSSES = (
     "outer_race_traction",
     "inner_race_traction",
@@ -55,7 +60,7 @@ POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = ran
 
 
 class RollerBearing(NamedTuple):
-    """All that the compiled code reads. SI; laws are NamedTuples whose types choose the compiled bodies."""
+    """Everything that compiled code reads, in SI. Laws are NamedTuples whose types choose the compiled bodies."""
 
     rollers: int
     sizes: Any
@@ -78,7 +83,7 @@ class RollerBearing(NamedTuple):
 
 @kernel
 def roller_count(bearing):
-    """Number of rollers, known not to be negative: so neighbours are read and written as vectors, not one by one."""
+    """Number of rollers, never negative: so the compiler reads and writes neighbours as vectors, not one by one."""
     return max(bearing.rollers, 0)
 
 
@@ -92,7 +97,7 @@ def pocket_direction(bearing, cosine, sine, j):
 
 @kernel
 def cage_motion(y, body):
-    """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
+    """Motion of the cage, whose coordinates begin at ``body``; its mark is the mid-line of the first pocket."""
     cosine, sine = fast_cos_sin(y[body + state.CAGE_ANGLE])
     return RingMotion(
         y[body + state.CAGE_X],
@@ -121,7 +126,7 @@ def inner_motion(y, body, acting):
 
 @kernel
 def motions(bearing, y):
-    """What acts on the bearing in a state, and the motions of cage, inner and outer ring."""
+    """``Action`` on the bearing in a state, and the motions of cage, inner and outer ring."""
     body = state.PARTS * roller_count(bearing)
     acting = action(bearing.drive, y)
     outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
@@ -163,11 +168,11 @@ class OnCage(NamedTuple):
 
 @kernel
 def touching_rollers(bearing, cage, y, scratch):
-    """Number of rollers that their pockets act on; which they are stands in ``scratch.touching``."""
+    """Number of rollers on which their pockets act; ``scratch.touching`` lists them."""
     z = roller_count(bearing)
     for j in range(z):
         scratch.gap[j] = roller_gap(bearing, y, cage, j)
-    # Counted without a branch, which could not be predicted.
+    # Counted without a branch, which the processor could not predict.
     touching = 0
     for j in range(z):
         scratch.touching[touching] = j
@@ -177,7 +182,7 @@ def touching_rollers(bearing, cage, y, scratch):
 
 @kernel
 def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
-    """Add the forces of the pocket walls to row ``row`` of ``dy``, as yet forces and moments on the rollers."""
+    """Add the forces of the pocket walls to row ``row`` of ``dy``, which still holds forces and moments on the rollers."""
     z = roller_count(bearing)
     fx = fy = moment = friction = damping = film = 0.0
     load = contact_load = 0.0
@@ -200,7 +205,7 @@ def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
 
 @kernel
 def accelerate_rollers(bearing, row, dy):
-    """Turn forces and moments on the rollers, which stand in row ``row`` of ``dy``, into accelerations."""
+    """Turn forces and moments on the rollers in row ``row`` of ``dy`` into accelerations."""
     z = roller_count(bearing)
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
     for j in range(z):
@@ -246,7 +251,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     for j in range(z):
         dy[row, j], dy[row, z + j], dy[row, 4 * z + j] = y[2 * z + j], y[3 * z + j], 0.0
     touching = touching_rollers(bearing, cage, y, scratch)
-    # Two long chains of roots and quotients: side by side they take little more than one.
+    # Two long chains of roots and quotients, which take little more time together than one.
     land = guide_forces(bearing.guide, cage, inner, outer)
     pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
@@ -297,9 +302,9 @@ def pocket_loads(bearing, y, row, loads, scratch):
 
 @routine
 def derivative_once(bearing, y, row, dy, power, loads, scratch):
-    """``derivative`` for calls outside the innermost loop, of which it would otherwise be a copy each.
+    """``derivative`` for calls outside the innermost loop, each of which would otherwise compile a copy of it.
 
-    Its parameters, more than a hundred numbers, are handed over one by one, which costs a quarter of the evaluation.
+    More than a hundred numbers are passed one by one, which costs a quarter of the evaluation.
     """
     derivative(bearing, y, row, dy, power, loads, scratch)
 
@@ -315,7 +320,7 @@ def race_energy(race, side, radius, dx, dy, ring):
 
 @entry
 def mechanical_energy(bearing, y):
-    """(kinetic, elastic, potential) energy [J] of a state. The rotation of the rings, being prescribed, is left out."""
+    """(kinetic, elastic, potential) energy [J] of a state, without the prescribed rotation of the rings."""
     z = bearing.rollers
     _, cage, inner, outer = motions(bearing, y)
     kinetic, elastic, potential = support_energy(bearing.outer_ring, bearing.gravity, y)
@@ -337,3 +342,106 @@ def mechanical_energy(bearing, y):
         ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
         elastic += pocket_energy(bearing.pocket, radius, ex, ey, x - cage.x, y_ - cage.y)
     return kinetic, elastic, potential
+
+
+TRIES = 60
+BALANCED = 1e-11  # of the forces at the ends of the bracket
+ROUND_OFF = 1e-15  # of a radius
+FIRST_APPROACH = 1e-6  # [m], from which a bracket of approaches is widened
+
+
+@kernel
+def race_loads(bearing, j, radius, angle, ring_x):
+    """Static loads [N] of roller ``j`` at (radius, angle): outer race, inner race with the ring at (ring_x, 0)."""
+    own_radius = roller_radius(bearing.sizes, j)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    rise, _ = form_at(bearing.outer.form, cosine, sine, 1.0, 0.0)
+    overlap = radius + own_radius - bearing.outer.radius - rise
+    outer = line_load(bearing.outer.contact, overlap, cosine, sine)[0]
+    dx, dy = radius * cosine - ring_x, radius * sine
+    distance = math.sqrt(dx * dx + dy * dy)
+    nx, ny = dx / distance, dy / distance
+    rise, _ = form_at(bearing.inner.form, nx, ny, 1.0, 0.0)
+    overlap = bearing.inner.radius + rise + own_radius - distance
+    return outer, line_load(bearing.inner.contact, overlap, nx, ny)[0]
+
+
+@kernel
+def narrowed(low, below, high, above, moved, middle, force):
+    """Bracket with the forces at its ends after a try, and the end that moved: +1 the high one, -1 the low one, 0 none yet.
+
+    False position: the force at an end that stays twice counts half (Illinois), so that both ends close in.
+    """
+    if force > 0.0:
+        return low, 0.5 * below if moved > 0 else below, middle, force, 1
+    return middle, force, high, 0.5 * above if moved < 0 else above, -1
+
+
+@kernel
+def seat_force(bearing, j, radius, angle, ring_x, orbit_speed):
+    """Outer load less inner load and centrifugal force [N]."""
+    outer, inner = race_loads(bearing, j, radius, angle, ring_x)
+    return outer - inner - bearing.roller_mass * radius * orbit_speed**2
+
+
+@routine
+def seated_radius(bearing, j, angle, ring_x, orbit_speed):
+    """Orbit radius [m] at which outer load balances inner load and centrifugal force."""
+    low = bearing.outer.radius - roller_radius(bearing.sizes, j)
+    width, below = FIRST_APPROACH, seat_force(bearing, j, low, angle, ring_x, orbit_speed)
+    high, above = low, below
+    while above <= 0.0 and high < 2.0 * bearing.outer.radius:
+        low, below, high, width = high, above, high + width, 2.0 * width
+        above = seat_force(bearing, j, high, angle, ring_x, orbit_speed)
+    while below > 0.0 and low > bearing.inner.radius:
+        low, high, above, width = low - width, low, below, 2.0 * width
+        below = seat_force(bearing, j, low, angle, ring_x, orbit_speed)
+    # The bits of its radius limit how well a light roller is balanced.
+    enough = BALANCED * max(abs(below), abs(above)) + ROUND_OFF * high * (above - below) / (high - low)
+    moved = 0
+    for _ in range(TRIES):
+        middle = (low * above - high * below) / (above - below)
+        force = seat_force(bearing, j, middle, angle, ring_x, orbit_speed)
+        if abs(force) <= enough:
+            return middle
+        low, below, high, above, moved = narrowed(low, below, high, above, moved, middle, force)
+    return high
+
+
+@routine
+def static_force(bearing, angles, orbit_speed, ring_x, radii):
+    """Force along x [N] of the rollers at ``angles`` on a ring at (ring_x, 0); fills their orbit radii."""
+    force = 0.0
+    for j in range(angles.size):
+        radii[j] = seated_radius(bearing, j, angles[j], ring_x, orbit_speed)
+        force += race_loads(bearing, j, radii[j], angles[j], ring_x)[1] * math.cos(angles[j])
+    return force
+
+
+@entry
+def static_share(bearing, angles, orbit_speed, load, radii):
+    """Ring displacement along x [m] under a load [N] along x; fills the orbit radii [m] of rollers at ``angles``.
+
+    The force rises with the displacement, which is negative where the form of the races alone pushes harder.
+    """
+    reach = roller_radius(bearing.sizes, 0)
+    low, high = -1e-5, 1e-5
+    while static_force(bearing, angles, orbit_speed, high, radii) < load and high < reach:
+        low, high = high, 2.0 * high
+    while static_force(bearing, angles, orbit_speed, low, radii) > load and low > -reach:
+        low, high = 2.0 * low, low
+    below = static_force(bearing, angles, orbit_speed, low, radii) - load
+    above = static_force(bearing, angles, orbit_speed, high, radii) - load
+    enough = BALANCED * max(abs(below), abs(above))
+    if below >= 0.0 or above <= 0.0:
+        # No load within the play, or more than the bracket holds.
+        return 0.5 * (low + high) if below == above else low if below >= 0.0 else high
+    middle = high
+    moved = 0
+    for _ in range(TRIES):
+        middle = (low * above - high * below) / (above - below)
+        force = static_force(bearing, angles, orbit_speed, middle, radii) - load
+        if abs(force) <= enough:
+            break
+        low, below, high, above, moved = narrowed(low, below, high, above, moved, middle, force)
+    return middle

@@ -1,6 +1,6 @@
-"""What happens in recorded states, outside the time integration: loads, slips and heat at every contact, loads of slices.
+"""Contacts in recorded states, outside the time integration: loads, slips and heat of each, and loads of slices.
 
-Compiled only where it is asked for.
+Compiled on request only.
 """
 
 from typing import Any
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact, closed_load, line_load, slice_drop
-from rbdyn.contact.tangential_elasticity import coefficient_of
+from rbdyn.contact.traction import coefficient_of
+from rbdyn.dynamics.forces.cage import guide_forces
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
-from rbdyn.dynamics.forces.guide_land import guide_forces
 from rbdyn.dynamics.forces.races import race_contact, roller_radius
 
 BISECTIONS = 60
@@ -48,7 +48,7 @@ def slice_loads(
 ) -> NDArray[np.float64]:
     """Loads [N] of ``count`` slices, shape (*loads.shape, count), of contacts of total ``loads`` [N].
 
-    A roller that is not cut into slices bears evenly.
+    A roller without slices bears evenly.
     """
     if not isinstance(contact, SlicedLineContact | TiltedLineContact):
         return np.repeat(loads[..., None] / count, count, axis=-1)
@@ -57,8 +57,8 @@ def slice_loads(
     return result.reshape(*loads.shape, count)
 
 
-# Rows of what is observed of each roller: loads [N] (that on the pocket wall, by contact and film, is positive on the
-# front wall, where the roller drives the cage), slips [m/s] and heat [W] by traction and rolling.
+# Rows observed of each roller: loads [N], slips [m/s], and heat [W] by traction and rolling. The load on the pocket wall, by
+# contact and film, is positive on the front wall, where the roller drives the cage.
 OUTER_LOAD, INNER_LOAD, POCKET_LOAD, OUTER_SLIP, INNER_SLIP, OUTER_HEAT, INNER_HEAT = range(7)
 OBSERVED = 7
 

@@ -1,10 +1,10 @@
 """Race contacts side by side: blocks of contacts in straight-line code, which the compiler turns into vector code.
 
-Whole vectors of rollers go through the outer race straight from the state. The rest of them, and the rollers that touch
-the inner race, are picked out and, where both races follow the same laws, share vectors. A traction law with a table takes three
-loops, for a look-up is no vector code: how rollers and race meet, the look-ups one by one, and what follows from both.
+Whole vectors of rollers go through the outer race straight from the state. The remaining ones, and the rollers that touch
+the inner race, are packed; where both races follow the same laws they share vectors. A look-up in a table is no vector
+code. So a traction law with a table takes three loops: how rollers and race meet, the look-ups one by one, and the forces.
 
-Rollers that do not touch the inner race are driven by the oil films between them and it, where a scene asks for these.
+Where a scene asks for them, oil films drive the rollers that do not touch the inner race.
 """
 
 import math
@@ -22,21 +22,19 @@ from rbdyn.contact.hertz_line import (
     TiltedLineContact,
 )
 from rbdyn.contact.rolling_resistance import OpenFilm, film_forces
-from rbdyn.contact.tangential_elasticity import (
-    RigidContact,
-    add_coefficient_rate,
-    coefficient_of,
-    keep_coefficient_rate,
-    relax_coefficients,
-)
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
     FourConstantTraction,
     MixedTraction,
     NoTraction,
+    RigidContact,
     SurfaceAxes,
     TractionSurface,
+    add_coefficient_rate,
+    coefficient_of,
+    keep_coefficient_rate,
+    relax_coefficients,
     table_place,
     table_value,
     traction,
@@ -58,18 +56,18 @@ from rbdyn.dynamics.forces.races import (
 )
 from rbdyn.dynamics.forces.state import PARTS
 
-# Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
-# picked out bring their coordinates, their radii, the side of the race (+1 outer, -1 inner) and their traction coefficients.
+# Blocks hold LANES contacts, VECTOR of them at a time; each quantity is a row of a block. Packed rollers bring their
+# coordinates, their radii, the side of the race (+1 outer, -1 inner) and their traction coefficients.
 LANES, OUTPUTS = 16, 9
 RADII = PARTS * LANES
 SIDES = RADII + LANES
 COEFFICIENTS = SIDES + LANES
-# Where the rows of what is found of a contact begin: the fields of ``RaceWrench`` but for the slip.
+# Where the rows of the results of a contact begin: the fields of ``RaceWrench`` but for the slip.
 FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, COEFFICIENT_RATE = range(
     0, OUTPUTS * LANES, LANES
 )
-# And those of how rollers and race meet, kept between the loops of a law with a table: the fields of ``RaceApproach``, side and
-# traction coefficient, and the place in the table, then what it holds.
+# Where the rows between the loops of a law with a table begin: the fields of ``RaceApproach``, side and traction
+# coefficient, and the place in the table, later its value.
 INPUTS = 16
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
@@ -96,7 +94,7 @@ class Scratch(NamedTuple):
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     met: NDArray[np.float64]  # (INPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
-    gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
+    gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
 
 
@@ -114,7 +112,7 @@ def scratch(rollers: int) -> Scratch:
 
 @law
 def radii_in_order(sizes, unused):
-    """Where the radii of all rollers stand; ``unused`` where there are none to read."""
+    """Array of the radii of all rollers; ``unused`` where all have one."""
 
 
 @radii_in_order.body(EqualRollers)
@@ -182,7 +180,7 @@ def runs_in_vectors(race):
 
 @kernel
 def lane_race(race):
-    """A race as lanes read it, which is numbers alone: arrays would be counted in and out of each lane."""
+    """A race as lanes read it, numbers alone: references to arrays would be counted in every lane."""
     return Race(
         race.radius,
         race.reach,
@@ -197,7 +195,7 @@ def lane_race(race):
 
 @kernel
 def share_vectors(outer, inner):
-    """Whether contacts of both races may stand in one vector."""
+    """Whether one vector may hold contacts of both races."""
     return runs_in_vectors(inner) and alike(lane_race(outer), lane_race(inner))
 
 
@@ -286,14 +284,14 @@ def approach_of_lane(met, i):
 
 @kernel
 def look_up(traction_model, met, first, count):
-    """Put what the table holds for the lanes from ``first`` to ``count`` where their places stood."""
+    """Replace the places in the table of the lanes from ``first`` to ``count`` by its values."""
     for i in range(first, count):
         met[ALONG + i] = table_value(traction_model, met[ALONG + i], met[ACROSS + i])
 
 
 @kernel
 def wrenches(outer, inner, met, lanes, count):
-    """Write what follows from approaches and look-ups to ``lanes``; races as ``lane_race``."""
+    """Write the wrenches from approaches and look-ups to ``lanes``; races as ``lane_race``."""
     for i in range(lanes_to_fill(inner, count)):
         side = met[SIDE + i]
         race, approach = either(side > 0.0, outer, inner), approach_of_lane(met, i)
@@ -303,9 +301,9 @@ def wrenches(outer, inner, met, lanes, count):
 
 @law
 def outer_block(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    """Outer contacts of ``count`` rollers from ``first`` on, maybe rounded up to whole vectors, into the lanes of ``scratch``.
+    """Outer contacts of ``count`` rollers from ``first`` on, in whole vectors where the race allows, to the lanes of ``scratch``.
 
-    The lanes past ``count`` hold nothing. ``traction_model``: that of the race.
+    The lanes past ``count`` hold no contact. ``traction_model``: that of the race.
     """
 
 
@@ -337,12 +335,14 @@ def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
 
 
 @law
-def picked_block(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
-    """As ``outer_block``, for packed contacts: of either race where they share vectors, ``outer_count`` of them first, else of the
-    inner one."""
+def packed_block(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
+    """As ``outer_block``, for packed contacts: ``outer_count`` of the outer race first, then those of the inner one.
+
+    There are outer ones only where both races share vectors.
+    """
 
 
-@picked_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@packed_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
 def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
     packed = scratch.packed
     for i in range(lanes_to_fill(inner, count)):
@@ -354,7 +354,7 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
         keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, side, approach, steady, coefficient))
 
 
-@picked_block.body(TractionSurface)
+@packed_block.body(TractionSurface)
 def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
     packed, bare_outer, bare_inner = scratch.packed, lane_race(outer), lane_race(inner)
     for i in range(lanes_to_fill(inner, count)):
@@ -367,9 +367,9 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
     wrenches(bare_outer, bare_inner, scratch.met, scratch.lanes, count)
 
 
-@picked_block.body(MixedTraction)
+@packed_block.body(MixedTraction)
 def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
-    picked_block(traction_model.fluid, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
+    packed_block(traction_model.fluid, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
 
 
 @kernel
@@ -409,8 +409,8 @@ def add_to_roller(lanes, i, j, rollers, row, dy):
 def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy, scratch):
     """All contacts of both races: adds forces and moments on the rollers to row ``row`` of ``dy``.
 
-    Returns ``OnRing`` of the outer and of the inner ring. Nearly every roller touches the outer race; only those of the
-    load zone touch the inner one and are picked out first.
+    Returns ``OnRing`` of the outer and of the inner ring. Nearly every roller touches the outer race. Only those of the
+    load zone touch the inner one, and are packed first.
     """
     relax_coefficients(inner.tangential, rollers, y, row, dy)
     lanes, index = scratch.lanes, scratch.roller
@@ -427,23 +427,23 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
             on_outer = add_to_ring(lanes, i, on_outer)
         start += LANES
 
-    left, reach2 = 0, inner.reach * inner.reach
+    candidate, reach2 = 0, inner.reach * inner.reach
     start = in_order
-    while start < rollers or left < rollers:
+    while start < rollers or candidate < rollers:
         count = 0
         while start < rollers and count < LANES:
             pack(outer, sizes, rollers, y, start, 1.0, scratch, count)
             start += 1
             count += 1
         outer_count = count
-        while left < rollers and count < LANES:
-            dx, dy_ = y[left] - inner_ring.x, y[rollers + left] - inner_ring.y
+        while candidate < rollers and count < LANES:
+            dx, dy_ = y[candidate] - inner_ring.x, y[rollers + candidate] - inner_ring.y
             if dx * dx + dy_ * dy_ < reach2:
-                pack(inner, sizes, rollers, y, left, -1.0, scratch, count)
+                pack(inner, sizes, rollers, y, candidate, -1.0, scratch, count)
                 count += 1
-            left += 1
+            candidate += 1
         if count > 0:
-            picked_block(inner.traction, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
+            packed_block(inner.traction, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
         for i in range(count):
             add_to_roller(lanes, i, index[i], rollers, row, dy)
         for i in range(outer_count):
@@ -456,7 +456,7 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
 
 
 class NoOpenFilm(NamedTuple):
-    """Contacts that do not touch exchange no force."""
+    """Rollers off the inner race feel no force from it."""
 
 
 @kernel
@@ -509,7 +509,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     sums = on_ring
     for start in range(0, rollers, LANES):
         count = min(LANES, rollers - start)
-        # Whole vectors: behind the last roller stand other numbers of the state, and lanes past ``count`` hold nothing.
+        # Whole vectors: other numbers of the state follow the last roller, and lanes past ``count`` hold no contact.
         for i in range(whole_vectors(count)):
             j = start + i
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y

@@ -1,8 +1,8 @@
 """Roller against raceway: normal load, traction and rolling resistance as one wrench at the contact point.
 
 The wrench acts with opposite sign on roller and ring at the same point, so that force, moment and power balance
-exactly. ``side`` is +1 for the outer race (the ring encloses the roller) and -1 for the inner race. A raceway is round, or has
-waviness and out-of-round as harmonics of its radius.
+exactly. ``side`` is +1 for the outer race, whose ring encloses the roller, and -1 for the inner race. A raceway is round,
+or has waviness and out-of-round as harmonics of its radius.
 """
 
 import math
@@ -15,8 +15,7 @@ from rbdyn.compiled.kernel import VECTOR, kernel, law
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.contact.tangential_elasticity import acting_coefficient, coefficient_rate
-from rbdyn.contact.traction import traction
+from rbdyn.contact.traction import acting_coefficient, coefficient_rate, traction
 
 
 class RoundRace(NamedTuple):
@@ -32,7 +31,7 @@ class WavyRace(NamedTuple):
 
 
 def wavy_race(order: NDArray[np.int64], amplitude: NDArray[np.float64], phase: NDArray[np.float64]) -> WavyRace:
-    """Harmonics of the radius: amplitude [m] cos(order (phi - phase)), so a lobe of the ring stands at ``phase`` [rad]."""
+    """Harmonics of the radius: amplitude [m] cos(order (phi - phase)), so a lobe of the ring is at ``phase`` [rad]."""
     return WavyRace(order, amplitude * np.cos(order * phase), amplitude * np.sin(order * phase))
 
 
@@ -97,7 +96,7 @@ SMALLEST_SPEED = 1e-12
 
 
 class Race(NamedTuple):
-    """One raceway: its radius, the largest distance of ring and roller centres at which they may touch [m], its laws."""
+    """One raceway: its radius [m], its laws, and ``reach``: distance of ring and roller centres beyond which they never touch [m]."""
 
     radius: float
     reach: float
@@ -161,11 +160,10 @@ class RaceWrench(NamedTuple):
 
 
 class RaceApproach(NamedTuple):
-    """How a roller meets a race: outward unit vector from ring to roller, 1/distance of the centres [1/m], slope of the race's form
-    and lean of the load [m/rad].
+    """How a roller meets a race: outward unit vector from ring to roller, 1/distance of the centres [1/m].
 
-    Then the load [N], the contact's tangent stiffness [N/m], the power of its damping [W], the levers of roller and ring [m], slip and
-    entrainment [m/s].
+    Slope of the race's form and lean of the load [m/rad]; load [N], tangent stiffness of the contact [N/m] and power of
+    its damping [W]; levers of roller and ring [m]; slip and entrainment [m/s].
     """
 
     nx: float
@@ -204,7 +202,7 @@ def race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed,
     ring_lever = distance + roller_lever
     slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
 
-    # Seen from the line of centres both surfaces run the same way at the entrainment speed.
+    # Seen from the line of centres both surfaces run in one direction, at the entrainment speed on average.
     roller_surface = (roller_spin - orbit_rate) * roller_lever
     ring_surface = (ring_speed - orbit_rate) * ring_lever
     return RaceApproach(
@@ -255,12 +253,13 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     """``RaceWrench`` of one race on one roller; zero, but for round-off, where they do not touch.
 
     ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
-    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark; ``coefficient``: that of the traction, where it is a state.
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark; ``coefficient``: traction coefficient, where it is a
+    state.
 
     Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
     the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
-    the overlap: through the roller's centre, past the ring's; so it does between tilted races, whose tilt, being
-    prescribed, bears the moment that this makes about the ring's centre.
+    the overlap: through the roller's centre, past the ring's. So it does between tilted races: their tilt is prescribed and
+    bears the moment about the ring's centre.
     """
     approach = race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin)
     steady = traction(race.traction, approach.slip, approach.load)

@@ -1,5 +1,4 @@
-"""Speeds and loads that are prescribed over time: constant, in steps, in straight or smooth ramps; a load and an unbalance that turn
-with the inner ring.
+"""Speeds and loads over time: constant, in steps, in straight or smooth ramps; a load and an unbalance that turn with the inner ring.
 
 Imported only for a scene that has one.
 """
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import kernel, law
-from rbdyn.dynamics.forces.drive import Action, action, load_potential, load_power, tick
+from rbdyn.dynamics.forces.bodies import Action, action, load_potential, load_power, tick
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, TIME
 
 
@@ -96,7 +95,7 @@ def _(schedule, time):
 class ClockedDrive(NamedTuple):
     """Inner speed and load along x by schedule; a load and an unbalance that turn with the inner ring."""
 
-    start: int  # where the clock stands in the state
+    start: int  # place of the clock in the state
     inner_speed: Any  # schedule [rad/s]
     outer_speed: float  # [rad/s]
     load: Any  # schedule [N]

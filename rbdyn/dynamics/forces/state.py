@@ -1,6 +1,6 @@
 """The state vector: one table of its components, from which layout, names, tolerances and the Jacobian's pattern follow.
 
-Each coordinate of the rollers stands contiguous, roller after roller; then come cage and inner ring, then what a scene adds.
+Each coordinate of the rollers is contiguous, roller after roller. Cage and inner ring follow, then what a scene adds.
 """
 
 from collections.abc import Callable
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 
 class Component(NamedTuple):
-    """A coordinate or a speed: body, name, unit; and the name of the speed at which it changes, where the state has that.
+    """A coordinate or a speed: body, name, unit, and the name of the speed at which it changes, if the state has that.
 
-    Body and unit together choose the size by which its error is measured.
+    Body and unit together choose the scale of its error.
     """
 
     body: str
@@ -32,14 +32,14 @@ def _body(body: str, *rows: tuple[str, ...]) -> tuple[Component, ...]:
 
 
 PLACE, VELOCITY = (("x", "m", "vx"), ("y", "m", "vy")), (("vx", "m/s"), ("vy", "m/s"))
-# Each of a roller's stands Z times, for one roller after the other.
+# Each component of a roller occurs Z times, for one roller after the other.
 ROLLER = _body("roller", *PLACE, *VELOCITY, ("spin", "rad/s"))
 CAGE = _body("cage", *PLACE, ("angle", "rad", "speed"), *VELOCITY, ("speed", "rad/s"))
 BODIES = (*CAGE, *_body("inner ring", *PLACE, *VELOCITY))
-# With an outer ring on a support; where something depends on time or on a ring's angle.
+# Of an outer ring on a support; of a scene that depends on time or on a ring's angle.
 SUPPORT = _body("outer ring", *PLACE, *VELOCITY)
 CLOCK = _body("clock", ("time", "s"), ("inner ring angle", "rad"), ("outer ring angle", "rad"))
-# With tangential elasticity, of every roller: first all at the outer, then all at the inner race.
+# Of every roller with tangential elasticity: first all at the outer, then all at the inner race.
 CONTACTS = _body("contact", ("outer traction coefficient", "1"), ("inner traction coefficient", "1"))
 PARTS = len(ROLLER)
 # Places within BODIES, SUPPORT and CLOCK.
@@ -71,10 +71,10 @@ class Layout(NamedTuple):
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """What each number of the state is."""
+        """The component that each number of the state is."""
         return (*(part for part in ROLLER for _ in range(self.rollers)), *self.bodies)
 
-    def each(self, value: Callable[[Component], float]) -> NDArray[np.float64]:
+    def values(self, value: Callable[[Component], float]) -> NDArray[np.float64]:
         """``value`` of every component, in the order of the state."""
         return np.array([value(part) for part in self.components])
 
@@ -91,7 +91,7 @@ def layout(rollers: int, supported: bool, clocked: bool, elastic: bool = False) 
 
 
 def name(index: int, layout: Layout) -> str:
-    """What a state component is, in words: 'roller 3 spin', 'cage vx'. Rollers count from 1."""
+    """Name of a state component: 'roller 3 spin', 'cage vx'. Rollers count from 1."""
     part = layout.components[index]
     if part in (*ROLLER, *CONTACTS):
         index -= 0 if part in ROLLER else layout.coefficients or 0

@@ -1,31 +1,120 @@
-"""The loop over steps, one for all methods: how long the next step is, what is kept of a step, and the search for peaks.
+"""The loop over steps, one for all methods: step control, work and loads of a step, the search for peaks.
 
-How long the next step is: a PI controller on the error of a step over its tolerance (Hairer, Norsett and Wanner, Solving
-ODEs I, II.4), which with ``beta`` = 0 is the plain one.
+A PI controller on the error of a step over its tolerance sets the next step (Hairer, Norsett and Wanner, Solving ODEs I,
+II.4); with ``beta`` = 0 it is the plain controller. The error of a step is the Euclidean norm of all components, each over
+its own absolute tolerance. It is no average, so it is never smaller than the error of the worst component.
 
-The error of a step is the Euclidean norm of all components, each over its own absolute tolerance, and not averaged
-over them: it is never smaller than that of the worst component, however many rollers there are.
+One set of records serves all methods: ``Control`` is the input, ``Carry`` goes from call to call, ``Tally`` is the output.
+What the loop asks of a method are laws, so that stages and weights are compiled in. A method is a NamedTuple:
+
+- ``last``: row of ``Carry.k`` at the end of the step, which is the first row of the next step
+- ``free``: a row of no stage, work space once a step was tried
+- ``exponent`` of the error of this step and ``beta`` of the error before, in the step control
+- ``rejected``: exponent of the error of a step that is refused
 """
 
 import math
+from enum import Enum
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import rough_power
-from rbdyn.compiled.kernel import entry, kernel, routine
+from rbdyn.compiled.kernel import entry, kernel, law, routine
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
+from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
-from rbdyn.dynamics.integrators import method_laws as laws
-from rbdyn.dynamics.integrators import records as at
-from rbdyn.dynamics.integrators.records import ERROR, PLACE_SQUARES, PLACES_X, PLACES_Y, SAMPLES, SPEEDS, SQUARES, STEP
+
+# Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
+# frame [rad/s].
+NOW, STEP, ERROR, SAMPLE, FRAME, CLOCK = range(6)
+# In ``Carry.counts``: steps, right-hand sides, and the component that made the last step impossible.
+ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
+# In ``Carry.stiffness``: steps tested, those that stability limits, sum of their |eigenvalue| [1/s].
+TESTED, LIMITED, EIGENVALUES, STIFFNESS = range(4)
+# In ``Tally.whirl``: samples, sum and sum of squares of the speed of the cage's centre, sums of its places x and y and of
+# x^2 + y^2.
+SAMPLES, SPEEDS, SQUARES, PLACES_X, PLACES_Y, PLACE_SQUARES, WHIRL = range(7)
+# Rows of stages: of the longest method, with its end of the step and a free one.
+ROWS = 8
+PI_START_ERROR = 1e-4
+
+
+class Status(Enum):
+    """Why ``advance`` returned, in the order of the numbers that it returns: a template of a message, and the remedy."""
+
+    FINISHED = "", ""
+    STEP_UNDERFLOW = (
+        "the step fell below {smallest_step:.2g} s because of {component}",
+        "loosen numerics.rtol or soften the law that acts on it (damping, friction blend, film floor)",
+    )
+    NOT_FINITE = "{component} is not finite at any step size", "check the laws that act on it"
+    STEP_BUDGET = (
+        "step budget of {step_budget} used up after {spent_s:.3g} s of running (last step {step:.2g} s)",
+        "raise numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law",
+    )
+
+
+FINISHED, STEP_UNDERFLOW, NOT_FINITE, STEP_BUDGET = range(len(Status))
+
+
+class Control(NamedTuple):
+    """Step control: inverse absolute tolerance of each component, step limits [s], step budget."""
+
+    inverse_tolerance: NDArray[np.float64]
+    smallest_step: float
+    largest_step: float
+    step_budget: int
+
+
+class Carry(NamedTuple):
+    """Memory from one call to the next. Arrays, changed in place."""
+
+    y: NDArray[np.float64]  # state
+    k: NDArray[np.float64]  # (ROWS, n) stage derivatives; row 0 belongs to y
+    stage: NDArray[np.float64]  # (n,) state of the current stage, at last of the end of the step
+    power: NDArray[np.float64]  # (ROWS, POWERS)
+    loads: NDArray[np.float64]  # (ROWS, LOADS)
+    scratch: Scratch
+    clock: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    stiffness: NDArray[np.float64]
+    method: Any  # the implicit one with its work space
+
+
+class Tally(NamedTuple):
+    """Sums and extremes over a batch. Arrays, changed in place."""
+
+    work: NDArray[np.float64]  # (POWERS,) integrals of the powers [J]
+    largest: NDArray[np.float64]  # (LOADS,) largest loads [N]
+    largest_time: NDArray[np.float64]  # (LOADS,) and when [s]
+    whirl: NDArray[np.float64]
+
+
+def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: Any) -> Carry:
+    """Memory of an integration from the state ``y`` on, which tries ``first_step`` [s] first."""
+    clock = np.zeros(CLOCK)
+    clock[STEP], clock[ERROR] = first_step, PI_START_ERROR
+    k, power, loads = (np.zeros((ROWS, columns)) for columns in (y.size, POWERS, LOADS))
+    counts = np.zeros(COUNTS, dtype=np.int64)
+    return Carry(y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, np.zeros(STIFFNESS), method)
+
+
+def empty_tally() -> Tally:
+    """A tally of nothing."""
+    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL))
+
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
 
 @kernel
 def after_accepted(method, clock, h, cut, error, refused, largest_step):
-    """Set the step after one of ``h`` [s] that was accepted. ``cut``: it ended early, which says nothing against the step it
-    was cut from; ``refused``: the one before was refused, so that this is no time to grow.
+    """Set the step after one of ``h`` [s] that was accepted.
+
+    ``cut``: it ended early, so the step before the cut may still be right; ``refused``: the trial before was refused, so the
+    step must not grow.
     """
     error = max(error, 1e-4)
     factor = SAFETY * rough_power(error, -method.exponent) * rough_power(clock[ERROR], method.beta)
@@ -45,7 +134,7 @@ def worst_component(method, k, h, inverse_tolerance):
     """Component that limits the step: the first that is not finite, else the one of the largest error."""
     worst, largest = 0, -1.0
     for i in range(inverse_tolerance.size):
-        e = abs(laws.step_error(method, k, h, i)) * inverse_tolerance[i]
+        e = abs(step_error(method, k, h, i)) * inverse_tolerance[i]
         if not math.isfinite(e):
             return i
         if e > largest:
@@ -53,7 +142,7 @@ def worst_component(method, k, h, inverse_tolerance):
     return worst
 
 
-PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
+PEAK_POINTS = 8  # interior points for the peak of a step with a new largest pocket load
 
 
 @kernel
@@ -77,8 +166,10 @@ def book_point(values, point, loads, row):
 
 @routine
 def book_peaks(values, start, h, tally):
-    """Keep the peaks of both pocket loads, given at even points of a step of ``h`` [s] from ``start`` on: of each the
-    largest, or the vertex of the parabola through it and its neighbours, where it is larger than any before.
+    """Book the peaks of both pocket loads, sampled at even points of a step of ``h`` [s] from ``start`` on.
+
+    The peak is the largest sample, or the vertex of the parabola through it and its neighbours. It counts where it is larger
+    than any before.
     """
     last = values.shape[1] - 1
     # Of a length that the compiler does not know: unrolled, this would be compiled twice.
@@ -90,23 +181,23 @@ def book_peaks(values, start, h, tally):
                 best, place = values[row, p], p
         theta = place * spacing
         if 0 < place < last:
-            left, right = values[row, place - 1], values[row, place + 1]
-            bend = left - 2.0 * best + right
+            before, after = values[row, place - 1], values[row, place + 1]
+            bend = before - 2.0 * best + after
             if bend < 0.0:
-                shift = 0.5 * (left - right) / bend
-                best -= 0.25 * (left - right) * shift
+                shift = 0.5 * (before - after) / bend
+                best -= 0.25 * (before - after) * shift
                 theta += shift * spacing
         if best > tally.largest[force]:
             tally.largest[force] = best
             tally.largest_time[force] = start + theta * h
 
 
-LOOK_EVERY = 8  # Stiffness is looked at in every eighth step.
+TEST_EVERY = 8  # Every eighth step is tested for stiffness.
 
 
 @routine
 def refine_peak(bearing, carry, h, tally):
-    """Look inside a step for its largest pocket loads: eight points, then the vertex of a parabola."""
+    """Search a step for its largest pocket loads: eight points, then the vertex of a parabola."""
     method, y, stage, k, loads = carry.method, carry.y, carry.stage, carry.k, carry.loads
     values = np.empty((2, PEAK_POINTS + 2))
     inside = np.empty_like(y)
@@ -115,22 +206,22 @@ def refine_peak(bearing, carry, h, tally):
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(y.size):
-            inside[i] = laws.interpolate(method, y, stage, k, h, p * spacing, i)
-        laws.to_fixed_axes_at(method, carry.clock, p * spacing * h, bearing.rollers, inside)
+            inside[i] = interpolate(method, y, stage, k, h, p * spacing, i)
+        to_fixed_axes_at(method, carry.clock, p * spacing * h, bearing.rollers, inside)
         pocket_loads(bearing, inside, method.free, loads, carry.scratch)
         book_point(values, p, loads, method.free)
-    book_peaks(values, carry.clock[at.NOW], h, tally)
+    book_peaks(values, carry.clock[NOW], h, tally)
 
 
 @kernel
 def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
-    """Book an accepted step: work, largest loads, samples; the cage's coordinates stand from ``body`` on.
+    """Book an accepted step: work, largest loads, samples; the cage's coordinates begin at ``body``.
 
     Returns whether a stage saw a new largest pocket load.
     """
     for p in range(POWERS):
-        work[p] += laws.work_done(method, power, h, p)
-    time = clock[at.NOW]
+        work[p] += work_done(method, power, h, p)
+    time = clock[NOW]
     on_wall = contact = 0.0
     for s in range(1, method.last + 1):
         on_wall = max(on_wall, loads[s, POCKET_LOAD])
@@ -139,53 +230,53 @@ def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_
         if loads[method.last, force] > largest[force]:
             largest[force] = loads[method.last, force]
             largest_time[force] = time + h
-    while clock[at.SAMPLE] <= time + h:
-        theta = (clock[at.SAMPLE] - time) / h
-        cage_x = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_X)
-        cage_y = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_Y)
-        vx = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_VX)
-        vy = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_VY)
+    while clock[SAMPLE] <= time + h:
+        theta = (clock[SAMPLE] - time) / h
+        cage_x = interpolate(method, y, stage, k, h, theta, body + CAGE_X)
+        cage_y = interpolate(method, y, stage, k, h, theta, body + CAGE_Y)
+        vx = interpolate(method, y, stage, k, h, theta, body + CAGE_VX)
+        vy = interpolate(method, y, stage, k, h, theta, body + CAGE_VY)
         book_whirl(whirl, cage_x, cage_y, vx, vy)
-        clock[at.SAMPLE] += sample_step
+        clock[SAMPLE] += sample_step
     return on_wall > largest[POCKET_LOAD] or contact > largest[POCKET_CONTACT_LOAD]
 
 
 @entry
 def advance(bearing, control, carry, tally, t_end, sample_step):
-    """Integrate from the carried time to ``t_end`` [s]; returns FINISHED or why not: see ``Status``.
+    """Integrate from the time in ``carry`` to ``t_end`` [s]; returns FINISHED or why not: see ``Status``.
 
     Steps end exactly at ``t_end``. On any other status ``carry`` holds the last good state, and
     ``carry.counts[WORST]`` the component that made it impossible.
     """
-    # Taken out of their tuples once: each time counts references, atomically.
+    # Read from their tuples once, since each read counts references atomically.
     y, k, stage, clock, counts = carry.y, carry.k, carry.stage, carry.clock, carry.counts
     power, loads, scratch, stiffness = carry.power, carry.loads, carry.scratch, carry.stiffness
     work, largest, largest_time, whirl = tally.work, tally.largest, tally.largest_time, tally.whirl
     inverse_tolerance, method = control.inverse_tolerance, carry.method
     z = roller_count(bearing)
-    worst = laws.begin(method, bearing, y, k, power, loads, scratch, clock, counts)
+    worst = begin(method, bearing, y, k, power, loads, scratch, clock, counts)
     if worst >= 0:
-        counts[at.WORST] = worst
-        return at.NOT_FINITE
+        counts[WORST] = worst
+        return NOT_FINITE
     refused = False
-    while clock[at.NOW] < t_end:
-        if counts[at.ACCEPTED] + counts[at.REJECTED] >= control.step_budget:
-            return at.STEP_BUDGET
-        remaining = t_end - clock[at.NOW]
-        cut = clock[at.STEP] >= remaining
-        h = remaining if cut else clock[at.STEP]
-        laws.trial_step(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h)
-        error = laws.error_norm(method, k, h, inverse_tolerance)
+    while clock[NOW] < t_end:
+        if counts[ACCEPTED] + counts[REJECTED] >= control.step_budget:
+            return STEP_BUDGET
+        remaining = t_end - clock[NOW]
+        cut = clock[STEP] >= remaining
+        h = remaining if cut else clock[STEP]
+        trial_step(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h)
+        error = error_norm(method, k, h, inverse_tolerance)
         if error <= 1.0:
-            if counts[at.ACCEPTED] % LOOK_EVERY == 0:
-                laws.look_at_stiffness(method, k, stiffness, h, inverse_tolerance)
-            laws.end_step(method, bearing, stage, k, power, loads, scratch, counts)
+            if counts[ACCEPTED] % TEST_EVERY == 0:
+                test_stiffness(method, k, stiffness, h, inverse_tolerance)
+            end_step(method, bearing, stage, k, power, loads, scratch, counts)
             if keep(
                 method, PARTS * z, y, stage, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step
             ):
                 refine_peak(bearing, carry, h, tally)
-            counts[at.ACCEPTED] += 1
-            clock[at.NOW] = t_end if cut else clock[at.NOW] + h
+            counts[ACCEPTED] += 1
+            clock[NOW] = t_end if cut else clock[NOW] + h
             for i in range(y.size):
                 y[i] = stage[i]
                 k[0, i] = k[method.last, i]
@@ -193,15 +284,65 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 power[0, p] = power[method.last, p]
             for force in range(LOADS):
                 loads[0, force] = loads[method.last, force]
-            laws.next_frame(method, clock, h, z, y, k)
+            next_frame(method, clock, h, z, y, k)
             after_accepted(method, clock, h, cut, error, refused, control.largest_step)
             refused = False
         else:
-            counts[at.REJECTED] += 1
+            counts[REJECTED] += 1
             refused = True
             shorter = shortened(method, h, error)
             if shorter < control.smallest_step:
-                counts[at.WORST] = worst_component(method, k, h, inverse_tolerance)
-                return at.STEP_UNDERFLOW if math.isfinite(error) else at.NOT_FINITE
-            clock[at.STEP] = shorter
-    return at.FINISHED
+                counts[WORST] = worst_component(method, k, h, inverse_tolerance)
+                return STEP_UNDERFLOW if math.isfinite(error) else NOT_FINITE
+            clock[STEP] = shorter
+    return FINISHED
+
+
+@law
+def begin(method, bearing, y, k, power, loads, scratch, clock, counts):
+    """Compute what a step needs of the state and ``Carry`` lacks. Returns the first component that is not finite, else -1."""
+
+
+@law
+def trial_step(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
+    """Stages of a step of ``h`` [s] from ``y``; the end state goes to ``stage``. ``refused``: the last trial from here was."""
+
+
+@law
+def error_norm(method, k, h, inverse_tolerance):
+    """Norm of the embedded error over the tolerances: a sum of squares, so that any NaN comes through."""
+
+
+@law
+def step_error(method, k, h, i):
+    """Embedded error of component ``i``."""
+
+
+@law
+def test_stiffness(method, k, stiffness, h, inverse_tolerance):
+    """Book whether stability, not accuracy, limits an accepted step."""
+
+
+@law
+def end_step(method, bearing, stage, k, power, loads, scratch, counts):
+    """Fill row ``last``, which belongs to the end of an accepted step, and what its dense output needs."""
+
+
+@law
+def interpolate(method, y, end, k, h, theta, i):
+    """Component ``i`` at the fraction ``theta`` of the step from ``y`` to ``end``."""
+
+
+@law
+def work_done(method, power, h, p):
+    """Integral of power ``p`` over the step [J]."""
+
+
+@law
+def to_fixed_axes_at(method, clock, time, z, y):
+    """Turn an interpolated state at a time [s] since the start of the step into the fixed axes."""
+
+
+@law
+def next_frame(method, clock, h, z, y, k):
+    """From the frame of a step of ``h`` [s] to that of the next one, whose start ``y`` and row 0 are."""

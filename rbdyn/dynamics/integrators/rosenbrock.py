@@ -1,52 +1,52 @@
-"""RODAS4: linearly implicit, for scenes whose explicit steps are held by stability and not by accuracy.
+"""RODAS4: linearly implicit, for scenes in which stability, not accuracy, limits the explicit steps.
 
 Six stages, order four with an embedded third-order result, stiffly accurate and L-stable, dense output of order three:
-Hairer and Wanner, Solving ODEs II, IV.7 (method and coefficients of their code RODAS, in the form u_i that needs no
-products with the Jacobian). Each stage solves (I/(gamma h) - J) u_i = f(y + sum a_ij u_j) + sum c_ij u_j/h.
+Hairer and Wanner, Solving ODEs II, IV.7. Method and coefficients are those of their code RODAS, in the form u_i that
+needs no products with the Jacobian. Each stage solves
 
-It works in fixed axes; the Jacobian of a state is kept while steps from it are refused. Works are integrated as further
-equations of the same method, w' = P(y): where a stiff slip makes the traction, no quadrature over interpolated states
-would close the power balance.
+    (I/(gamma h) - J) u_i = f(y + sum a_ij u_j) + sum c_ij u_j/h
 
-Jacobian of the equations of motion by differences, as an arrow matrix, for any laws.
+The method works in fixed axes. The Jacobian of a state is kept while steps from it are refused. Works are further
+equations of the same method, w' = P(y): traction from a stiff slip would leave a gap in the power balance of any
+quadrature over interpolated states.
 
-Rollers feel each other only through the bodies. So the columns of one roller are those of a bearing that holds just
-this roller: its land and other terms without the roller drop out of the difference. One Jacobian costs 5 z right-hand
-sides of one roller and one full right-hand side a body coordinate.
+The Jacobian comes from differences, for any laws. Rollers feel each other only through the bodies (cage, rings, clock).
+So the columns of one roller are those of a bearing with this roller alone: terms without the roller drop out of the
+difference. One Jacobian costs 5 z right-hand sides of one roller and one full right-hand side per body coordinate.
 
-Arrow matrices: each roller couples to itself, and all rollers to the bodies (cage, rings, clock), not to each other.
+It is an arrow matrix: each roller couples to itself and to the bodies, not to the other rollers.
 
-    | own_1            right_1 |      own_j:   5 x 5, a roller's coordinates among themselves
-    |        own_2     right_2 |      right_j: 5 x m, effect of the bodies on roller j
-    | left_1 left_2 .. bodies  |      left_j:  m x 5, effect of roller j on the bodies
+    | own_1             upper_1 |      own_j:   5 x 5, a roller's coordinates among themselves
+    |         own_2     upper_2 |      upper_j: 5 x m, effect of the bodies on roller j
+    | lower_1 lower_2 .. bodies |      lower_j: m x 5, effect of roller j on the bodies
 
 Elimination takes the rollers first and leaves an m x m system for the bodies (Golub and Van Loan, Matrix Computations,
-4.5): work and storage grow with the number of rollers, not with its cube.
+4.5). Work and storage grow with the number of rollers, not with its cube.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.compiled.kernel import kernel, law, routine
-from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative, derivative_once
-from rbdyn.dynamics.forces.race_lanes import Scratch
+from rbdyn.compiled.kernel import VECTOR, kernel, law, routine
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing, derivative, derivative_once
+from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS, Layout
-from rbdyn.dynamics.integrators import method_laws as laws
-from rbdyn.dynamics.integrators.records import DERIVATIVES
+from rbdyn.dynamics.integrators import advance as laws
+from rbdyn.dynamics.integrators.advance import DERIVATIVES
 
 
 class ArrowMatrix(NamedTuple):
     """Blocks of the matrix; after ``factor`` those of its factors. Arrays, changed in place."""
 
     own: NDArray[np.float64]  # (5, 5, z)
-    right: NDArray[np.float64]  # (5, z, m)
-    left: NDArray[np.float64]  # (rows that rollers push, 5, z)
+    upper: NDArray[np.float64]  # (5, z, m)
+    lower: NDArray[np.float64]  # (rows that rollers push, 5, z)
     bodies: NDArray[np.float64]  # (m, m)
-    pushed: NDArray[np.int64]  # which rows of the bodies those of ``left`` are
+    pushed: NDArray[np.int64]  # which rows of the bodies those of ``lower`` are
     pivots: NDArray[np.int64]  # (m,) row exchanges of the factors
 
 
@@ -56,8 +56,8 @@ def arrow_matrix(layout: Layout) -> ArrowMatrix:
     pushed = [place for place, part in enumerate(layout.bodies) if part.pushed]
     return ArrowMatrix(
         own=np.zeros((PARTS, PARTS, z)),
-        right=np.zeros((PARTS, z, m)),
-        left=np.zeros((len(pushed), PARTS, z)),
+        upper=np.zeros((PARTS, z, m)),
+        lower=np.zeros((len(pushed), PARTS, z)),
         bodies=np.zeros((m, m)),
         pushed=np.array(pushed),
         pivots=np.zeros(m, dtype=np.int64),
@@ -75,11 +75,11 @@ def shifted(matrix, shift, result):
                 result.own[r, c, j] = diagonal - matrix.own[r, c, j]
         for j in range(z):
             for b in range(m):
-                result.right[r, j, b] = -matrix.right[r, j, b]
+                result.upper[r, j, b] = -matrix.upper[r, j, b]
     for a in range(matrix.pushed.size):
         for c in range(PARTS):
             for j in range(z):
-                result.left[a, c, j] = -matrix.left[a, c, j]
+                result.lower[a, c, j] = -matrix.lower[a, c, j]
     for a in range(m):
         for b in range(m):
             result.bodies[a, b] = (shift if a == b else 0.0) - matrix.bodies[a, b]
@@ -92,7 +92,7 @@ def factor(matrix):
     Rollers without exchange of rows: positions come first, and eliminating them leaves inertia, damping and stiffness of
     the velocities, whose pivots are sound where a step is. A zero pivot shows as values that are not finite.
     """
-    own, right = matrix.own, matrix.right
+    own, upper = matrix.own, matrix.upper
     z, m = own.shape[2], matrix.bodies.shape[0]
     for p in range(PARTS):
         for j in range(z):
@@ -106,22 +106,22 @@ def factor(matrix):
             for j in range(z):
                 multiplier = own[r, p, j]
                 for b in range(m):
-                    right[r, j, b] -= multiplier * right[p, j, b]
+                    upper[r, j, b] -= multiplier * upper[p, j, b]
     for r in range(PARTS - 1, -1, -1):
         for j in range(z):
             for c in range(r + 1, PARTS):
                 multiplier = own[r, c, j]
                 for b in range(m):
-                    right[r, j, b] -= multiplier * right[c, j, b]
+                    upper[r, j, b] -= multiplier * upper[c, j, b]
             for b in range(m):
-                right[r, j, b] *= own[r, r, j]
+                upper[r, j, b] *= own[r, r, j]
     for a in range(matrix.pushed.size):
         row = matrix.pushed[a]
         for c in range(PARTS):
             for j in range(z):
-                multiplier = matrix.left[a, c, j]
+                multiplier = matrix.lower[a, c, j]
                 for b in range(m):
-                    matrix.bodies[row, b] -= multiplier * right[c, j, b]
+                    matrix.bodies[row, b] -= multiplier * upper[c, j, b]
     factor_dense(matrix.bodies, matrix.pivots)
 
 
@@ -148,7 +148,7 @@ def factor_dense(a, pivots):
 @routine
 def solve(factors, x):
     """Replace the right side ``x``, in the order of the state vector, by the solution."""
-    own, right, pivots = factors.own, factors.right, factors.pivots
+    own, upper, pivots = factors.own, factors.upper, factors.pivots
     z, m = own.shape[2], factors.bodies.shape[0]
     body = PARTS * z
     for r in range(PARTS):
@@ -165,24 +165,24 @@ def solve(factors, x):
         total = 0.0
         for c in range(PARTS):
             for j in range(z):
-                total += factors.left[a, c, j] * x[c * z + j]
+                total += factors.lower[a, c, j] * x[c * z + j]
         x[body + factors.pushed[a]] -= total
-    lower = factors.bodies
+    dense = factors.bodies
     # Rows of L were exchanged together with those of the matrix, so all exchanges come first.
     for p in range(m):
         x[body + p], x[body + pivots[p]] = x[body + pivots[p]], x[body + p]
     for p in range(m):
         for r in range(p + 1, m):
-            x[body + r] -= lower[r, p] * x[body + p]
+            x[body + r] -= dense[r, p] * x[body + p]
     for r in range(m - 1, -1, -1):
         for c in range(r + 1, m):
-            x[body + r] -= lower[r, c] * x[body + c]
-        x[body + r] *= lower[r, r]
+            x[body + r] -= dense[r, c] * x[body + c]
+        x[body + r] *= dense[r, r]
     for r in range(PARTS):
         for j in range(z):
             total = 0.0
             for b in range(m):
-                total += right[r, j, b] * x[body + b]
+                total += upper[r, j, b] * x[body + b]
             x[r * z + j] -= total
 
 
@@ -222,25 +222,25 @@ def _(sizes, one, j):
 
 
 @routine
-def jacobian(bearing, y, stage, k, row, power, loads, scratch, found):
-    """Fill the derivatives of ``found`` for the state ``y``, whose right-hand side stands in row 0; uses row ``row``."""
-    z, m = bearing.rollers, found.matrix.bodies.shape[0]
+def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
+    """Fill ``differences`` for the state ``y``, whose right-hand side is in row 0; row ``row`` is work space."""
+    z, m = bearing.rollers, differences.matrix.bodies.shape[0]
     body = PARTS * z
     for i in range(y.size):
         stage[i] = y[i]
     for b in range(m):
-        stage[body + b] = y[body + b] + found.increments[body + b]
+        stage[body + b] = y[body + b] + differences.increments[body + b]
         per = 1.0 / (stage[body + b] - y[body + b])
         derivative(bearing, stage, row, k, power, loads, scratch)
         stage[body + b] = y[body + b]
         for r in range(PARTS):
             for j in range(z):
-                found.matrix.right[r, j, b] = (k[row, r * z + j] - k[0, r * z + j]) * per
+                differences.matrix.upper[r, j, b] = (k[row, r * z + j] - k[0, r * z + j]) * per
         for a in range(m):
-            found.matrix.bodies[a, b] = (k[row, body + a] - k[0, body + a]) * per
+            differences.matrix.bodies[a, b] = (k[row, body + a] - k[0, body + a]) * per
         for p in range(POWERS):
-            found.power[p, body + b] = (power[row, p] - power[0, p]) * per
-    one = found.one
+            differences.power[p, body + b] = (power[row, p] - power[0, p]) * per
+    one = differences.one
     single = one.bearing
     for b in range(m):
         one.y[PARTS + b] = y[body + b]
@@ -253,29 +253,29 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, found):
         for c in range(PARTS, -1, -1):
             place = c * z + j
             if c < PARTS:
-                one.y[c] = y[place] + found.increments[place]
+                one.y[c] = y[place] + differences.increments[place]
             derivative(single, one.y, c // PARTS, one.dy, one.power, one.loads, one.scratch)
             if c < PARTS:
                 per = 1.0 / (one.y[c] - y[place])
                 one.y[c] = y[place]
-                roller_column(found, c, j, z, per)
+                roller_column(differences, c, j, z, per)
 
 
 @kernel
-def roller_column(found, c, j, z, per):
+def roller_column(differences, c, j, z, per):
     """Column ``c`` of roller ``j`` from the right-hand sides of its bearing: row 1 unchanged, row 0 changed."""
-    matrix, dy, power = found.matrix, found.one.dy, found.one.power
+    matrix, dy, power = differences.matrix, differences.one.dy, differences.one.power
     for r in range(PARTS):
         matrix.own[r, c, j] = (dy[0, r] - dy[1, r]) * per
     for a in range(matrix.pushed.size):
         row = PARTS + matrix.pushed[a]
-        matrix.left[a, c, j] = (dy[0, row] - dy[1, row]) * per
+        matrix.lower[a, c, j] = (dy[0, row] - dy[1, row]) * per
     for p in range(POWERS):
-        found.power[p, c * z + j] = (power[0, p] - power[1, p]) * per
+        differences.power[p, c * z + j] = (power[0, p] - power[1, p]) * per
 
 
 STAGES = 6
-# Rows of a right-hand side, as integers of numpy: for each plain one it would be compiled anew.
+# Rows of a right-hand side, as integers of numpy: each plain one would be compiled anew.
 START_ROW, NEXT_ROW, END_ROW = np.int64(0), np.int64(1), np.int64(STAGES)
 GAMMA = 0.25
 # Row s: weights of the stages before it in the state at which stage s is evaluated, and divided by h in its right side.
@@ -305,12 +305,12 @@ D_3 = np.array([-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76
 
 
 class Rodas(NamedTuple):
-    """The method and what one run of it works on. Arrays, changed in place; numbers as in ``method_laws``."""
+    """The method and what one run of it works on. Arrays, changed in place; numbers as in ``advance``."""
 
     u: NDArray[np.float64]  # (6, n) stages
     work: NDArray[np.float64]  # (6, POWERS) stages of the works
     dense: NDArray[np.float64]  # (2, n) quadratic and cubic part of the dense output
-    found: Differences
+    differences: Differences
     factors: ArrowMatrix
     last: int = STAGES
     free: int = 1
@@ -330,10 +330,10 @@ def _(method, bearing, y, k, power, loads, scratch, clock, counts):
 def _(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
     if not refused:
         # Right-hand sides of one roller count as their share.
-        jacobian(bearing, y, stage, k, NEXT_ROW, power, loads, scratch, method.found)
+        jacobian(bearing, y, stage, k, NEXT_ROW, power, loads, scratch, method.differences)
         counts[DERIVATIVES] += PARTS + 1 + method.factors.bodies.shape[0]
     n, u, per_step = y.size, method.u, 1.0 / h
-    shifted(method.found.matrix, per_step / GAMMA, method.factors)
+    shifted(method.differences.matrix, per_step / GAMMA, method.factors)
     factor(method.factors)
     for s in range(u.shape[0]):
         if s > 0:
@@ -359,7 +359,7 @@ def _(method, refused, bearing, y, k, stage, power, loads, scratch, clock, count
 @routine
 def stage_work(method, power, s, h):
     """Stage ``s`` of the works: they act on nothing, so that each follows from the stage of the state."""
-    gradients, u = method.found.power, method.u
+    gradients, u = method.differences.power, method.u
     for p in range(POWERS):
         rate = power[s, p]
         for i in range(u.shape[1]):
@@ -383,7 +383,7 @@ def _(method, k, h, i):
     return method.u[STAGES - 1, i]
 
 
-@laws.look_at_stiffness.body(Rodas)
+@laws.test_stiffness.body(Rodas)
 def _(method, k, stiffness, h, inverse_tolerance):
     pass
 
@@ -409,10 +409,10 @@ def _(method, y, end, k, h, theta, i):
 
 @laws.work_done.body(Rodas)
 def _(method, power, h, p):
-    done = method.work[STAGES - 1, p]
+    total = method.work[STAGES - 1, p]
     for s in range(STAGES - 1):
-        done += A[STAGES - 1, s] * method.work[s, p]
-    return done
+        total += A[STAGES - 1, s] * method.work[s, p]
+    return total
 
 
 @laws.to_fixed_axes_at.body(Rodas)
@@ -423,3 +423,47 @@ def _(method, clock, time, z, y):
 @laws.next_frame.body(Rodas)
 def _(method, clock, h, z, y, k):
     pass
+
+
+def rodas(layout: Layout, bearing: RollerBearing, increments: NDArray[np.float64]) -> Rodas:
+    """The method with work space for a bearing; ``increments`` (n,): of the difference quotients of its Jacobian."""
+    n = layout.size
+    return Rodas(
+        np.zeros((STAGES, n)),
+        np.zeros((STAGES, POWERS)),
+        np.zeros((2, n)),
+        differences_of(layout, bearing, increments),
+        arrow_matrix(layout),
+    )
+
+
+def differences_of(layout: Layout, bearing: RollerBearing, increments: NDArray[np.float64]) -> Differences:
+    """Storage for the Jacobian of a bearing."""
+    gradients = np.zeros((POWERS, layout.size))
+    return Differences(arrow_matrix(layout), gradients, increments, one_roller(bearing, layout.size))
+
+
+def one_roller(bearing: RollerBearing, size: int) -> OneRoller:
+    """The same bearing, of the same types of laws, with room for one roller."""
+    moved = PARTS * (bearing.rollers - 1)
+    single = bearing._replace(
+        rollers=1,
+        sizes=_room_for_one(bearing.sizes),
+        pocket_cos=np.ones(1),
+        pocket_sin=np.zeros(1),
+        drive=_moved(bearing.drive, moved),
+        outer_ring=_moved(bearing.outer_ring, moved),
+    )
+    rows = size - moved
+    return OneRoller(
+        single, np.zeros(rows), np.zeros((2, rows)), np.zeros((2, POWERS)), np.zeros((2, LOADS)), scratch(1)
+    )
+
+
+def _room_for_one(sizes: EqualRollers | UnequalRollers) -> EqualRollers | UnequalRollers:
+    return sizes if isinstance(sizes, EqualRollers) else UnequalRollers(np.zeros(VECTOR))
+
+
+def _moved(part: Any, by: int) -> Any:
+    """A part whose coordinates stand further forward by ``by``, where it has any."""
+    return part._replace(start=part.start - by) if hasattr(part, "start") else part

@@ -1,27 +1,210 @@
 """Explicit Runge-Kutta pairs: first-same-as-last, dense output; Hairer, Norsett and Wanner, Solving ODEs I, II.4.
 
-The pairs stand in modules of their own. Loss powers are integrated with the main weights from the same stages, so that the
-power balance tests the integrator too. The rollers are integrated in a frame that turns with them through one step.
+The main weights integrate the powers of the losses from the same stages, so that the power balance tests the integrator
+too.
 
-Rollers run round the bearing thousands of times farther than they move against each other. In fixed axes a step must
-follow that circle, and its stages, which cut the corner, jolt the stiff race contacts; in a frame that turns with
-the rollers they all but stand still. So their coordinates are integrated in such a frame, an exact change of variables
-(Lawson 1967, for a linear part that is a rotation), while forces are still those of the fixed axes.
+Rollers run round the bearing thousands of times farther than they move against each other. In fixed axes a step would
+follow that circle, and its stages, which cut the corner, would jolt the stiff race contacts. In a frame that turns with
+the rollers they hardly move. So their coordinates are integrated in such a frame, from forces in fixed axes: an exact
+change of variables (Lawson 1967, for a linear part that is a rotation). The frame coincides with the fixed axes at the
+start of the step. At the time t of the step it has turned by phi, with tan(phi/2) = rate t/2: cosine, sine and speed of
+such a turn are rational.
 
-The frame stands in the fixed axes at the start of the step and has turned by phi at the time t of the step, with
-tan(phi/2) = rate t/2: cosine, sine and speed of such a turn are rational, and it is as smooth.
+A pair is a method (``advance``) that also has ``limit``: h |eigenvalue| above which stability limits a step. There are two:
+
+- Dormand and Prince 1980: order 5(4), six right-hand sides a step; continuous extension after Hairer, Norsett and Wanner, II.6
+- Kutta 1901: the 3/8 rule with its embedded third order, four right-hand sides a step (the same, II.1); dense output by the
+  cubic through values and slopes at both ends, third-order accurate
+
+Until stability limits it, a right-hand side of Kutta's pair goes a quarter (decay) and three quarters (vibration) farther
+than one of Dormand and Prince. So it is the cheaper pair where stability limits the steps.
 """
 
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import kernel, routine
+import numpy as np
+
+from rbdyn.compiled.elementary import fma
+from rbdyn.compiled.kernel import kernel, law, routine
 from rbdyn.dynamics.forces.equations import derivative, roller_count
-from rbdyn.dynamics.integrators import method_laws as laws
-from rbdyn.dynamics.integrators.dormand_prince import DormandPrince
-from rbdyn.dynamics.integrators.kutta_pair import Kutta
-from rbdyn.dynamics.integrators.method_laws import mean_rate, quartic_rate, rate_error, stage_state, tableau
-from rbdyn.dynamics.integrators.records import DERIVATIVES, EIGENVALUES, FRAME, HELD, LOOKED_AT
+from rbdyn.dynamics.integrators import advance as laws
+from rbdyn.dynamics.integrators.advance import DERIVATIVES, EIGENVALUES, FRAME, LIMITED, TESTED
+
+
+@law
+def tableau(pair):
+    """Weights and nodes. Row s weighs the rows before it in the state at which row s is evaluated; the last row makes the new
+    state. Node: time of a row since the start of the step, over its size.
+    """
+
+
+@law
+def stage_state(pair, s, y, k, h, state):
+    """State at which row ``s`` is evaluated. One pass a stage: rows of weight zero may hold anything."""
+
+
+@kernel
+def early_stage_state(s, y, k, w0, w1, w2, state):
+    """``stage_state`` of rows 0 to 3 by the weights of rows 0 to 2, times the step."""
+    n = y.size
+    if s == 0:
+        for i in range(n):
+            state[i] = y[i]
+    elif s == 1:
+        for i in range(n):
+            state[i] = fma(w0, k[0, i], y[i])
+    elif s == 2:
+        for i in range(n):
+            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
+    else:
+        for i in range(n):
+            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
+
+
+@law
+def mean_rate(pair, rows, i):
+    """Mean over the step of rate ``i``, by the main weights."""
+
+
+@law
+def rate_error(pair, k, i):
+    """Main less embedded mean of rate ``i``."""
+
+
+@law
+def quartic_rate(pair, k, i):
+    """Coefficient of theta^2 (1 - theta)^2 in the dense output, added to the cubic through values and slopes at both ends."""
+
+
+PRINCE_WEIGHTS = np.array(
+    [
+        [0, 0, 0, 0, 0, 0],
+        [1 / 5, 0, 0, 0, 0, 0],
+        [3 / 40, 9 / 40, 0, 0, 0, 0],
+        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+PRINCE_NODES = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
+B1, B3, B4, B5, B6 = 35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
+E1, E3, E4, E5, E6, E7 = 71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40
+D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
+D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
+
+
+class DormandPrince(NamedTuple):
+    """The pair of order 5(4), six right-hand sides a step; fields as in ``advance``."""
+
+    last: int = 6
+    free: int = 7
+    exponent: float = 0.2 - 0.75 * 0.04
+    beta: float = 0.04
+    rejected: float = 0.2
+    # Stable up to 3.3 for decay and about 2.4 for a loaded contact that vibrates.
+    limit: float = 2.0
+
+
+@tableau.body(DormandPrince)
+def _(pair):
+    return PRINCE_WEIGHTS, PRINCE_NODES
+
+
+@mean_rate.body(DormandPrince)
+def _(pair, rows, i):
+    return B1 * rows[0, i] + B3 * rows[2, i] + B4 * rows[3, i] + B5 * rows[4, i] + B6 * rows[5, i]
+
+
+@rate_error.body(DormandPrince)
+def _(pair, k, i):
+    return E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
+
+
+@quartic_rate.body(DormandPrince)
+def _(pair, k, i):
+    return D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i]
+
+
+@stage_state.body(DormandPrince)
+def _(pair, s, y, k, h, state):
+    n = y.size
+    w0, w1, w2, w3, w4, w5 = (
+        h * PRINCE_WEIGHTS[s, 0],
+        h * PRINCE_WEIGHTS[s, 1],
+        h * PRINCE_WEIGHTS[s, 2],
+        h * PRINCE_WEIGHTS[s, 3],
+        h * PRINCE_WEIGHTS[s, 4],
+        h * PRINCE_WEIGHTS[s, 5],
+    )
+    if s <= 3:
+        early_stage_state(s, y, k, w0, w1, w2, state)
+    elif s == 4:
+        for i in range(n):
+            state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))
+    elif s == 5:
+        for i in range(n):
+            early = fma(w2, k[2, i], fma(w1, k[1, i], w0 * k[0, i]))
+            state[i] = y[i] + fma(w4, k[4, i], fma(w3, k[3, i], early))
+    else:
+        for i in range(n):
+            early = fma(w3, k[3, i], fma(w2, k[2, i], w0 * k[0, i]))
+            state[i] = y[i] + fma(w5, k[5, i], fma(w4, k[4, i], early))
+
+
+KUTTA_WEIGHTS = np.array(
+    [[0, 0, 0, 0], [1 / 3, 0, 0, 0], [-1 / 3, 1, 0, 0], [1, -1, 1, 0], [1 / 8, 3 / 8, 3 / 8, 1 / 8]]
+)
+KUTTA_NODES = np.array([0, 1 / 3, 2 / 3, 1, 1])
+KUTTA_B1, KUTTA_B2, KUTTA_B3, KUTTA_B4 = 1 / 8, 3 / 8, 3 / 8, 1 / 8
+KUTTA_E1, KUTTA_E2, KUTTA_E3, KUTTA_E4, KUTTA_E5 = 1 / 24, -1 / 8, 1 / 8, 1 / 8, -1 / 6
+
+
+class Kutta(NamedTuple):
+    """Kutta's pair, four right-hand sides a step. The PI controller is Gustafsson's: 0.7 and 0.4 over the order of the error.
+
+    With the milder one of the other pair every sixth step that stability limits is refused.
+    """
+
+    last: int = 4
+    free: int = 5
+    exponent: float = 0.7 / 4
+    beta: float = 0.4 / 4
+    rejected: float = 1 / 4
+    # Stable up to 2.8 both for decay and for vibration.
+    limit: float = 2.3
+
+
+@tableau.body(Kutta)
+def _(pair):
+    return KUTTA_WEIGHTS, KUTTA_NODES
+
+
+@stage_state.body(Kutta)
+def _(pair, s, y, k, h, state):
+    n = y.size
+    w0, w1, w2, w3 = h * KUTTA_WEIGHTS[s, 0], h * KUTTA_WEIGHTS[s, 1], h * KUTTA_WEIGHTS[s, 2], h * KUTTA_WEIGHTS[s, 3]
+    if s <= 3:
+        early_stage_state(s, y, k, w0, w1, w2, state)
+    else:
+        for i in range(n):
+            state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))
+
+
+@mean_rate.body(Kutta)
+def _(pair, rows, i):
+    return KUTTA_B1 * rows[0, i] + KUTTA_B2 * rows[1, i] + KUTTA_B3 * rows[2, i] + KUTTA_B4 * rows[3, i]
+
+
+@rate_error.body(Kutta)
+def _(pair, k, i):
+    return KUTTA_E1 * k[0, i] + KUTTA_E2 * k[1, i] + KUTTA_E3 * k[2, i] + KUTTA_E4 * k[3, i] + KUTTA_E5 * k[4, i]
+
+
+@quartic_rate.body(Kutta)
+def _(pair, k, i):
+    return 0.0
 
 
 class Turn(NamedTuple):
@@ -57,8 +240,8 @@ def turned(turn, along, across):
 
 
 @kernel
-def seen(turn, x_rate, y_rate, x, y):
-    """What the frame sees of the rate of change of a vector (x, y)."""
+def in_frame(turn, x_rate, y_rate, x, y):
+    """Rate of change in the frame of a vector (x, y) of the fixed axes."""
     x_rate, y_rate = x_rate + turn.speed * y, y_rate - turn.speed * x
     return turn.cosine * x_rate + turn.sine * y_rate, turn.cosine * y_rate - turn.sine * x_rate
 
@@ -73,10 +256,10 @@ def to_fixed_axes(turn, z, y):
 
 @kernel
 def rates_to_frame(turn, z, y, row, dy):
-    """Turn rates of change of the rollers in row ``row`` of ``dy`` into those that the frame sees; ``y``: fixed axes."""
+    """Turn rates of change of the rollers in row ``row`` of ``dy`` into those in the frame; ``y``: fixed axes."""
     for i in range(z):
-        dy[row, i], dy[row, z + i] = seen(turn, dy[row, i], dy[row, z + i], y[i], y[z + i])
-        dy[row, 2 * z + i], dy[row, 3 * z + i] = seen(
+        dy[row, i], dy[row, z + i] = in_frame(turn, dy[row, i], dy[row, z + i], y[i], y[z + i])
+        dy[row, 2 * z + i], dy[row, 3 * z + i] = in_frame(
             turn, dy[row, 2 * z + i], dy[row, 3 * z + i], y[2 * z + i], y[3 * z + i]
         )
 
@@ -113,8 +296,8 @@ def _(pair, bearing, y, k, power, loads, scratch, clock, counts):
 
 @laws.trial_step.body(*PAIRS)
 def _(pair, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
-    # One loop of a length the compiler does not know: unrolled, the derivatives overflow the instruction cache. The first
-    # step of all begins with its first row.
+    # One loop of a length that the compiler does not know: unrolled, the derivatives would overflow the instruction cache.
+    # Only the very first step computes its first row.
     z, rate = roller_count(bearing), clock[FRAME]
     _, nodes = tableau(pair)
     first = 0 if counts[DERIVATIVES] == 0 else 1
@@ -183,15 +366,17 @@ def _(pair, clock, h, z, y, k):
     clock[FRAME] = begin_step(z, y, k)
 
 
-@laws.look_at_stiffness.body(*PAIRS)
+@laws.test_stiffness.body(*PAIRS)
 def _(pair, k, stiffness, h, inverse_tolerance):
     compare_last_stages(pair, k, stiffness, h, inverse_tolerance)
 
 
 @routine
 def compare_last_stages(pair, k, stiffness, h, inverse_tolerance):
-    """Book whether stability holds the step: |eigenvalue| = |difference of rates|/|difference of states| over the
-    tolerances, of the last two stages, both at the end of the step (Hairer and Wanner, Solving ODEs II, IV.2).
+    """Book whether stability limits the step (Hairer and Wanner, Solving ODEs II, IV.2).
+
+    |eigenvalue| = |difference of rates|/|difference of states| over the tolerances, of the last two stages, which are both at
+    the end of the step.
     """
     last, (weights, _), way = pair.last, tableau(pair), pair.free
     for i in range(inverse_tolerance.size):
@@ -207,7 +392,7 @@ def compare_last_stages(pair, k, stiffness, h, inverse_tolerance):
         place = k[way, i] * (h * inverse_tolerance[i])
         rates += rate * rate
         places += place * place
-    stiffness[LOOKED_AT] += 1.0
+    stiffness[TESTED] += 1.0
     if h * h * rates > pair.limit * pair.limit * places > 0.0:
-        stiffness[HELD] += 1.0
+        stiffness[LIMITED] += 1.0
         stiffness[EIGENVALUES] += math.sqrt(rates / places)

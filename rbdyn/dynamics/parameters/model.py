@@ -1,6 +1,6 @@
-"""From a scene to what the kernels read: geometry, masses and the chosen laws, traction of each race and its film, in SI.
+"""From a scene to what the kernels read, in SI: geometry, masses and the chosen laws, traction of each race and its film.
 
-What only some scenes need is imported where it is built: a scene without it never loads it.
+Parts that only some scenes need are imported where they are built, so that a scene without them never loads them.
 """
 
 import math
@@ -13,7 +13,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.contact import film_thickness, traction
 from rbdyn.contact.cage_film import short_journal_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
-from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
+from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, slice_contact
 from rbdyn.contact.rolling_resistance import (
     NoRollingResistance,
     OpenFilm,
@@ -23,19 +23,34 @@ from rbdyn.contact.rolling_resistance import (
     starved,
     touching_gap,
 )
-from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact
-from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
-from rbdyn.dynamics.forces.bodies import BalancedCage, HeldRing, UnbalancedCage
-from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive
+from rbdyn.contact.traction import CoulombTraction, ElasticContact, NoTraction, RigidContact, dry_friction
+from rbdyn.dynamics.forces.bodies import (
+    BalancedCage,
+    Gravity,
+    HeldRing,
+    NoDrag,
+    NoGravity,
+    SteadyDrive,
+    TwoSpeedDrive,
+    UnbalancedCage,
+    cylinder_drag,
+)
+from rbdyn.dynamics.forces.cage import (
+    DryContact,
+    InnerGuide,
+    LippedPocket,
+    LubricatedPocket,
+    NoFilm,
+    NoGuide,
+    NoPocket,
+    OuterGuide,
+    Pocket,
+)
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
 from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
 from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
-from rbdyn.dynamics.forces.surroundings import Gravity, NoDrag, NoGravity, cylinder_drag
 from rbdyn.dynamics.parameters.state import contact_approach, layout_of
-from rbdyn.properties.lubricants import Oil
-from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.properties.materials import Oil, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
 from rbdyn.scene.lubricant import RHEOLOGIES
@@ -46,23 +61,23 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.forces.schedule import ClockedDrive
 
 
-# The slip of rollers that stand still is twice the entrainment speed.
+# The slip of rollers that do not move is twice the entrainment speed.
 LARGEST_SLIP_RATIO = 2.0
 # A table starts at the load where the film turns elastohydrodynamic, but spans at least this ratio of loads.
 SMALLEST_RANGE = 10.0
-# Entrainment speed [m/s] that is round-off of none.
+# Entrainment speeds [m/s] up to this are round-off.
 ROLLING = 1e-9
-# It ends at the static capacity of a roller contact (ISO 76: 4 GPa), past which no oil law holds.
+# It ends at the static capacity of a roller contact (ISO 76: 4 GPa), beyond which no oil law is valid.
 LARGEST_PRESSURE = 4e9
-# Error of a table, as a share of its largest coefficient, that is refused.
+# Largest error of a table, as a share of its largest coefficient.
 LARGEST_ERROR = 0.01
 
 
 def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
     """Traction law of a race by one of its contacts.
 
-    ``oil`` is the scene's, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of
-    pure rolling. Raises InputError where a model needs a film and nothing rolls.
+    ``oil``: of the scene, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of pure
+    rolling. Raises InputError where a model needs a film and nothing rolls.
     """
     table = scene.traction
     if table.elasticity and not contact.entrainment_speed > ROLLING:
@@ -70,8 +85,8 @@ def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
     if not contact.entrainment_speed > ROLLING:
-        key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
-        raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
+        key = f"traction.model = '{table.model}'" if table.model in RHEOLOGIES else "traction.friction = 'mixed'"
+        raise InputError([f"{key}: needs a film, but the races do not roll; choose another"])
     law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
@@ -148,8 +163,12 @@ def _surface(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, lar
     largest_slip = LARGEST_SLIP_RATIO * contact.entrainment_speed
     fit = traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
     if fit.error > LARGEST_ERROR:
-        what = f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak"
-        raise InputError([f"{what} up to {largest_load:.4g} N; raise lubricant.temperature_C or choose another model"])
+        raise InputError(
+            [
+                f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up to "
+                f"{largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
+            ]
+        )
     return fit.surface
 
 
@@ -168,8 +187,8 @@ def _rheology(scene: Scene, oil: Oil) -> "Rheology":
 
 def _mixed(scene: Scene, fluid: Any, contact: film_thickness.RollingContact, oil: Oil) -> traction.MixedTraction:
     table = scene.traction
-    # The film goes as Q^-0.1. Heating and starvation vary little with the load: they are taken at that of the most
-    # loaded roller, 5 F/Z (Stribeck).
+    # The film varies as Q^-0.1. Heating and starvation vary little with the load: they are those of the most loaded roller,
+    # 5 F/Z (Stribeck).
     stribeck = 5.0 * scene.operation.largest_load_N / scene.bearing.rollers
     load = max(stribeck, film_thickness.lightest_load(contact, oil))
     film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
@@ -229,7 +248,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
     form = _form(getattr(scene.bearing, f"{which}_waviness"))
     largest_roller = geometry.roller_radius if radii is None else float(radii.max())
     largest_load = TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0)
-    # A tilt may close the ends of a contact whose middle is open.
+    # A tilt may close the ends of a contact with an open middle.
     end_rise = 0.5 * scene.bearing.effective_length * abs(scene.bearing.tilt)
     return Race(
         radius=radius,
@@ -244,7 +263,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
 
 
 def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
-    """Whether the traction coefficients of the outer (0) or inner race (1) are states, and how they follow the steady law."""
+    """Law by which traction coefficients of the outer (0) or inner race (1) follow the steady law; rigid where none is a state."""
     start = layout_of(scene).coefficients
     if start is None:
         return RigidContact()
@@ -253,7 +272,7 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
     stiffness = 10.0 / 9.0 * load / contact_approach(scene, load)
     mass = scene.geometry.roller_mass
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
-    # Its translation weighs the roller's mass on two springs, its traction the third of it that turns with the slip.
+    # Translation acts with the mass of the roller on two springs, traction with the third of it that turns with the slip.
     shortest, damping = math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
     return ElasticContact(start + place * scene.bearing.rollers, shortest, damping)
 
@@ -285,7 +304,7 @@ def race_contact_law(scene: Scene, which: str) -> Any:
     from rbdyn.contact.profile import slice_centres
 
     share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
-    return sliced(
+    return slice_contact(
         whole,
         roller_relief(scene, scene.slices),
         slice_centres(scene.slices, length),

@@ -1,5 +1,6 @@
-"""The state of a scene in SI: its layout, the sizes by which errors of its components are measured, and where a run starts: static load
-share at epicyclic speed, rollers at seeded offsets in their pockets.
+"""The state of a scene in SI: its layout, the scales of its errors, and the start of a run.
+
+A run starts with the static load share at epicyclic speed, rollers at seeded offsets in their pockets.
 """
 
 import math
@@ -11,31 +12,30 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
-from rbdyn.dynamics.forces.drive import action
-from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.bodies import action
+from rbdyn.dynamics.forces.equations import RollerBearing, static_share
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X, Layout, layout
-from rbdyn.dynamics.parameters.static_load import static_share
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 
-# Largest contact speed by which errors are measured, as a share of that of the faster race. Held at its limit of
-# stability, the explicit method leaves the whole tolerance in every contact in every step, and contacts lose it: in a
-# slow bearing that must stay small compared with what rolling loses. The implicit method damps it.
+# Largest scale of errors of contact speeds, as a share of the speed of the faster race. At its limit of stability the explicit
+# method leaves the whole tolerance in every contact in every step, and contacts dissipate it. In a slow bearing that must
+# stay small compared with the rolling loss. The implicit method damps it.
 SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
-# Tolerance of the cage's speeds over that of a contact's. Only impacts change them, in two or three explicit steps each,
-# which damp an impact where the races alone rule the steps: with it impact and whirl of the bearing of Chen et al. 2022
+# Tolerance of the speeds of the cage over that of a contact speed. Only impacts change them, in two or three explicit steps
+# each, which damp an impact where the races alone set the steps. With it impact and whirl of the bearing of Chen et al. 2022
 # are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1890 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1490.
 # The implicit method damps less: whirl goes from +0.6 +- 1.1 to +0.2 +- 0.8 % for a hundredth more right-hand sides.
 CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "rosenbrock": 0.1}
-# Centrifugal force over the mean load share, below which rollers outside the load zone lie lightly and jump.
+# Centrifugal force over the mean load share, below which rollers outside the load zone jump.
 LIGHT = 0.05
-# Traction coefficient by which errors are measured: a fifth of a usual peak.
+# Scale of errors of a traction coefficient: a fifth of a usual peak.
 COEFFICIENT_SCALE = 0.01
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Characteristic load [N], approach [m] and speed [m/s] of a race contact, by which errors are measured."""
+    """Characteristic load [N], approach [m] and speed [m/s] of a race contact: the scales of errors."""
 
     load: float
     length: float
@@ -85,9 +85,9 @@ class LightContact(NamedTuple):
 
 
 def light_contact(scene: Scene) -> LightContact | None:
-    """How a roller outside the load zone vibrates on the outer race; None where its centrifugal force is not light.
+    """Vibration of a roller outside the load zone on the outer race; None where its centrifugal force is not light.
 
-    Viscous damping is a share of the critical one as far as it is engaged. Of Hunt and Crossley's, c = 3/2 alpha F, and with
+    Viscous damping is a share of the critical one, as far as the contact engages it. Of Hunt and Crossley's, c = 3/2 alpha F, and with
     k = 10/9 F/x the ratio c omega/(2 k) is 27/40 alpha x omega.
     """
     force, mass, laws = scene.geometry.centrifugal_force, scene.geometry.roller_mass, scene.model
@@ -113,8 +113,9 @@ def fastest_surface(scene: Scene) -> float:
 
 
 def slip_scale(bearing: RollerBearing, load: float) -> float:
-    """Slip [m/s] at which the tangent of the steeper traction curve at rest would reach its peak; infinite without
-    traction. Slips must be known to a part of this, whatever the speed: beyond it friction is false.
+    """Slip [m/s] at which the tangent of the steeper traction curve at rest would reach its peak; infinite without traction.
+
+    Errors of slips must be below a part of this at any speed, or friction is wrong.
     """
     slips = np.logspace(-9.0, 3.0, 241)
     scale = math.inf
@@ -128,10 +129,12 @@ def slip_scale(bearing: RollerBearing, load: float) -> float:
 def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45") -> Array:
     """Tolerance of each state component: ``rtol`` of the approach or contact speed that the component can make.
 
-    In a slow bearing the contact speed is at most the method's share of the speed of the faster race, and the approach
-    shrinks with it. The spin of a roller counts by the slip it makes, at most the scale of the traction curve at the load
-    of the most loaded roller (Stribeck), unless traction coefficients are states with a scale of their own. Speeds of the cage count by the method's share of a contact's. Infinite for the
-    clock, which the method integrates exactly.
+    - In a slow bearing the contact speed is at most the method's share of the speed of the faster race. The approach
+      decreases with it.
+    - The spin of a roller counts by its slip. That is at most the scale of the traction curve at the load of the most loaded
+      roller (Stribeck). Traction coefficients that are states have a scale of their own.
+    - Speeds of the cage count by the method's share of a contact speed.
+    - The clock has an infinite tolerance, since the method integrates it exactly.
     """
     scale, state = scales(scene), layout_of(scene)
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
@@ -150,16 +153,30 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
         "contact": {"1": COEFFICIENT_SCALE},
         "clock": {"s": math.inf, "rad": math.inf},
     }
-    return rtol * state.each(lambda part: sizes_of[part.body][part.unit])
+    return rtol * state.values(lambda part: sizes_of[part.body][part.unit])
+
+
+def increments(scene: Scene, bearing: RollerBearing) -> Array:
+    """Increment of each state component in a difference quotient (n,).
+
+    The geometric mean of its round-off and of the scale on which laws change makes round-off and truncation alike.
+    """
+    layout, length = layout_of(scene), 0.5 * scene.bearing.pitch_diameter
+    turning = max(abs(speed) for speed in scene.operation.speeds)
+    sizes = {"m": length, "rad": 1.0, "m/s": length * turning, "rad/s": turning, "s": scene.turn_s}
+    spin = max(abs(scene.geometry.motion.roller_spin), turning)
+    size = layout.values(lambda part: spin if (part.body, part.unit) == ("roller", "rad/s") else sizes[part.unit])
+    scale = np.minimum(absolute_tolerance(scene, bearing, 1.0, "rosenbrock"), size)
+    return np.sqrt(np.finfo(float).eps * size * scale)
 
 
 def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> Array:
     """State at time zero.
 
-    The cage stands at any angle, rollers within +-20 % of the pocket clearance of their pockets' middles and the cage a
-    tenth of the guide (or pocket) clearance off centre, all at random; all move as if they rolled without slip. With one
-    angle for all, replicates would share the passage of the rollers through the load zone, which no mean over them
-    takes away.
+    The angle of the cage is random, and so are the offsets of rollers from the middles of their pockets, within +-20 % of the
+    pocket clearance. The cage is off centre by a tenth of the guide (or pocket) clearance in a random direction. All bodies
+    move as if they rolled without slip. With one cage angle, replicates would share the passage of the rollers through the
+    load zone, which no mean over them removes.
     """
     z = bearing.rollers
     state = layout_of(scene)
@@ -184,12 +201,12 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
             np.full(z, motion.roller_spin),
         )
     )
-    body = y[5 * z :]  # cage, ring and what the scene adds, which starts at rest at time zero
+    body = y[5 * z :]  # cage, ring and what the scene adds, which starts at rest
     body[CAGE_X], body[CAGE_Y] = offset * math.cos(direction), offset * math.sin(direction)
     body[CAGE_ANGLE], body[CAGE_SPEED] = cage_angle, motion.cage_speed
     body[RING_X] = ring_x
     if state.support is not None:
-        # All sits on the outer ring, which gives way under the load.
+        # The outer ring carries all other bodies and sags under the load.
         sag = acting.load_x / bearing.outer_ring.stiffness
         y[:z] += sag
         y[state.support] = sag

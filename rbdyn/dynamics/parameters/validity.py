@@ -1,5 +1,6 @@
-"""Whether the model holds for a scene: what it leaves out, each item with what it would change and an estimate of how much; the maker's
-friction next to the simulated power loss; pressure, half-width and film of each race at its largest load.
+"""Validity of the model for a scene: effects left out, the maker's friction, pressure and film of each race.
+
+Each effect left out has the change that it would make and, where possible, an estimate of its size.
 """
 
 import math
@@ -8,27 +9,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.base.fields import RPM
+from rbdyn.base.faults import RPM
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, dent_sentence, palmgren
-from rbdyn.dynamics.forces.surroundings import AIR_DENSITY
+from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_report, race_contact_law, rolling_contacts
-from rbdyn.life.maker_friction import SERIES, iso_15312_heat, skf_moments
-from rbdyn.life.rollers import REFERENCE_SPEED, minimum_loads, static_capacity
+from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
-from rbdyn.scene.notes import catalogued
+from rbdyn.scene.notes import catalogue_entry
 
 # Film over roughness below which asperities bear part of the load.
 FULL_FILM = 1.0
-SMALLEST_LOAD = 1e-3  # [N]: below this a race counts as unloaded
+SMALLEST_LOAD = 1e-3  # [N]: a race with less counts as unloaded
 
 
 def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
-    """For "inner" and "outer", at the largest loads [N]: max_pressure_MPa, half_width_um, central_film_um,
-    minimum_film_um, lambda_ratio. A race that was never loaded is left out, so are films where nothing rolls.
+    """For "inner" and "outer", at the largest loads [N]: max_pressure_MPa, half_width_um, and three figures of the film.
 
-    With a profile or a tilt the pressure is that of the most loaded slice, with the roller where the tilt is largest.
+    These are central_film_um, minimum_film_um and lambda_ratio, missing where nothing rolls. A race without a load is missing
+    too. With a profile or a tilt the pressure is that of the most loaded slice, of a roller where the tilt is largest.
     """
     loads = max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
     films = film_report(scene, scene.lubricant.in_service, *loads)
@@ -55,15 +55,17 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
 
 
 def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
-    """Where ``races`` of a report lie beyond their laws: dents, and films too thin for the friction of a full one."""
+    """Notes where ``races`` of a report exceed their laws: dents, and films too thin for the friction of a full one."""
     pressures = {name: 1e6 * race["max_pressure_MPa"] for name, race in races.items()}
     notes = [dent_sentence(most, ROLLERS, name) for name, most in pressures.items() if most > ROLLERS]
     law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
-        what = f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}"
-        why = "so asperities touch while the friction is that of a full film; set traction.friction = 'mixed'"
-        notes.append(f"{what}, {why}, or check lubricant.temperature_C and the roughnesses")
+        notes.append(
+            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the "
+            "friction is that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the "
+            "roughnesses"
+        )
     return tuple(notes)
 
 
@@ -77,17 +79,17 @@ def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
     return float(slice_loads(law, scene.slices, scene.geometry.roller_radius, np.array([load]), nx, ny).max())
 
 
-# A ratio of simulated to maker's loss outside this is noted: SKF's model is a factor of two off ISO 15312 itself.
+# A ratio of simulated to maker's loss outside this range gets a note. SKF's model differs from ISO 15312 by a factor of two.
 USUAL_RATIO = (0.5, 2.0)
 
 
 def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] | None:
     """SKF's moments [N mm] and power, the heat of ISO 15312, and the simulated ``power_loss`` [W] over SKF's power.
 
-    At the speed, load and oil of the scene; the load is the steady one with what rotates in line with it. None without a
-    designation, or where a schedule varies them; the ratio is None where SKF's power is nil: no load, or no speed.
+    At the speed, load and oil of the scene; the load is the steady one in line with the rotating one. None without a
+    designation, or with a schedule. The ratio is None where SKF's power is zero: no load, or no speed.
     """
-    listed = catalogued(scene.bearing)
+    listed = catalogue_entry(scene.bearing)
     if listed is None or scene.operation.schedule is not None:
         return None
     named, sizes = listed
@@ -112,26 +114,27 @@ def friction_notes(check: dict[str, Any] | None) -> tuple[str, ...]:
     low, high = USUAL_RATIO
     if check is None or ratio is None or low <= ratio <= high:
         return ()
-    what = f"power loss: {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}"
-    return (f"{what}; compare the power terms, the oil and lubricant.supply",)
+    return (
+        f"power loss: {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}; "
+        "compare the power terms, the oil and lubricant.supply",
+    )
 
 
-# Share of the power loss from which a result speaks of power that was left out.
+# Share of the power loss from which a note states a power that was left out.
 NOTED_SHARE = 0.03
-# An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2];
-# some times as much is beyond any cooling. Oil takes up 27 W/K a litre a minute (SKF), over at most some 100 K [W min/L].
+# An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2].
+# Ten times as much is beyond any cooling. Oil absorbs 27 W/K at a litre a minute (SKF), over at most some 100 K [W min/L].
 JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
 
 
-# Share of C below which slip is a matter of films: an NU 210 at 6000 rpm slips by 1 % under 0.03 C, by 0.35 under 0.003 C.
+# Share of C below which films decide the slip: an NU 210 at 6000 rpm slips by 1 % under 0.03 C, by 0.35 under 0.003 C.
 FILM_DRIVEN = 0.01
 
 
 class LeftOut(NamedTuple):
-    """One item: its name, what it would change, how it is estimated, and where it matters.
+    """An effect that the model leaves out: name, change that it would make, way to estimate it.
 
-    ``power``: its estimate for a scene [W], None where there is none; ``matters``: whether a scene without such an
-    estimate calls for it.
+    ``power``: its estimate for a scene [W], None without one; ``matters``: whether it matters in a scene, without an estimate.
     """
 
     name: str
@@ -160,7 +163,7 @@ def friction_factor(reynolds: float) -> float:
     """
     root = 0.1
     for _ in range(40):
-        # Below Re = 80 the curve lies under the laminar line, and far below it has no root: any large one will do.
+        # Below Re = 80 the curve is under the laminar line, and far below it has no root: any large value serves.
         root = 1.0 / max(-0.6 + 4.07 * math.log10(max(reynolds * root, 1.0)), 4.0)
     return max(root**2, 4.0 / reynolds)
 
@@ -196,8 +199,8 @@ def spin_windage(scene: Scene) -> float:
 def open_inner_films(scene: Scene) -> float:
     """Power of the oil films between inner race and the rollers that it does not load [W]; 0 where the scene has them.
 
-    2 u times 4.601 eta u l sqrt(R/h) each, with the gap h = c - (c + d) cos psi of a ring that has come down by the
-    radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z), averaged over the circle.
+    Each film takes 2 u times 4.601 eta u l sqrt(R/h), averaged over the circle, with the gap h = c - (c + d) cos psi. The ring
+    is displaced by the radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z).
     """
     clearance = 0.5 * scene.geometry.clearance
     if clearance <= 0.0 or scene.model.open_contact_film:
@@ -209,8 +212,8 @@ def open_inner_films(scene: Scene) -> float:
     angle = (np.arange(2000) + 0.5) * math.pi / 2000
     gap = clearance - (clearance + approach) * np.cos(angle)
     speed, oil = scene.geometry.motion.entrainment, scene.lubricant.in_service
-    each = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
-    return count * float(each.sum()) / angle.size
+    powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
+    return count * float(powers.sum()) / angle.size
 
 
 LEFT_OUT = (
@@ -229,31 +232,31 @@ LEFT_OUT = (
     LeftOut(
         "churning of a sump",
         "more power loss",
-        "none: the level of a bath is unknown, and lubricant.oil_fraction holds what rollers plough through",
+        "none: the level of a bath is unknown, and lubricant.oil_fraction includes what rollers plough through",
     ),
     LeftOut(
         "skew of rollers",
         "axial sliding in the races and forces on the cage off its middle plane",
-        "none: it asks for motion out of the plane; tilted rings cause it",
+        "none: it needs motion out of the plane; tilted rings cause it",
         matters=lambda scene: scene.bearing.tilt != 0.0,
     ),
     LeftOut(
         "contact of roller ends and flanges",
-        "friction at the flanges, which holds rollers against skew",
-        "none: it asks for motion along the axis; tilted rings load the flanges",
+        "friction at the flanges, which limits the skew of rollers",
+        "none: it needs motion along the axis; tilted rings load the flanges",
         matters=lambda scene: scene.bearing.tilt != 0.0,
     ),
     LeftOut(
         "elastic deformation of the cage ring",
         "lower impacts and load shared by several pockets; bars bend by model.pocket_bar_stiffness_N_m, the ring does not",
-        f"none: it counts in cages below {SOFTEST_METAL * 1e-9:g} GPa",
+        f"none: it matters in cages below {SOFTEST_METAL * 1e-9:g} GPa",
         matters=lambda scene: scene.material("cage").elastic_modulus < SOFTEST_METAL,
     ),
 )
 
 
 def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
-    """Notes on what the model leaves out and this scene would show, ``power_loss`` being the measured one [W]."""
+    """Notes on effects that the model leaves out and that matter in this scene, of the simulated ``power_loss`` [W]."""
     notes = []
     for item in LEFT_OUT:
         if item.power is not None:
@@ -270,15 +273,15 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
 
 
 def light_load_notes(scene: Scene) -> tuple[str, ...]:
-    """A note where even the largest load is below what a maker asks for, with every maker's rule.
+    """A note where even the largest load is below the minimum load of a maker, with every maker's rule.
 
     A designation gives the factor k_r and the reference speed of SKF's rule, and the mean diameter of bore and outside.
     """
     drawing, operation = scene.bearing, scene.operation
     inner, outer = operation.speeds
     diameter, of_series = drawing.pitch_diameter, None
-    if (known := catalogued(drawing)) is not None:
-        named, box = known
+    if (listed := catalogue_entry(drawing)) is not None:
+        named, box = listed
         diameter = 0.5e-3 * (box.bore + box.outside)
         usual = REFERENCE_SPEED / diameter
         of_series = SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
@@ -289,9 +292,11 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     if not missed:
         return ()
     rising = sorted(rules.items(), key=lambda item: item[1])
-    listed = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
-    what = f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}"
-    return (f"{what}; no rule is safe; see cage_slip",)
+    loads = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
+    return (
+        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {loads}; no rule is "
+        "safe; see cage_slip",
+    )
 
 
 def film_drive_notes(scene: Scene) -> tuple[str, ...]:
@@ -299,14 +304,20 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
     load, capacity = scene.operation.largest_load_N, scene.bearing.rated_capacity
     if load >= FILM_DRIVEN * capacity:
         return ()
-    why = f"load: {load:.4g} N is below {100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN, so cage slip rests on the drag of oil films"
+    limit = f"{100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN"
     if scene.model.open_contact_film:
-        return (f"{why} and on lubricant.inlet_distance; compare it over the range of that key",)
-    return (f"{why}, of which those at open inner contacts are left out; set model.open_contact_film = true",)
+        return (
+            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films and on "
+            "lubricant.inlet_distance; compare it over the range of that key",
+        )
+    return (
+        f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, of which those at open inner "
+        "contacts are left out; set model.open_contact_film = true",
+    )
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
-    """A note where a power loss [W] is more than any oil carries off: the model leaves out what it would warm."""
+    """A note where a power loss [W] is more than any oil carries off; the model leaves out the temperatures that it causes."""
     drawing, oil = scene.bearing, scene.lubricant
     heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter * drawing.roller_length)
     if heat <= TOO_HOT * JET_COOLED:

@@ -1,7 +1,6 @@
 """From batches to figures with errors.
 
-- ``metrics``: impact force, whirl deviation ratio, power loss, cage speed and orbit of replicates; error of the time integration
-- ``filtered_whirl``: speed of the cage's centre below a cutoff, of runs and of rigs
-- ``batch_means``: scatter
-- ``error_bars``: scatter, transient, slow change and integration joined, and what is to be said of them
+- ``metrics``: figures of replicates, orbit of the cage, numerical error by companions, filtered whirl of runs and rigs
+- ``batch_means``: statistical error of correlated series
+- ``error_bars``: both errors together with transient and slow change, and the notes on them
 """

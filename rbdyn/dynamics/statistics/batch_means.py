@@ -1,18 +1,19 @@
 """Error of a mean over correlated series: batch means over several independent replicates, and the jackknife.
 
-A run is cut into short equal batches, of which each keeps sums (moments). A figure is a function of the sums over all
-batches of all replicates: a mean, a ratio, a standard deviation over a mean. Its error is found in two steps:
+A run is cut into short equal batches, each with its own sums (moments). A figure is a function of the sums over all
+batches of all replicates: a mean, a ratio, a standard deviation over a mean. Its error takes two steps:
 
-- how long the series remembers: the integrated autocorrelation time of the figure's pseudo-values, by the initial
-  monotone sequence of Geyer (1992, *Statistical Science* 7, 473);
-- batches are joined until they are several such times long (Schmeiser 1982, *Operations Research* 30, 556), and
-  leaving out one after the other (jackknife: Quenouille 1956, Tukey 1958) gives the variance of the figure with one
-  degree of freedom less than there are joined batches.
+- the memory of the series: the integrated autocorrelation time of the figure's pseudo-values, by the initial monotone
+  sequence of Geyer (1992, *Statistical Science* 7, 473)
+- neighbouring batches are joined until they are several such times long (Schmeiser 1982, *Operations Research* 30, 556);
+  the jackknife leaves out one after the other (Quenouille 1956, Tukey 1958); it gives the variance of the figure, with one
+  degree of freedom less than there are joined batches
 
-Both look at deviations from the mean over all replicates, so replicates that differ lengthen the memory and widen the
-interval; where one remembers its start to its end the joined batches are whole replicates, and the interval is
-Student's over replicates. So it is from eight replicates on, which are independent by their making: a memory found in
-short series is itself uncertain, and of the bearing of Chen et al. 2022 intervals by it held the impact in 90 of 100.
+Both use deviations from the mean over all replicates, so replicates that differ lengthen the memory and widen the
+interval. Where a replicate remembers its start to its end, the joined batches are whole replicates, and the interval is
+Student's over replicates. From eight replicates on it is always so, since they are independent by construction. A memory
+from short series is itself uncertain: with it, intervals of the impact of the bearing of Chen et al. 2022 held the truth in
+90 of 100 cases.
 """
 
 import math
@@ -23,19 +24,22 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 
-# Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches stay as they are.
+# Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches are not joined.
 MEMORIES = 8.0
-# More joined batches would hardly narrow Student's t, longer ones are less correlated.
+# More joined batches would hardly reduce Student's t, and longer ones are less correlated.
 MOST_BATCHES = 64
-# A single replicate is cut into so many at least.
+# A single replicate has at least so many joined batches.
 FEWEST_BATCHES = 4
 # Replicates from which each is one batch.
 ENOUGH_REPLICATES = 8
 
 
 class Estimate(NamedTuple):
-    """A figure, the half-width of its 95 % interval (None for fewer than two batches), how many independent batches
-    would carry as much, and the degrees of freedom of Student's t in the half-width (None without one)."""
+    """A figure and the half-width of its 95 % interval, None for fewer than two batches.
+
+    ``effective_samples``: independent batches that would carry as much; ``freedom``: degrees of freedom of Student's t in the
+    half-width, None without one.
+    """
 
     value: float
     half_width: float | None
@@ -74,7 +78,7 @@ def autocorrelation_time(series: Sequence[Array]) -> float:
     for part in series:
         spectrum = np.fft.rfft(part - mean, size)
         covariance[: len(part)] += np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(part)]
-    # Each lag has its own number of pairs: without that, short replicates would seem to forget.
+    # Each lag has its own number of pairs. Otherwise short replicates would seem to have a short memory.
     pairs = sum(np.maximum(len(part) - np.arange(longest), 0) for part in series)
     covariance /= pairs
     if covariance[0] <= np.finfo(float).eps ** 2 * mean**2 * longest:
@@ -97,8 +101,9 @@ def student_half_width(values: Array) -> float | None:
 
 
 def student_factor(freedom: int, level: float = 0.95) -> float:
-    """The t that holds the share ``level`` of Student's distribution with ``freedom`` > 0 degrees of freedom between
-    -t and t, by bisection.
+    """The t for which the share ``level`` of Student's distribution with ``freedom`` > 0 degrees lies between -t and t.
+
+    By bisection.
     """
     low, high = 0.0, 0.5 * math.pi
     for _ in range(60):
@@ -125,7 +130,7 @@ def _student_share(freedom: int, theta: float) -> float:
 
 
 def _pseudo_values(moments: Array, total: Array, figure: Callable[[Array], Array]) -> Array:
-    """What each batch says of the figure: ``n`` figures less ``n - 1`` figures without that batch."""
+    """Contribution of each batch to the figure: ``n`` figures less ``n - 1`` figures without that batch."""
     count = len(moments)
     return count * figure(total) - (count - 1) * figure(total - moments)
 

@@ -1,32 +1,29 @@
-"""Figures of a scene with their error bars: where the transient ends, whether what is counted has settled, what slow change may add to
-its errors, and what is to be said about these.
+"""Figures of a scene with their error bars: end of the transient, drift, slow change, and notes on large errors.
 
-The transient is found by MSER-5 on the mean of the replicates.
-The marginal standard error rule (White 1997, *Simulation* 69, 323; MSER-5: White, Cobb and Spratt 2000) drops the head
-of the series without which the rest has the smallest standard error of its mean, on means of five batches and over
-at most half of the run. Replicates are averaged first (Welch 1983), which leaves the transient and lowers the noise. On
-stationary noise the rule would still drop a little; so a head counts as a transient only if its mean differs from that
-of the rest beyond their scatter.
+MSER-5 on the mean of the replicates finds the transient. The marginal standard error rule (White 1997, *Simulation* 69, 323;
+MSER-5: White, Cobb and Spratt 2000) works on means of five batches. It drops the head of the series, at most half of the
+run, without which the rest has the smallest standard error of its mean. Averaging the replicates first (Welch 1983) keeps the
+transient and lowers the noise. On stationary noise the rule would still drop a little. So a head counts as a transient only
+if its mean differs from that of the rest beyond their scatter.
 
-Cages have slow regimes: loose ones change the way they whirl over 20 to 400 shaft turns, jumping at random moments, so no
-curve fitted to a start shows where it leads. What can be tested is whether the counted turns drift. Each replicate
-gives one difference between the figure of the later half and that of the earlier half; replicates are independent,
-so Student's t of these differences needs no memory of the series (Heidelberger and Welch 1983, *Operations Research* 31,
-1109, test a single series against its spectrum). The test is made on each figure and on the mean speed of the cage's
-centre, which shows a change of regime first. Its level is that of all figures together (Holm 1979, *Scandinavian Journal
-of Statistics* 6, 65): one settled run in twenty is lengthened in vain. A drift within the error of its figure, or below a
-hundredth of it, lengthens no run.
+Cages have slow regimes. Loose ones change the way they whirl over 20 to 400 shaft turns, at random moments, so no curve
+fitted to a start shows its limit. A test can show whether the counted turns drift. Each replicate gives the figure of its
+later half less that of its earlier half. Replicates are independent, so Student's t of these differences needs no memory of
+the series. Heidelberger and Welch (1983, *Operations Research* 31, 1109) test a single series against its spectrum. The test
+covers each figure and the mean speed of the cage's centre, which shows a change of regime first. Its level is that of
+all figures together (Holm 1979, *Scandinavian Journal of Statistics* 6, 65): one settled run in twenty is lengthened in
+vain. A drift within the error of its figure, or below a hundredth of it, lengthens no run.
 
-A drift d with standard error s that lengthens nothing still hides a bias. Of a transient that at least halves from one half
-to the next, the mean over both is off by at most 3 d/2. Where any figure is likelier than not to drift the transient is not
-over, and of every figure sqrt(d^2 + s^2) counts so; elsewhere what of d stands above its noise, max(|d| - s, 0). On seven
-scenes this holds the truth in 0.89 to 0.99 of 200 repeats of each figure; with max(|d| - s, 0) alone it does so in 0.33 of
-repeats where replicates scatter little.
+A drift d with standard error s that lengthens nothing still hides a bias. If a transient at least halves from one half to
+the next, the mean over both is off by at most 3 d/2. Where any figure is likelier than not to drift, the transient is not
+over, and sqrt(d^2 + s^2) of every figure counts so. Elsewhere the part of d above its noise counts, max(|d| - s, 0). On seven
+scenes the interval then holds the truth in 0.89 to 0.99 of 200 repeats of each figure. With max(|d| - s, 0) alone it does so
+in 0.33 of repeats where replicates scatter little.
 
-Some regimes last for good: of the replicates of the bearing of Chen et al. 2022 one in 25 ends in another one, at loose
-clearances one in 8. One that none of n replicates is in has a share of about 1/(n + 1) (Laplace's rule of succession);
-how far it may be away is gauged by the stretch of two impact windows, of any replicate, whose figure lies farthest from
-the mean of all. Their product counts too.
+Some regimes last for good. Of the replicates of the bearing of Chen et al. 2022 one in 25 ends in another one, at loose
+clearances one in 8. A regime without any of n replicates has a share of about 1/(n + 1) (Laplace's rule of succession). Its
+distance is estimated by the stretch of two impact windows, of any replicate, with the figure farthest from the mean of all.
+The product of both counts too.
 """
 
 import math
@@ -43,18 +40,18 @@ from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
 GROUP = 5
-# Means of five batches without which nothing can be said.
+# Fewer means of five batches show no transient.
 FEWEST_GROUPS = 8
-# Standard errors by which the mean of a head must differ: the head is the worst of many, so more than the usual two or three.
+# Standard errors by which the mean of a head must differ: more than the usual two or three, since it is the worst of many.
 SIGNIFICANT = 4.0
-# Replicates from which their differences are tested as such; fewer are tested by batch means.
+# From so many replicates on their differences are tested; fewer are tested by batch means.
 FEWEST_REPLICATES = 3
-# Share of settled runs of which any figure seems to drift: of those that are lengthened, and of those whose errors count all
-# of a drift, which costs no turn.
+# Share of settled runs in which a figure seems to drift: of those that are lengthened, and of those whose errors count the
+# whole drift, which costs no turn.
 FALSE_ALARMS, DOUBT = 0.05, 0.3
 # Drift of a figure, over the figure, for which no run is lengthened.
 NEGLIGIBLE = 1e-2
-# Impact windows that make a stretch.
+# Impact windows in a stretch.
 STRETCH = 2
 # Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2.
 BIAS_OF_DRIFT = 1.5
@@ -66,7 +63,7 @@ def find_transient(series: Array) -> int | None:
     if groups < FEWEST_GROUPS:
         return None
     means = series[: groups * GROUP].reshape(groups, GROUP).mean(axis=1)
-    # Means and variances of all tails at once, about the mean lest digits cancel.
+    # Means and variances of all tails at once, about the mean so that digits do not cancel.
     tails = (means - means.mean())[::-1]
     count = np.arange(1, groups + 1)
     mean = np.cumsum(tails) / count
@@ -96,8 +93,10 @@ def series_of(runs: Runs) -> dict[str, Array]:
 
 
 class Start(NamedTuple):
-    """Where counting starts: batch, transient found in the whole run [shaft turns] (None where the run is too short or
-    follows a schedule), and what a result has to say about both."""
+    """Batch at which counting starts, transient of the whole run [shaft turns], and notes for the result.
+
+    ``turns``: None where the run is too short to show it or follows a schedule.
+    """
 
     first: int
     turns: float | None
@@ -105,26 +104,26 @@ class Start(NamedTuple):
 
 
 def start_of_counting(scene: Scene, runs: Runs) -> Start:
-    """Where to start counting, as ``numerics.discard_turns`` asks: after so many turns, or after the transient."""
+    """Where counting starts: after ``numerics.discard_turns``, or after the transient where that is "auto"."""
     numerics, run = scene.numerics, runs[0]
     if scene.operation.schedule is not None:
         return Start(run.first, None, ())
-    known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
-    transient = max(known, default=None)  # the longest; None where the run is too short to decide
+    transients = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
+    transient = max(transients, default=None)  # the longest; None where the run is too short to decide
     if transient is None:
         fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
         note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"
         return Start(run.first, None, (note,))
     turns = round(float(run.durations[:transient].sum()) / scene.turn_s, 6)
     if numerics.discard_turns == "auto":
-        # An impact window at least must be left to count.
+        # At least one impact window counts.
         first = min(transient, len(run.durations) - run.per_window)
         return Start(first, turns, ())
     return Start(run.first, turns, ())
 
 
 def _largest(force: int) -> Figure:
-    """Mean of the largest load of each batch: of impact windows a run may hold one or two."""
+    """Mean of the largest load of each batch, since a run may have only one or two impact windows."""
     return Figure(
         lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], mean
     )
@@ -142,8 +141,10 @@ TESTED = {
 
 
 class Drift(NamedTuple):
-    """Later half of the counted part less the earlier one: mean over the replicates, its standard error, the degrees of
-    freedom of that, and the size of the figure."""
+    """Later half of the counted part less the earlier one: mean over replicates, standard error, degrees of freedom of that.
+
+    ``figure``: size of the figure.
+    """
 
     size: float
     error: float
@@ -158,14 +159,13 @@ class Drift(NamedTuple):
         return student_chance(self.size / self.error, self.freedom) if self.error > 0.0 else 0.0
 
     def bias(self, moving: bool) -> float:
-        """What the drift leaves in the mean of both halves: where the figures are ``moving`` all that it may be, elsewhere
-        what of it stands above its noise."""
-        seen = math.hypot(self.size, self.error) if moving else max(abs(self.size) - self.error, 0.0)
-        return BIAS_OF_DRIFT * seen
+        """Bias of the mean of both halves: by the whole drift where figures are ``moving``, elsewhere by its part above noise."""
+        drift = math.hypot(self.size, self.error) if moving else max(abs(self.size) - self.error, 0.0)
+        return BIAS_OF_DRIFT * drift
 
 
 def drift_of(figure: Figure, runs: Runs) -> Drift | None:
-    """Drift of a figure over what is counted; None where that is too short to decide."""
+    """Drift of a figure over the counted turns; None where they are too few to decide."""
     moments = [figure.moments(run) for run in runs]
     rows = min(len(part) for part in moments)
     half = rows // 2
@@ -197,14 +197,14 @@ def significant_drifts(runs: Runs, false_alarms: float) -> dict[Figure, Drift]:
 
 
 def drifting(runs: Runs) -> bool:
-    """Whether any figure may still drift, so that the errors of all have to hold it."""
+    """Whether any figure may still drift, so that the errors of all must cover it."""
     return bool(significant_drifts(runs, DOUBT))
 
 
 def worth_lengthening(runs: Runs, since: int) -> bool:
     """Whether a figure drifts by more than a hundredth of it and than its error without the drift.
 
-    ``since``: batch from which the runs show what regimes there are.
+    ``since``: batch from which the runs show their regimes.
     """
     return any(
         abs(drift.size) > max(NEGLIGIBLE * drift.figure, _settled_error(figure, runs, since))
@@ -219,7 +219,7 @@ def _settled_error(figure: Figure, runs: Runs, since: int) -> float:
 
 
 def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
-    """What a regime in which no replicate is counted may add to the mean, gauged by all stretches from batch ``since`` on."""
+    """Effect on the mean of a regime that no counted replicate is in, estimated by all stretches from batch ``since`` on."""
     counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
     middle, farthest = float(figure.of_sums(counted)), 0.0
     for run in runs:
@@ -232,7 +232,7 @@ def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
 
 
 def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, moving: bool) -> float:
-    """Half-width that slow change adds to a figure of steady runs: drift left over and regimes unseen, as root sum of squares.
+    """Half-width that slow change adds to a figure of steady runs: drift and unseen regimes, as root sum of squares.
 
     ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
     """
@@ -249,7 +249,7 @@ FIGURES = {
     "cage_speed_rpm": (metrics.CAGE_SPEED, 30.0 / math.pi),
     "cage_slip": (metrics.CAGE_SLIP, 1.0),
 }
-# A slip near nothing has no relative error worth a word; the cage speed shows it.
+# A slip near zero has no useful relative error; the cage speed shows it.
 JUDGED = {
     "impact_force_N": "impact force",
     "whirl_deviation_ratio": "whirl deviation ratio",
@@ -258,14 +258,14 @@ JUDGED = {
 }
 # Fewer effective samples leave the half-width itself uncertain by a quarter and more.
 FEW_SAMPLES = 10.0
-# Numerical errors that are said: beyond a twentieth of the value, or beyond a hundredth where they rule the sum.
+# Numerical errors in the notes: above a twentieth of the value, or above a hundredth where they dominate the sum.
 LARGE, NOTICEABLE = 0.05, 0.01
 # Companions tighter than the run let scatter alone make the numerical error up to two and a half times the statistical one.
 RULES = 3.0
 
 
 def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Replicate], list[Replicate], Start]:
-    """Replicates and companions counted from where the scene asks, and where that is."""
+    """Replicates and companions, counted from the start of counting, and that start."""
     start = start_of_counting(scene, runs)
     ours, theirs = ([run.counted_from(start.first) for run in series] for series in (runs, companions))
     return ours, theirs, start
@@ -274,9 +274,10 @@ def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Re
 def quantities(
     scene: Scene, runs: Runs, companions: Runs, share: float, since: int | None = None
 ) -> dict[str, Quantity]:
-    """Every figure with its errors, by the name it has in a record.
+    """Every figure with its errors, by its name in a record.
 
-    ``share`` of the difference from the companions is the bias of the runs. ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.
+    ``share`` of the difference from the companions is the bias of the runs. ``since``: batch from which the replicates show
+    their regimes; unless given, that from which they count.
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
@@ -290,7 +291,7 @@ def quantities(
 def error_notes(
     scene: Scene, figures: dict[str, Quantity], fault: str | None, tighter: float | None = None
 ) -> list[str]:
-    """Sentences on errors that are large or themselves uncertain, each with its fix.
+    """Notes on errors that are large or uncertain, each with its fix.
 
     ``tighter``: the tolerance that removes a numerical error; a tenth of the scene's unless given.
     """
@@ -298,8 +299,10 @@ def error_notes(
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
-        what = f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples"
-        notes.append(f"{what} stand behind it ({listed}); raise numerics.turns or numerics.replicates")
+        notes.append(
+            f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it ({listed}); "
+            "raise numerics.turns or numerics.replicates"
+        )
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name], tighter))]
 
 
@@ -314,7 +317,11 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | 
     biased = error > RULES * (figure.statistical_error or 0.0)
     if error <= (NOTICEABLE if biased else LARGE) * size:
         return None
-    rtol = scene.numerics.rtol
-    longer = "it is mostly scatter, so raise numerics.turns or numerics.replicates"
-    fix = f"tighten numerics.rtol = {rtol:g} to {tighter or 0.1 * rtol:.1g}" if biased else longer
-    return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {fix}"
+    rtol, percent = scene.numerics.rtol, f"{100.0 * error / size:.2g} %"
+    if biased:
+        tolerance = f"{tighter or 0.1 * rtol:.1g}"
+        return f"numerical error: {name} may be off by {percent}; tighten numerics.rtol = {rtol:g} to {tolerance}"
+    return (
+        f"numerical error: {name} may be off by {percent}; it is mostly scatter, so raise numerics.turns or "
+        "numerics.replicates"
+    )

@@ -1,23 +1,37 @@
-"""From what one replicate kept, batch by batch, to the figures that are reported.
+"""From the batches of replicates to figures: impact, whirl, power loss, cage speed, slip and orbit, with their numerical errors.
 
-Numerical error of a statistic: a comparison with companions, a share of the replicates at another tolerance.
+Orbit of the cage: the whirl deviation ratio is one of speeds and does not show how far the cage moves. Rollers and film
+press most cages to one place of their land, where the centre trembles. The radius of the orbit is the root mean square
+distance of the centre from its mean place in each replicate. A circle about the guide has its own radius; a cage that rests
+off the middle has none.
 
-Chaos makes two runs from one start independent within a turn or so (correlations of pairs scatter about zero), so the
-mean of all replicates is set against the mean of the companions, unpaired. A companion at a tenth of the tolerance is
-dear, and the difference drowns in its noise. At ten times the tolerance it is cheap, and the bias is at least ten times
-as large: from rtol 0.1 to 0.01 the impact of the bearing of Chen et al. 2022 goes from -0.57 to -0.05 +- 0.12 %, its whirl
-from -4.0 to +0.1 +- 0.4 %, its loss from +0.025 to 0.000 +- 0.008 %. Of a difference d with the 95 % half-width w the bias
-left at the tolerance of the run is d / 9 (Richardson, first order), known to w / 9; both count, as root sum of squares.
-Where stability rules the steps, companions resolve more, and 10 d / 9 counts (``rbdyn.dynamics.companions``).
-Companions scatter as the replicates do, and there are too few of them to decide: w is the half-width of the replicates
-times sqrt(1 + n/m), for n turns counted of these and m of companions.
+Numerical error: companions are a share of the replicates at another tolerance. Chaos makes two runs from one start
+independent within a turn or so (correlations of pairs scatter about zero). So the mean of all replicates is compared with
+the mean of the companions, unpaired. A companion at a tenth of the tolerance is expensive, and its noise exceeds the
+difference. At ten times the tolerance it is cheap, and the bias is at least ten times as large. From rtol 0.1 to 0.01 the
+impact of the bearing of Chen et al. 2022 goes from -0.57 to -0.05 +- 0.12 %. Its whirl goes from -4.0 to +0.1 +- 0.4 %, its
+loss from +0.025 to 0.000 +- 0.008 %. Let d be the difference and w its 95 % half-width. The bias at the tolerance of the
+run is d/9 (Richardson, first order), known to w/9; both count, as root sum of squares. There are too few companions for a
+scatter of their own: w is the half-width of the replicates times sqrt(1 + n/m), for n turns counted of these and m of
+companions. The power loss also has the error that the power balance shows: input less losses less change of energy.
+Integration errors act as one more loss that no law books, and they leave the input unchanged.
 
-To the error of the power loss comes, likewise, what the power balance misses: input less losses less change of energy,
-since integration errors act as one more loss that no law books and leave the input as it is.
+Companions at a looser tolerance do not show the bias of a step that stability limits, for it is the same there. Such a step
+hurts in slow bearings. Rollers outside the load zone lie on the outer race by their centrifugal force alone, and jump on
+it. A method damps this vibration of frequency omega by (h omega)^5/C a radian. C follows from its stability function, for
+which |R(i x)| is 1 - x^6/C (Hairer and Wanner, Solving ODEs II, IV.2). It is 144 for Kutta's pair, 3600 for Dormand and
+Prince's, and 11 500 for RODAS4, which damps less where x is above 1.
 
-Orbit of the cage: the whirl deviation ratio is one of speeds and says nothing of how far the cage moves. Rollers and film press
-most cages to one place of their land, where the centre trembles. The radius of the orbit is the root mean square distance of the centre
-from its mean place in each replicate: a circle about the guide has its own radius, a cage that rests off the middle none.
+This damping matters in comparison with that of the race, which light contacts hardly engage. At 2000 rpm and 4 kN the
+bearing of Chen et al. 2022 has a damping ratio of 4.9e-4 there. Its loss rises with the logarithm of the damping: by 1.5 %
+a decade from 2e-5 to 2e-3, by 0.4 +- 0.4 % below, and hardly beyond. It does not matter whether law or method damps: the
+loss rises by 1.2 % at a numerical damping ratio of 8e-3, by 0.5 % at 6e-4, and by 0.08 % at 2e-5 to 7e-5. So companions of
+such runs take shorter steps, which leave a tenth of this bias, and 10 d/9 counts.
+
+Filtered whirl: a rig and a run give the speed of the cage's centre from samples of its place. At high frequencies such a
+speed is mostly noise, so it exists only below a cutoff. A cubic spline gives the velocity, with an error of 0.1 % at the
+cutoff for ten samples a period. Butterworth's low pass of fourth order runs over it forward and backward: no delay, half
+the amplitude at the cutoff. Runout turns with cage or shaft. Notches remove it, and any whirl that is as fast.
 """
 
 import math
@@ -27,34 +41,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate
 from rbdyn.result import JITTER, Quantity
 from rbdyn.scene import Scene
-
-FACTOR = 10.0
-# The loosest tolerance that a scene may have; beyond it the power balance no longer shows anything.
-LOOSEST = 0.1
-
-
-def companion_tolerance(rtol: float) -> float:
-    """Tolerance of the companions: ten times looser, or ten times tighter where that would be too loose."""
-    return FACTOR * rtol if FACTOR * rtol <= LOOSEST * (1.0 + 1e-9) else rtol / FACTOR
-
-
-def bias_scale(rtol: float) -> float:
-    """Bias of replicates at ``rtol`` over their difference from companions."""
-    return 1.0 / (FACTOR - 1.0) if companion_tolerance(rtol) > rtol else FACTOR / (FACTOR - 1.0)
-
-
-def companion_error(ours: Estimate, theirs: float, times_fewer: float, share: float) -> float | None:
-    """95 % bound of the bias of ``ours``: the ``share`` of its difference from companions with so many times fewer turns;
-    None where ours has no half-width."""
-    if ours.half_width is None:
-        return None
-    return share * math.hypot(ours.value - theirs, ours.half_width * math.sqrt(1.0 + times_fewer))
-
 
 SLOWEST_CAGE = 1e-6  # [rad/s]
 
@@ -64,11 +56,16 @@ class Replicate:
     """One run in batches. Times in s, works and energies in J, loads in N, angles in rad.
 
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
-    impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``orbit``: samples, sums of the
-    centre's places x, y and of x^2 + y^2; ``work``: integrals of the loss powers, of those that come in by shafts and loads,
-    and of the rolling resistance of the inner race; ``largest``: loads; ``energy``: kinetic, elastic and
-    load energy together at the ends of batches; ``energy_scale``: contact load times approach;
-    ``stiffness``: as in ``runge_kutta.Carry``; ``decay_rates``: (states, motions) as in ``relaxation`` [1/s].
+    impact window.
+
+    - ``whirl``: samples, sum and sum of squares of the speed of the cage's centre
+    - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
+    - ``work``: integrals of the powers in the order of ``equations.LOSSES`` and what follows there
+    - ``largest``: loads in the order of ``equations``
+    - ``energy``: kinetic, elastic and potential energy together, at the ends of batches
+    - ``energy_scale``: load of a contact times its approach
+    - ``stiffness``: as in ``advance.Carry``
+    - ``decay_rates``: (states, motions) as in ``recording.Linearised`` [1/s]
     """
 
     first: int
@@ -164,7 +161,7 @@ class Replicate:
 
 
 class Figure(NamedTuple):
-    """A figure as a function of sums over batches (or impact windows), so that any set of batches has one.
+    """A figure as a function of sums over batches (or impact windows), so that any set of batches has one value.
 
     ``moments``: (batches, sums) of the counted part of a replicate; ``of_sums``: from sums on the last axis.
     """
@@ -174,25 +171,25 @@ class Figure(NamedTuple):
 
 
 def mean(sums: Array) -> Array:
-    """Mean of what was summed, weighted by the first sum."""
+    """Second sum over the first: a mean over samples, windows or time."""
     return sums[..., 1] / sums[..., 0]
 
 
 def _deviation_ratio(sums: Array) -> Array:
     """Standard deviation over mean (Ghaisas et al. 2004); 0 for a cage at rest."""
     samples, total, squares = np.moveaxis(sums, -1, 0)
-    known = (samples > 1.5) & (total > 0.0)
-    samples, total = np.where(known, samples, 2.0), np.where(known, total, 1.0)
+    defined = (samples > 1.5) & (total > 0.0)
+    samples, total = np.where(defined, samples, 2.0), np.where(defined, total, 1.0)
     mean = total / samples
     variance = np.maximum(squares / samples - mean**2, 0.0) * samples / (samples - 1.0)
-    return np.where(known, np.sqrt(variance) / mean, 0.0)
+    return np.where(defined, np.sqrt(variance) / mean, 0.0)
 
 
 def _slip(sums: Array) -> Array:
-    """0 where counter-rotation leaves the cage no speed to fall behind."""
+    """1 - angle of the cage over its kinematic angle; 0 where counter-rotation leaves no kinematic speed."""
     duration, rolling, turned = np.moveaxis(sums, -1, 0)
-    known = np.abs(rolling) > SLOWEST_CAGE * duration
-    return np.where(known, 1.0 - turned / np.where(known, rolling, 1.0), 0.0)
+    defined = np.abs(rolling) > SLOWEST_CAGE * duration
+    return np.where(defined, 1.0 - turned / np.where(defined, rolling, 1.0), 0.0)
 
 
 def _windowed(force: int) -> Callable[[Replicate], Array]:
@@ -222,7 +219,7 @@ ORBIT_RADIUS = Figure(_about_its_place, lambda sums: np.sqrt(sums[..., 1] / np.m
 
 
 def mean_gap(runs: Sequence[Replicate]) -> float:
-    """Size of the mean relative gap of the power balance: what is left of it when replicates are averaged."""
+    """Size of the relative gap of the power balance, averaged over replicates with its sign."""
     return abs(sum(run.signed_power_gap for run in runs)) / len(runs)
 
 
@@ -242,10 +239,9 @@ Runs = Sequence[Replicate]
 def quantity(figure: Figure, runs: Runs, companions: Runs, share: float, slow: float, unit: float = 1.0) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
-    Statistical: batch means over all replicates (``rbdyn.dynamics.statistics.batch_means``) and, as root sum of squares, the
-    half-width ``slow`` of what changes slowly (``rbdyn.dynamics.statistics.error_bars``). Numerical: the ``share`` of the
-    difference from companions, and of the power loss what the power balance misses (``rbdyn.dynamics.statistics.metrics``). None where it was not
-    estimated.
+    Statistical: batch means over all replicates (``batch_means``) and, as root sum of squares, the half-width ``slow`` of slow
+    changes (``error_bars``). Numerical: the ``share`` of the difference from companions, and for the power loss also the gap
+    of the power balance. None where it was not estimated.
     """
     ours = estimate([figure.moments(run) for run in runs], figure.of_sums)
     statistical = None if ours.half_width is None else math.hypot(ours.half_width, slow)
@@ -262,7 +258,7 @@ def quantity(figure: Figure, runs: Runs, companions: Runs, share: float, slow: f
 
 
 def orbit_radius_share(scene: Scene, runs: Runs, companions: Runs, share: float) -> Quantity | None:
-    """Radius of the cage's orbit over its radial play, with errors as of any figure; None for a cage without a play.
+    """Radius of the cage's orbit over its radial play, with its errors; None for a cage without a play.
 
     ``share`` of the difference from the companions is the bias of the runs.
     """
@@ -273,10 +269,163 @@ def orbit_radius_share(scene: Scene, runs: Runs, companions: Runs, share: float)
 
 
 def whirl_notes(scene: Scene, share: Quantity | None) -> tuple[str, ...]:
-    """A note where the whirl deviation ratio is that of a jitter."""
+    """A note where the whirl deviation ratio shows a jitter, no whirl."""
     play = scene.cage_play_m
     if share is None or play is None or share.value >= JITTER:
         return ()
-    where = "radial play in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
-    what = "whirl deviation ratio: that of a jitter, for the cage does not whirl"
-    return (f"{what}; its orbit has a radius of {1e6 * play * share.value:.2g} um, {share.value:.2g} of the {where}",)
+    clearance = "radial play in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
+    return (
+        "whirl deviation ratio: that of a jitter, for the cage does not whirl; its orbit has a radius of "
+        f"{1e6 * play * share.value:.2g} um, {share.value:.2g} of the {clearance}",
+    )
+
+
+FACTOR = 10.0
+# The loosest tolerance that a scene may have; beyond it the power balance no longer shows anything.
+LOOSEST = 0.1
+
+
+def companion_tolerance(rtol: float) -> float:
+    """Tolerance of the companions: ten times looser, or ten times tighter where that would be too loose."""
+    return FACTOR * rtol if FACTOR * rtol <= LOOSEST * (1.0 + 1e-9) else rtol / FACTOR
+
+
+def bias_scale(rtol: float) -> float:
+    """Bias of replicates at ``rtol`` over their difference from companions."""
+    return 1.0 / (FACTOR - 1.0) if companion_tolerance(rtol) > rtol else FACTOR / (FACTOR - 1.0)
+
+
+def companion_error(ours: Estimate, theirs: float, times_fewer: float, share: float) -> float | None:
+    """95 % bound of the bias of ``ours``: the ``share`` of its difference from companions with so many times fewer turns.
+
+    None where ours has no half-width.
+    """
+    if ours.half_width is None:
+        return None
+    return share * math.hypot(ours.value - theirs, ours.half_width * math.sqrt(1.0 + times_fewer))
+
+
+# C of each method, see above.
+DAMPING_SCALE = {"rk45": 3600.0, "rk43": 144.0, "rosenbrock": 11_500.0}
+# Numerical damping of a light contact, over that of the race, above which it counts.
+NOTABLE_DAMPING = 0.2
+# Damping ratios between which the loss depends on them most. Below them something else ends the jumps; above them rollers
+# hardly jump.
+LEAST_DAMPING, MOST_DAMPING = 2e-5, 2e-3
+# Tolerance, over that of runs whose steps stability limits, that itself makes the steps short enough.
+TIGHT = 1e-4
+
+
+class Companions(NamedTuple):
+    """How companions are integrated: tolerance, method, longest step [s].
+
+    ``share`` of the difference between runs and companions is the bias of the runs.
+    """
+
+    rtol: float
+    method: str
+    longest_step: float
+    share: float
+
+    @property
+    def resolve_more(self) -> bool:
+        """Whether their steps are shorter than their tolerance requires."""
+        return math.isfinite(self.longest_step)
+
+
+def usual_companions(scene: Scene) -> Companions:
+    """Companions of runs whose steps the tolerance limits."""
+    numerics = scene.numerics
+    return Companions(companion_tolerance(numerics.rtol), numerics.method, math.inf, bias_scale(numerics.rtol))
+
+
+def companions_of(scene: Scene, runs: Sequence[Replicate]) -> Companions:
+    """Companions of these runs, by the steps that they took."""
+    light = light_contact(scene)
+    if light is None:
+        return usual_companions(scene)
+    damping, method = max(
+        (numerical_damping(light, mean_step(runs, one), one), one) for one in {run.method for run in runs}
+    )
+    race = max(light.damping, LEAST_DAMPING)
+    if damping <= NOTABLE_DAMPING * race:
+        return usual_companions(scene)
+    step = longest_step(light, resolved_damping(damping, race), method)
+    return Companions(scene.numerics.rtol / FACTOR, method, step, FACTOR / (FACTOR - 1.0))
+
+
+def resolved_damping(damping: float, race: float) -> float:
+    """Numerical damping ratio that leaves 1/FACTOR of the bias that ``damping`` adds to the damping ``race`` of the race.
+
+    The bias grows with the logarithm of their sum.
+    """
+    return race * math.expm1(math.log1p(min(damping, max(MOST_DAMPING, NOTABLE_DAMPING * race)) / race) / FACTOR)
+
+
+def mean_step(runs: Sequence[Replicate], method: str) -> float:
+    """Mean step [s] of the runs by a method."""
+    own = [run for run in runs if run.method == method]
+    return sum(float(run.durations.sum()) for run in own) / sum(run.accepted_steps for run in own)
+
+
+def numerical_damping(light: LightContact, step: float, method: str) -> float:
+    """Damping ratio that steps [s] of a method add to a light contact, at most."""
+    return (step * light.frequency) ** 5 / DAMPING_SCALE[method]
+
+
+def longest_step(light: LightContact, damping: float, method: str) -> float:
+    """Step [s] of a method that adds so large a damping ratio."""
+    return float((damping * DAMPING_SCALE[method]) ** 0.2 / light.frequency)
+
+
+ORDER = 4
+# Centre over width of a notch: it removes what turns within 5 % of the frequency, since cage speeds vary so much.
+NOTCH_QUALITY = 10.0
+# A notch this many times above the cutoff has nothing to remove.
+NOTCH_REACH = 2.0
+# Fewer periods of a notch in a record look like slow motion, and its filter rings to the end.
+NOTCH_PERIODS = 10.0
+# Periods of the cutoff at either end where the filter, which sees one side, passes fast motion. At 1 kHz it gives three times
+# the speed of the bearing of Chen et al. 2022 in the last sample, and errs by less than a hundredth two periods before.
+ENDS = 2.0
+
+
+def filtered_speed(place: Array, rate: float, cutoff: float, notches: Sequence[float]) -> Array:
+    """Speed (samples,) [m/s] of a point at ``place`` (2, samples) [m], sampled at ``rate``, below ``cutoff`` [Hz].
+
+    It has no motion at those frequencies ``notches`` [Hz] that have ``NOTCH_PERIODS`` in the record. The ends get the speeds
+    next to them, mirrored. Zero for fewer than two samples.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import butter, iirnotch, sosfiltfilt, tf2sos
+
+    samples = place.shape[1]
+    if samples < 2:
+        return np.zeros(samples)
+    slowest = NOTCH_PERIODS * rate / samples
+    removable = [frequency for frequency in notches if slowest <= frequency < NOTCH_REACH * cutoff]
+    sections = [
+        butter(ORDER, cutoff, fs=rate, output="sos"),
+        *(tf2sos(*iirnotch(frequency, NOTCH_QUALITY, fs=rate)) for frequency in removable),
+    ]
+    # Reflected at the ends as far as the memory of the slowest part: velocities, since fast motion makes places step there.
+    memory = rate / min([cutoff, *(frequency / NOTCH_QUALITY for frequency in removable)])
+    reflected = min(samples - 1, int(memory))
+    times = np.arange(samples) / rate
+    velocity = CubicSpline(times, place, axis=1)(times, 1)
+    speed = np.hypot(*sosfiltfilt(np.concatenate(sections), velocity, axis=1, padtype="even", padlen=reflected))
+    end = min(round(ENDS * rate / cutoff), samples // 2)
+    speed[:end] = speed[end : 2 * end][::-1]
+    speed[samples - end :] = speed[samples - 2 * end : samples - end][::-1]
+    return speed
+
+
+def sums_until(moments: Array, ends: Sequence[int] | Whole) -> Array:
+    """Sums (parts, m) of ``moments`` (m, samples) over parts that end before the samples ``ends``."""
+    total = np.concatenate([np.zeros((len(moments), 1)), np.cumsum(moments, axis=1)], axis=1)
+    return np.diff(total[:, [0, *ends]], axis=1).T
+
+
+def speed_sums(speed: Array, ends: Sequence[int]) -> Array:
+    """Samples, sum and sum of squares of the speed, as ``Replicate.whirl``, over parts as in ``sums_until``."""
+    return sums_until(np.stack([np.ones_like(speed), speed, speed * speed]), ends)

@@ -1,41 +1,41 @@
-"""One ball: its raceway control, its orbit and spin, the forces on it and on the inner ring from it, with their derivatives
-(Jones 1960; Harris, *Rolling Bearing Analysis*).
+"""One ball: raceway control, orbit and spin, its forces and those on the inner ring, all with their derivatives.
 
-Raceway control: which race a ball spins on, and who takes its gyroscopic moment.
+Sources: Jones, A general theory for elastically constrained ball and radial roller bearings (1960); Harris, *Rolling Bearing Analysis*.
 
-A ball cannot roll without spin on both races. Let its spin moments be proportional to spin speed with weights w_i and
-w_o: their balance is linear in the pitch angle beta of the ball's axis,
+Raceway control decides on which race a ball spins and how the races share its gyroscopic moment. A ball cannot roll without
+spin on both races. Each spin moment is the spin speed times a weight, w_i or w_o. Their balance is linear in the tangent of
+the pitch angle b of the ball's axis:
 
-    tan beta = [w_o sin a_o/P + w_i sin a_i/N] / [w_o (cos a_o + g)/P + w_i (cos a_i - g)/N],
-    P = 1 + g cos a_o,  N = 1 - g cos a_i,  g = D/d_m.
+    tan b = rise/run;
+    rise = w_o sin a_o/P + w_i sin a_i/N;
+    run = w_o (cos a_o + g)/P + w_i (cos a_i - g)/N;
+    P = 1 + g cos a_o;  N = 1 - g cos a_i;  g = D/d_m.
 
-w_i = 0 is Jones's outer raceway control, w_o = 0 inner control, equal weights share evenly; with the friction moments
-w = Q a E(k) of a Hertz ellipse (up to a common factor) it is the friction-weighted hybrid. The friction forces that take
-the gyroscopic moment are shared alike: lambda_i = 2 s, lambda_o = 2 (1 - s) with s = w_i/(w_i + w_o).
+w_i = 0 is Jones's outer raceway control, w_o = 0 inner control; equal weights share evenly. The friction-weighted hybrid
+takes the friction moments of the Hertz ellipses, w = Q a E(k). The friction forces that balance the gyroscopic moment are
+shared by the same weights: lambda_i = 2 s, lambda_o = 2 (1 - s) with s = w_i/(w_i + w_o). The simplest hypothesis has one
+common cage speed and no gyroscopic moment.
 
-One common cage speed with no gyroscopic moment is the hypothesis without any of this.
+Orbit w_m, spin w_R, centrifugal force F_c and gyroscopic moment M_g follow from rolling without slip at both contacts:
 
-Orbit and spin of a ball that rolls on both races: centrifugal force and gyroscopic moment with their derivatives.
+    K = N cos(a_o - b) + P cos(a_i - b);
+    w_m = [w_in N cos(a_o - b) + w_out P cos(a_i - b)] / K;
+    w_R = (w_out - w_in) N P / (g K);
+    F_c = m d_m w_m^2/2;  M_g = J w_R w_m sin b.
 
-Rolling without slip at both contacts (Harris, *Rolling Bearing Analysis*), pitch angle beta by ``control``:
+Numerators and denominators have the same degree in (cos b, sin b), so no angle is computed. w_R is positive where the outer
+ring turns faster. With a turning inner ring M_g is therefore negative. Many texts drop this sign; friction then pushes the
+ball the other way.
 
-    w_m = [w_in N cos(a_o - b) + w_out P cos(a_i - b)] / [N cos(a_o - b) + P cos(a_i - b)],
-    w_R = (w_out - w_in) N P / (g [N cos(a_o - b) + P cos(a_i - b)]),
-    F_c = m d_m w_m^2/2,  M_g = J w_R w_m sin b.
+Balance of a ball, with the friction forces T = lambda M_g/D:
 
-Numerators and denominators are of one degree in (cos b, sin b), so no angle is ever computed. w_R counts positive where
-the outer ring turns faster: with the inner ring turning M_g is negative, and the friction that balances it pushes the ball
-the other way than where the sign is dropped, as many texts do.
+    axial   Q_i sin a_i - Q_o sin a_o
+            - T_i cos a_i + T_o cos a_o = 0,
+    radial  Q_i cos a_i - Q_o cos a_o
+            + T_i sin a_i - T_o sin a_o + F_c = 0.
 
-Forces on one ball and on the inner ring from it, with their derivatives (Jones 1960; Harris, *Rolling Bearing Analysis*).
-
-With T = lambda M_g/D the friction forces that take the gyroscopic moment:
-
-    axial   Q_i sin a_i - Q_o sin a_o - T_i cos a_i + T_o cos a_o = 0,
-    radial  Q_i cos a_i - Q_o cos a_o + T_i sin a_i - T_o sin a_o + F_c = 0;
-
-on the ring: axial Q_i sin a_i - T_i cos a_i, radial Q_i cos a_i + T_i sin a_i, and the couple f_i D T_i of the friction about
-the groove centre.
+The ball puts on the ring the axial force Q_i sin a_i - T_i cos a_i and the radial force Q_i cos a_i + T_i sin a_i. Friction
+adds the couple f_i D T_i about the groove centre.
 """
 
 import math
@@ -45,12 +45,12 @@ from rbdyn.compiled.kernel import kernel, law
 
 
 class Spinning(NamedTuple):
-    """What orbit and spin of a ball depend on besides its contact angles. SI.
+    """Parameters of the orbit and spin of a ball, next to its contact angles. SI.
 
     ``ratio``: g = D/d_m. ``orbit_mass``: half the ball's mass times the pitch diameter, F_c = orbit_mass w_m^2 [kg m].
-    ``inertia``: J of the ball [kg m^2], 0 where no gyroscopic moment is wanted. ``turning``: -1 keeps the sign of the ball's spin
-    for an inner ring that turns faster, +1 drops it. ``blend_load``: inner contact load [N] from which on a ball
-    follows the race control; unloaded it goes with the cage. ``friction``: largest coefficient that may hold a gyroscopic moment.
+    ``inertia``: J of the ball [kg m^2], 0 without a gyroscopic moment. ``turning``: -1 keeps the sign of the ball's spin
+    for an inner ring that turns faster, +1 drops it. ``blend_load``: inner contact load [N] above which the race control
+    rules the ball; an unloaded ball orbits with the cage. ``friction``: largest coefficient that may balance a gyroscopic moment.
     """
 
     ratio: float
@@ -78,8 +78,10 @@ class FixedShare(NamedTuple):
 
 
 class FrictionShare(NamedTuple):
-    """Weights from friction: ``inner_weight`` (a E/Q^(1/3)) K^(4/3) of the inner race over that of the outer, so that
-    w_i/w_o = inner_weight (delta_i/delta_o)^2."""
+    """Weights from friction, w_i/w_o = inner_weight (delta_i/delta_o)^2.
+
+    ``inner_weight``: (a E/Q^(1/3)) K^(4/3) of the inner race over that of the outer.
+    """
 
     inner_weight: float
     spinning: Spinning
@@ -92,7 +94,7 @@ Control = CommonCage | FixedShare | FrictionShare
 def orbit_and_spin(spinning: Any, share: float, ci: float, si: float, co: float, so: float) -> tuple[Any, Any]:
     """F_c [N] and M_g [N m] of a ball, each with its derivatives by inner angle, outer angle and inner ``share``.
 
-    Contact angles are given by cosine and sine. Returns ((F_c, by a_i, by a_o, by share), (M_g, ...)).
+    The contact angles enter by cosine and sine. Returns ((F_c, by a_i, by a_o, by share), (M_g, ...)).
     """
     g = spinning.ratio
     outer = 1.0 - share
@@ -143,9 +145,9 @@ def orbit_and_spin(spinning: Any, share: float, ci: float, si: float, co: float,
     return force, moment
 
 
-# Share of the friction limit up to which a contact holds all of a gyroscopic moment.
+# Share of the friction limit up to which a contact balances the whole gyroscopic moment.
 STICKING = 0.8
-# Cosine of the inner angle below which a ball begins to lie across the groove, where rolling on both races ends: 78 deg.
+# Cosine of the inner angle (78 deg) below which a ball lies across the groove, so that rolling on both races fades out.
 ACROSS = 0.2
 
 
@@ -158,7 +160,7 @@ def line(axial: float, radial: float) -> tuple[float, float, float]:
 
 @kernel
 def deflection(axial: float, radial: float, reach: float) -> float:
-    """How deep two bodies with centres (axial, radial) [m] apart touch; 0 where the contact is open."""
+    """Depth [m] of the contact of two bodies with centres (axial, radial) [m] apart; 0 where it is open."""
     return max(math.sqrt(axial * axial + radial * radial) - reach, 0.0)
 
 
@@ -177,17 +179,17 @@ def tangent(load: float, normal: float, inverse: float, s: float, c: float) -> t
 
 
 @kernel
-def gradually(part: float) -> tuple[float, float]:
-    """From 0 at 0 to 1 at 1 with no slope at either end, and the slope."""
+def smoothstep(part: float) -> tuple[float, float]:
+    """Smooth rise from 0 at 0 to 1 at 1 without slope at either end, and its slope."""
     part = min(part, 1.0)
     return part * part * (3.0 - 2.0 * part), 6.0 * part * (1.0 - part)
 
 
 @kernel
-def held(force: float, limit: float) -> tuple[float, float, float]:
-    """What a contact holds of a friction ``force`` where at most ``limit`` > 0 is possible, by force and by limit.
+def friction_force(force: float, limit: float) -> tuple[float, float, float]:
+    """Friction force [N] of a contact that needs ``force`` and can give at most ``limit`` > 0; its derivatives by both.
 
-    The whole force up to STICKING of the limit, then a smooth approach to the limit.
+    It is the whole force up to the share STICKING of the limit, then approaches the limit smoothly.
     """
     beyond = (abs(force) / limit - STICKING) / (1.0 - STICKING)
     if beyond <= 0.0:
@@ -219,16 +221,16 @@ def _by_friction(control: Any, inner_deflection: float, outer_deflection: float)
 
 
 @law
-def rules(control: Any) -> Any:
-    """Whether there is more to the equilibrium than one common cage speed."""
+def has_race_control(control: Any) -> Any:
+    """Whether the raceway control differs from one common cage speed."""
 
 
-@rules.body(CommonCage)
+@has_race_control.body(CommonCage)
 def _never(control: Any) -> bool:
     return False
 
 
-@rules.body(FixedShare, FrictionShare)
+@has_race_control.body(FixedShare, FrictionShare)
 def _always(control: Any) -> bool:
     return True
 
@@ -237,20 +239,21 @@ def _always(control: Any) -> bool:
 def ball_forces(
     control: Any, strength: float, row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
 ) -> Any:
-    """A ball with its centre at (x, y), the inner groove centre at (a_axial, a_radial), contacts ``di`` and ``do`` deep [m].
+    """Forces on a ball and on the ring, with their derivatives.
 
-    The depths are unknowns of their own: the lines between the centres give the angles only. Derivatives by place count a
+    The ball's centre is X = (x, y), the inner groove centre A = (a_axial, a_radial); the contacts are ``di`` and ``do`` deep [m].
+    The depths are separate unknowns: the lines between the centres give only the angles. Derivatives by position treat a
     change along a line as a change of depth.
 
-    ``strength``: 0 to 1, how far the race control rules orbit and moment; the rest is the common cage speed.
-    Returns (residual, ring, residual by A, residual by X, ring by A, ring by X): residual (axial, radial) [N]; ring
-    (axial, radial [N], couple [N m]); derivatives row by row [N/m, N]; then F_c [N], M_g [N m].
+    ``strength``: from 0, the common cage speed, to 1, the full race control of orbit and moment.
+    Returns (residual, ring, residual by A, residual by X, ring by A, ring by X, F_c [N], M_g [N m]). The residual is
+    (axial, radial) [N], the ring's part (axial, radial [N], couple [N m]); derivatives are row by row [N/m, N].
     """
 
 
 @kernel
 def elastic_forces(row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float) -> Any:
-    """What ``ball_forces`` returns for a ball that goes with the cage: springs and the common centrifugal force."""
+    """``ball_forces`` of a ball that orbits with the cage: contact springs and the common centrifugal force."""
     one_i, si, ci = line(a_axial - x, a_radial - y)
     one_o, so, co = line(x, y)
     qi, ki = spring(di, row.inner_stiffness)
@@ -276,19 +279,19 @@ def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do
 
 
 @kernel
-def steered(control: Any, strength: float, row: Any, inner: Any, outer: Any, di: float, do: float) -> Any:
-    """What the race control makes of a ball: F_c, the friction forces T_i and T_o [N], then M_g [N m].
+def race_control_forces(control: Any, strength: float, row: Any, inner: Any, outer: Any, di: float, do: float) -> Any:
+    """Centrifugal force F_c and friction forces T_i and T_o [N] by the race control, then M_g [N m].
 
-    The forces as (value, derivatives by inner angle, outer angle, inner depth, outer depth); ``inner, outer``: sine, cosine,
-    load and stiffness of the contacts.
+    Each force is (value, derivatives by inner angle, outer angle, inner depth, outer depth). ``inner, outer``: sine,
+    cosine, load and stiffness of the contacts.
     """
     (si, ci, qi, ki), (so, co, qo, ko) = inner, outer
     spinning = control.spinning
     share, share_i, share_o = spin_share(control, di, do)
     (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
-    # A lightly loaded ball, or one across the groove, goes with the cage; otherwise the race control alone rules.
-    loaded, loaded_q = gradually(qi / spinning.blend_load)
-    level, level_c = gradually(ci / ACROSS)
+    # A lightly loaded ball, or one across the groove, orbits with the cage; otherwise the race control alone rules.
+    loaded, loaded_q = smoothstep(qi / spinning.blend_load)
+    level, level_c = smoothstep(ci / ACROSS)
     follow = strength * loaded * level
     follow_d = strength * level * loaded_q / spinning.blend_load * ki
     follow_a = -strength * loaded * level_c / ACROSS * si
@@ -307,21 +310,21 @@ def steered(control: Any, strength: float, row: Any, inner: Any, outer: Any, di:
     to_1 = follow * m_i * (1.0 - share) * by_diameter + follow_a * out_share
     to_2 = follow * m_o * (1.0 - share) * by_diameter
     to_3, to_4 = follow_d * out_share + follow * grow_o * share_i, follow * grow_o * share_o
-    # A contact holds no more than friction allows.
-    held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)
-    held_o, slope_o, by_load_o = held(to, spinning.friction * qo)
+    # No contact takes more than friction allows.
+    friction_i, slope_i, by_load_i = friction_force(ti, spinning.friction * qi)
+    friction_o, slope_o, by_load_o = friction_force(to, spinning.friction * qo)
     by_load_i, by_load_o = by_load_i * spinning.friction * ki, by_load_o * spinning.friction * ko
     return (
         (row.centrifugal_force + follow * beyond, (pull_1, pull_2, pull_3, pull_4)),
-        (held_i, (slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)),
-        (held_o, (slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)),
+        (friction_i, (slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)),
+        (friction_o, (slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)),
         moment,
     )
 
 
 @kernel
 def by_places(slopes: Any, ic: float, is_: float, oc: float, os_: float, sines: Any) -> tuple[float, ...]:
-    """Derivatives by the inner line u = A - X and by the outer line X, (axial, radial) each, of what ``steered`` gives.
+    """Derivatives of a force of ``race_control_forces`` by the inner line u = A - X and the outer line X, (axial, radial) each.
 
     An angle turns with (c, -s)/length, a depth grows along (s, c); ``sines``: si, ci, so, co.
     """
@@ -340,7 +343,9 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
         return elastic_forces(row, a_axial, a_radial, x, y, di, do)
     aa, ar, rr = tangent(qi, ki, one_i, si, ci)
     oaa, oar, orr = tangent(qo, ko, one_o, so, co)
-    pulls, inner, outer, moment = steered(control, strength, row, (si, ci, qi, ki), (so, co, qo, ko), di, do)
+    pulls, inner, outer, moment = race_control_forces(
+        control, strength, row, (si, ci, qi, ki), (so, co, qo, ko), di, do
+    )
     (pull, pull_by), (ti, ti_by), (to, to_by) = pulls, inner, outer
     ic, is_, oc, os_ = ci * one_i, si * one_i, co * one_o, so * one_o
     sines = si, ci, so, co

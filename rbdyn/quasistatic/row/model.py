@@ -1,4 +1,4 @@
-"""From a scene to the parameters of the kernels: the only module here that knows both."""
+"""One row from a scene: parameters of the kernels in SI, load and constraint."""
 
 import math
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.contact.hertz_point import PointContact, ball_on_race
+from rbdyn.contact.point_contact import PointContact, ball_on_race
 from rbdyn.mounting.fits import row_change
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
@@ -15,12 +15,12 @@ from rbdyn.quasistatic.row.ring import Row, at_rest
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
-# Keeps a quotient finite where nothing turns.
+# Least blend load [N], which keeps quotients finite where nothing turns.
 VANISHING = 1e-200
 
 
 class RowModel(NamedTuple):
-    """One row as the solver takes it, and its contacts."""
+    """One row with its raceway control, as ``equilibrium.solve`` takes them, and its contacts."""
 
     row: Row
     control: Control
@@ -97,7 +97,7 @@ def row_model(
 def control_of(
     model: BallModel, spinning: Spinning, cage: float, to_inner: PointContact, to_outer: PointContact
 ) -> Control:
-    """Parameters of the raceway control that the scene asks for."""
+    """Parameters of the raceway control of the scene."""
     if model.raceway_control == "common_cage":
         return CommonCage(cage)
     if model.raceway_control == "hybrid":
@@ -110,7 +110,7 @@ def control_of(
 
 
 def row_of(scene: SingleRowScene) -> RowModel:
-    """The row of a single-row scene, its rings grown as far as the scene asks for."""
+    """The row of a single-row scene, with the ring growth that the scene states."""
     ball, inner, outer = (scene.material(part) for part in ("ball", "inner_ring", "outer_ring"))
     return row_model(scene.bearing, scene.model, ball, inner, outer, *scene.operation.speeds, row_change(scene))
 
@@ -120,6 +120,6 @@ def load_of(scene: BallScene) -> Array:
     return np.array([*scene.operation.load, *scene.operation.moment])
 
 
-def given_of(scene: BallScene) -> Array:
+def constraint_of(scene: BallScene) -> Array:
     """Prescribed displacements [m, rad], NaN where the load rules."""
-    return np.array(scene.operation.given, float)
+    return np.array(scene.operation.displacements, float)

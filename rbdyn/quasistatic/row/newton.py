@@ -1,11 +1,14 @@
-"""Equilibrium from any start: the convex problem first, then the full equations.
+"""Newton's method for the equilibrium of one row, from any start: the convex problem first, then the full equations.
 
-With one common cage speed and no gyroscopic moment the equilibrium is the minimiser of a jointly convex energy in the ring's
-displacement and the places of the balls: unique, and a guarded Newton reaches it from anywhere. From there Newton on the
-full equations; where it fails the race control is brought in by and by. All work on a ``Task`` and leave ``at``, a ``Space``,
-where they end.
+With one common cage speed and no gyroscopic moment, the equilibrium minimises an energy. This is jointly convex in the
+ring's displacement and the positions of the balls. The equilibrium is unique, and a guarded Newton method reaches it from anywhere.
+Newton on the full equations starts there. Where it fails, continuation raises the strength of the race control from 0 to 1.
 
-The first guess is how far the ring goes along its load, and where the balls then rest. ``Task`` is what a solve is given.
+The first guess moves the ring along its load until balls without centrifugal force carry it, and lets the balls settle.
+All functions solve a ``Task`` and work on a ``Space``, their ``state``, which they leave at the last point.
+
+- ``find``: equilibrium of a task; ``walk``: equilibrium at every step of a path of balls, each from the step before
+- ``march``: whole Newton steps; ``descend``: Newton steps that must improve; ``bring_in``: continuation of the race control
 """
 
 import math
@@ -14,36 +17,39 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.compiled.kernel import kernel, routine
-from rbdyn.quasistatic.row.ball import Control, rules
+from rbdyn.compiled.kernel import entry, kernel, routine
+from rbdyn.quasistatic.row.ball import Control, has_race_control, spring
 from rbdyn.quasistatic.row.ring import (
     BALL,
     BALL_WORK,
     ENERGY,
+    INNER_DEPTH,
     LARGEST,
     LOADED,
+    OUTER_DEPTH,
     RING,
     SUMS,
     Row,
     assemble,
     ball_step,
+    centre_shift,
     component_lengths,
     follow,
     groove_centre,
     measure,
-    moved_centre,
     settle,
     unbalance,
 )
 
-# Counters: Newton steps, continuations, starts from nothing.
+# Counters: Newton steps, continuations, cold starts.
 STEPS, STRIDES, COLD_STARTS, COUNTERS = range(4)
 
 
 class Task(NamedTuple):
-    """A row, its raceway control, and what holds its ring: all forces [N], as moments count over the lever R.
+    """Equations of a solve: a row, its raceway control, and the load and constraints of its ring.
 
-    ``load`` (5,) on the ring; ``free`` (5,): 1 where the load rules, 0 where the displacement is prescribed.
+    ``load`` (5,) on the ring [N], moments divided by the lever R. ``free`` (5,): 1 where the load rules, 0 where the
+    displacement is prescribed.
     """
 
     control: Control
@@ -53,11 +59,12 @@ class Task(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Where a solve of Z balls stands, and its work space; kept from one solve to the next.
+    """State of a solve of Z balls and its work space, reused from one solve to the next.
 
-    ``q`` (5,): displacement of the ring [m], tilts times R; ``balls`` (Z, BALL); ``old_q, old_balls, old_work``: before the last step.
-    ``matrix`` (5, 5): stiffness of the ring [N/m]; ``vector`` (5,): what a Newton step is to take away [N]; ``step`` (5,) [m];
-    ``sums``, ``work`` (Z, BALL_WORK): columns of ``ring``; ``counts``: above. ``table``, ``base``: of an elimination and of the first guess.
+    ``q`` (5,): displacement of the ring [m], tilts times R. ``balls`` (Z, BALL) and ``work`` (Z, BALL_WORK): columns as in ``ring``.
+    ``old_q, old_balls, old_work``: values before the last step. ``matrix`` (5, 5): stiffness of the ring [N/m]. ``vector``
+    (5,): residual of the ring [N]. ``step`` (5,): Newton step [m]. ``sums``: as in ``ring``. ``counts``: the counters above.
+    ``table``: of an elimination. ``base``: start of the first guess.
     """
 
     counts: Whole
@@ -76,29 +83,29 @@ class Space(NamedTuple):
 
 
 def space(balls: int) -> Space:
-    """Work space for a row of so many balls."""
+    """Work space for a row of ``balls`` balls."""
     ball, work, square = (balls, BALL), (balls, BALL_WORK), (RING, RING)
     shapes = (RING, ball, square, RING, square, RING, SUMS, work, RING, ball, work, RING)
     return Space(np.zeros(COUNTERS, np.int64), *(np.zeros(shape) for shape in shapes))
 
 
-def posed(row: Row, load: Array, given: Array | None) -> tuple[Array, Array, Array]:
-    """``load`` and ``free`` of a ``Task`` from load and prescribed displacements of ``equilibrium.solve``, and those displacements.
+def boundary_conditions(row: Row, load: Array, constraint: Array | None) -> tuple[Array, Array, Array]:
+    """``load`` and ``free`` of a ``Task``, and the prescribed displacements (5,) in m, 0 where the load rules.
 
-    The last (5,) in m, 0 where the load rules.
+    ``load`` and ``constraint`` are those of ``equilibrium.solve``.
     """
     unit = component_lengths(row.lever)
-    held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
-    free = np.isnan(held)
-    return np.asarray(load, float) / unit, free.astype(float), np.where(free, 0.0, held) * unit
+    displacement = np.full(RING, np.nan) if constraint is None else np.asarray(constraint, float)
+    free = np.isnan(displacement)
+    return np.asarray(load, float) / unit, free.astype(float), np.where(free, 0.0, displacement) * unit
 
 
 @routine
 def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
-    """Solve ``matrix`` x = ``vector`` in place with row pivots; x is left in ``vector``, the matrix is spent.
+    """Solve ``matrix`` x = ``vector`` in place with row pivots: ``vector`` becomes x, the matrix is overwritten.
 
-    Only the first ``size`` rows and columns count. Returns whether every pivot was found: False for a matrix that is not
-    finite or has a pivot no larger than ``least``, 0 where only a singular one is to fail.
+    Only the first ``size`` rows and columns count. Returns False for a matrix that is not finite or has a pivot no larger
+    than ``least``; with ``least`` = 0 only a singular matrix fails.
     """
     for i in range(size):
         pivot = i
@@ -114,7 +121,7 @@ def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
         one = 1.0 / matrix[i, i]
         for k in range(i + 1, size):
             factor = matrix[k, i] * one
-            # Most of a matrix of all balls is zero, and stays so where no ball meets another.
+            # Most of a matrix of all balls is zero and stays zero, for no ball touches another.
             if factor != 0.0:
                 for m in range(i + 1, size):
                     matrix[k, m] -= factor * matrix[i, m]
@@ -129,9 +136,9 @@ def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
 
 FIRST_STEP = 1e-6  # [m]
 LONGEST_STEP = 1.0  # [m]
-# Residual over the contact loads of a ball that is good enough to start from.
+# Residual over the contact loads of a ball that is good enough for a start.
 START_BALANCE = 1e-2
-# The start need only be of the right size.
+# Relative error of the first guess, which only needs the right size.
 START_ERROR = 0.1
 
 
@@ -144,55 +151,55 @@ def force_along(row: Any, both: float, q: Any, direction: Any) -> float:
         length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
         deflection = max(length - row.inner_reach[j] - row.outer_reach[j], 0.0)
         load = both * deflection * math.sqrt(deflection) / length
-        axial, radial = moved_centre(row, j, direction)
+        axial, radial = centre_shift(row, j, direction)
         total += load * (a_axial * axial + a_radial * radial)
     return total
 
 
 @kernel
-def force_at(row: Any, both: float, far: float, at: Any) -> float:
-    """``force_along`` with the ring at ``at.base`` + ``far`` along ``at.step``, where it is left."""
-    q, base, step = at.q, at.base, at.step
+def force_at(row: Any, both: float, far: float, state: Any) -> float:
+    """Move the ring to ``state.base`` + ``far`` times ``state.step``, and return ``force_along`` that step there."""
+    q, base, step = state.q, state.base, state.step
     for i in range(RING):
         q[i] = base[i] + far * step[i]
     return force_along(row, both, q, step)
 
 
 @routine
-def along_the_load(task: Any, at: Any) -> None:
-    """Move ``at.q`` from where it is along the free part of the load until the balls carry it, roughly."""
-    row, direction = task.row, at.step
+def move_along_load(task: Any, state: Any) -> None:
+    """Move ``state.q`` along the free part of the load until the balls roughly carry it."""
+    row, direction = task.row, state.step
     length = 0.0
     for i in range(RING):
         direction[i] = task.load[i] * task.free[i]
-        at.base[i] = at.q[i]
+        state.base[i] = state.q[i]
         length += direction[i] * direction[i]
     if length == 0.0:
         return
-    wanted = math.sqrt(length)
+    force = math.sqrt(length)
     for i in range(RING):
-        direction[i] /= wanted
+        direction[i] /= force
     both = (row.inner_stiffness ** (-2.0 / 3.0) + row.outer_stiffness ** (-2.0 / 3.0)) ** -1.5
     below, above = 0.0, FIRST_STEP
-    while above < LONGEST_STEP and not force_at(row, both, above, at) >= wanted:
+    while above < LONGEST_STEP and not force_at(row, both, above, state) >= force:
         below, above = above, 3.0 * above
     while above - below > START_ERROR * (above - below + 0.1 * below):
         middle = 0.5 * (below + above)
-        if force_at(row, both, middle, at) >= wanted:
+        if force_at(row, both, middle, state) >= force:
             above = middle
         else:
             below = middle
         if above - below < 0.02 * above:
             break
     for i in range(RING):
-        at.q[i] = at.base[i] + above * direction[i]
+        state.q[i] = state.base[i] + above * direction[i]
 
 
 @routine
-def settle_all(row: Any, at: Any) -> None:
-    """Settle every ball for the ring at ``at.q``, and mark all as loaded."""
-    q, balls = at.q, at.balls
-    at.work[:, LOADED] = 1.0
+def settle_all(row: Any, state: Any) -> None:
+    """Settle every ball for the ring at ``state.q``, and mark all as loaded."""
+    q, balls = state.q, state.balls
+    state.work[:, LOADED] = 1.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         settle(row, j, a_axial, a_radial, START_BALANCE, balls)
@@ -203,24 +210,24 @@ def settle_all(row: Any, at: Any) -> None:
 CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST = range(3)
 # Largest residual over largest force: aimed at, and accepted where rounding allows no better.
 AIM, ACCEPTED = 1e-12, 1e-9
-# Residual over the load that is good enough for the convex problem where the full equations follow.
+# Residual over the load at which the convex problem may stop when the full equations follow.
 ROUGHLY = 1e-3
 CONVEX_MARCH, CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 12, 200, 40, 30, 100
 SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
-# Largest turn of a contact line in one whole step [rad], and steps without progress that are waited for.
+# Largest turn of a contact line in one whole step [rad], and patience in steps without progress.
 FURTHEST, PATIENCE = 0.5, 8
-# Share of the largest diagonal entry below which a pivot of the ring's matrix shows nothing.
+# Share of the largest diagonal entry below which a pivot of the ring's matrix counts as zero.
 LEAST_PIVOT = 1e-13
 
 
 @routine
-def ring_step(free: Any, damping: float, at: Any) -> bool:
-    """Newton step (matrix + damping) step = vector of the free components of the ring; 0 for the others.
+def ring_step(free: Any, damping: float, state: Any) -> bool:
+    """Solve (matrix + damping) step = vector for the free components of the ring; the other components are 0.
 
-    Returns whether a pivot of a reasonable size was found every time; only then ``at.step`` is a step.
+    Returns whether every pivot was large enough; only then ``state.step`` is valid.
     """
-    count, largest, matrix, vector, table, step = 0, 0.0, at.matrix, at.vector, at.table, at.step
+    count, largest, matrix, vector, table, step = 0, 0.0, state.matrix, state.vector, state.table, state.step
     for i in range(RING):
         if free[i] > 0.0:
             column = 0
@@ -244,26 +251,26 @@ def ring_step(free: Any, damping: float, at: Any) -> bool:
 
 
 @kernel
-def weighed(task: Any, strength: float, mixed: bool, at: Any) -> tuple[float, float]:
+def assembly_unbalance(task: Any, strength: float, mixed: bool, state: Any) -> tuple[float, float]:
     """``unbalance`` of a new assembly."""
-    assemble(task, strength, mixed, at)
-    return unbalance(task, at)
+    assemble(task, strength, mixed, state)
+    return unbalance(task, state)
 
 
 @kernel
 def stiffness_scale(row: Any, force: float) -> float:
-    """A contact stiffness to measure damping by [N/m]: that of a ball under ``force``."""
+    """Unit of the damping [N/m]: the contact stiffness of a ball under ``force``."""
     return 1.5 * row.outer_stiffness ** (2.0 / 3.0) * force ** (1.0 / 3.0)
 
 
 @routine
-def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bool:
-    """Newton's method from where ``at`` stands, which it leaves at the best point found; whether that is an equilibrium.
+def descend(task: Any, strength: float, convex: bool, limit: int, state: Any) -> bool:
+    """Damped Newton's method from ``state``, which ends at the best point; returns whether that is an equilibrium.
 
-    Guarded by the energy where ``convex``, else by the squared length of the residuals.
+    Every step must lower the squared length of the residuals or, where ``convex``, the energy.
     """
-    sums = at.sums
-    total, worst = weighed(task, strength, False, at)
+    sums = state.sums
+    total, worst = assembly_unbalance(task, strength, False, state)
     unit = stiffness_scale(task.row, sums[LARGEST])
     damping = 0.0
     for _ in range(limit):
@@ -271,20 +278,20 @@ def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bo
             return False
         if worst <= AIM * sums[LARGEST]:
             return True
-        if not ring_step(task.free, damping, at):
+        if not ring_step(task.free, damping, state):
             damping = max(1e3 * damping, 1e-9 * unit)
             if damping > 1e9 * unit:
                 return worst <= ACCEPTED * sums[LARGEST]
             continue
-        at.counts[STEPS] += 1
-        go_to(at.q, at.balls, at.old_q, at.old_balls)
-        copy(at.work, at.old_work)
+        state.counts[STEPS] += 1
+        go_to(state.q, state.balls, state.old_q, state.old_balls)
+        copy(state.work, state.old_work)
         before, energy, scale = total, sums[ENERGY], 1.0
         shortest = SHORTEST_CONVEX if convex else SHORTEST_FULL
         better = False
         while scale >= shortest:
-            follow(task.row, scale, at.old_work, at)
-            total, worst = weighed(task, strength, False, at)
+            follow(task.row, scale, state.old_work, state)
+            total, worst = assembly_unbalance(task, strength, False, state)
             better = total <= (1.0 - 1e-4 * scale) * before
             if convex and not better:
                 better = sums[ENERGY] < energy - 1e-14 * abs(energy)
@@ -295,9 +302,9 @@ def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bo
             if scale == 1.0:
                 damping = 0.1 * damping if damping > 1e-9 * unit else 0.0
             continue
-        # No step helps: rounding has been reached, or the matrix misleads.
-        go_to(at.old_q, at.old_balls, at.q, at.balls)
-        total, worst = weighed(task, strength, False, at)
+        # No step improves: the residual is at rounding level, or the matrix is misleading.
+        go_to(state.old_q, state.old_balls, state.q, state.balls)
+        total, worst = assembly_unbalance(task, strength, False, state)
         if worst <= ACCEPTED * sums[LARGEST]:
             return True
         if not convex or damping > 1e3 * unit:
@@ -307,9 +314,9 @@ def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bo
 
 
 @routine
-def bound(row: Any, at: Any, furthest: float) -> float:
+def bound(row: Any, state: Any, furthest: float) -> float:
     """Share of a Newton step that turns no contact line by more than ``furthest`` [rad]."""
-    scale, step, work = 1.0, at.step, at.work
+    scale, step, work = 1.0, state.step, state.work
     for j in range(row.cosine.size):
         if work[j, LOADED] > 0.0:
             axial, radial, x, y = ball_step(row, j, step, work)
@@ -324,8 +331,8 @@ def bound(row: Any, at: Any, furthest: float) -> float:
 
 
 @kernel
-def roughly(task: Any) -> float:
-    """Residual [N] that is good enough for the convex problem where the full equations follow."""
+def rough_residual(task: Any) -> float:
+    """Residual [N] at which the convex problem may stop when the full equations follow."""
     enough = 0.0
     for i in range(RING):
         enough = max(enough, ROUGHLY * abs(task.load[i]) * task.free[i])
@@ -333,28 +340,28 @@ def roughly(task: Any) -> float:
 
 
 @routine
-def march(task: Any, strength: float, enough: float, limit: int, at: Any) -> bool:
-    """Newton's method with whole steps, bounded in angle, that need not improve at once; whether it ends in an equilibrium.
+def march(task: Any, strength: float, enough: float, limit: int, state: Any) -> bool:
+    """Newton's method with whole steps, bounded in angle; returns whether it ends in an equilibrium.
 
-    A ball that slides along its groove leaves the stiff normal direction by the square of its step: forces rise, and the next
-    step fixes them. A search along the step for smaller forces would creep. ``enough``: residual at which to
-    stop already [N].
+    Steps need not improve at once. A ball that slides along its groove leaves the stiff normal direction by the square of
+    its step: forces rise, and the next step lowers them. A line search for smaller forces would creep.
+    ``enough``: residual [N] at which it may stop early.
     """
-    row, free, sums = task.row, task.free, at.sums
-    total, worst = weighed(task, strength, True, at)
+    row, free, sums = task.row, task.free, state.sums
+    total, worst = assembly_unbalance(task, strength, True, state)
     best, idle = total, 0
     for _ in range(limit):
         if not math.isfinite(total):
             return False
         if worst <= max(AIM * sums[LARGEST], enough):
             return True
-        if not ring_step(free, 0.0, at) and not ring_step(free, 1e-9 * stiffness_scale(row, sums[LARGEST]), at):
+        if not ring_step(free, 0.0, state) and not ring_step(free, 1e-9 * stiffness_scale(row, sums[LARGEST]), state):
             return False
-        at.counts[STEPS] += 1
+        state.counts[STEPS] += 1
         floor = worst <= ACCEPTED * sums[LARGEST]
-        go_to(at.q, at.balls, at.old_q, at.old_balls)
-        follow(row, bound(row, at, FURTHEST), at.work, at)
-        total, worst = weighed(task, strength, True, at)
+        go_to(state.q, state.balls, state.old_q, state.old_balls)
+        follow(row, bound(row, state, FURTHEST), state.work, state)
+        total, worst = assembly_unbalance(task, strength, True, state)
         if total < 0.25 * best:
             best, idle = total, 0
         else:
@@ -368,7 +375,7 @@ def march(task: Any, strength: float, enough: float, limit: int, at: Any) -> boo
 
 @routine
 def copy(table: Any, into: Any) -> None:
-    """Copy a table. Row by row: assigned to a slice, it would bring numba's strings with it, seconds of compiling."""
+    """Copy a table entry by entry: assignment to a slice would compile numba's strings, which takes seconds."""
     for j in range(table.shape[0]):
         for i in range(table.shape[1]):
             into[j, i] = table[j, i]
@@ -376,31 +383,31 @@ def copy(table: Any, into: Any) -> None:
 
 @routine
 def go_to(q: Any, balls: Any, to_q: Any, to_balls: Any) -> None:
-    """Put ring and balls ``to_q`` and ``to_balls`` where ``q`` and ``balls`` are."""
+    """Copy the ring's displacement ``q`` to ``to_q`` and the ``balls`` to ``to_balls``."""
     for i in range(RING):
         to_q[i] = q[i]
     copy(balls, to_balls)
 
 
 @routine
-def bring_in(task: Any, at: Any) -> bool:
-    """From the convex minimum to the full equations by strides in the strength of the race control."""
-    q, balls = at.q.copy(), at.balls.copy()
+def bring_in(task: Any, state: Any) -> bool:
+    """Continuation from the convex minimum to the full equations, by strides in the strength of the race control."""
+    q, balls = state.q.copy(), state.balls.copy()
     reached, stride = 0.0, 0.25
     for _ in range(CONTINUATIONS):
-        at.counts[STRIDES] += 1
+        state.counts[STRIDES] += 1
         ahead = min(reached + stride, 1.0)
-        arrived = march(task, ahead, 0.0, CONTINUED_STEPS, at)
+        arrived = march(task, ahead, 0.0, CONTINUED_STEPS, state)
         if not arrived:
-            go_to(q, balls, at.q, at.balls)
-            arrived = descend(task, ahead, False, CONTINUED_STEPS, at)
+            go_to(q, balls, state.q, state.balls)
+            arrived = descend(task, ahead, False, CONTINUED_STEPS, state)
         if arrived:
             if ahead == 1.0:
                 return True
             reached, stride = ahead, 2.0 * stride
-            go_to(at.q, at.balls, q, balls)
+            go_to(state.q, state.balls, q, balls)
         else:
-            go_to(q, balls, at.q, at.balls)
+            go_to(q, balls, state.q, state.balls)
             stride *= 0.25
             if stride < SMALLEST_STRIDE:
                 return False
@@ -408,46 +415,82 @@ def bring_in(task: Any, at: Any) -> bool:
 
 
 @routine
-def start_afresh(task: Any, at: Any) -> None:
-    """Put ring and balls where a solve begins that knows nothing; prescribed displacements stay."""
-    at.counts[COLD_STARTS] += 1
+def start_afresh(task: Any, state: Any) -> None:
+    """Put ring and balls at the first guess of a cold start; prescribed displacements stay."""
+    state.counts[COLD_STARTS] += 1
     for i in range(RING):
         if task.free[i] > 0.0:
-            at.q[i] = 0.0
-    along_the_load(task, at)
-    settle_all(task.row, at)
+            state.q[i] = 0.0
+    move_along_load(task, state)
+    settle_all(task.row, state)
 
 
 @routine
-def find(task: Any, warm: bool, at: Any) -> int:
-    """Equilibrium of one row. ``at`` holds the start where ``warm``, and the prescribed displacements always.
+def find(task: Any, warm: bool, state: Any) -> int:
+    """Equilibrium of one row; returns its outcome.
 
-    Returns an outcome.
+    ``state`` holds the prescribed displacements and, where ``warm``, the start.
     """
     if warm:
-        at.work[:, LOADED] = 1.0
-        if march(task, 1.0, 0.0, FULL_STEPS, at):
+        state.work[:, LOADED] = 1.0
+        if march(task, 1.0, 0.0, FULL_STEPS, state):
             return CONVERGED
-    start_afresh(task, at)
-    q, balls = at.q.copy(), at.balls.copy()
-    if rules(task.control):
-        # Most often a rough minimum is start enough.
-        if march(task, 0.0, roughly(task), CONVEX_MARCH, at) and march(task, 1.0, 0.0, FULL_STEPS, at):
+    start_afresh(task, state)
+    q, balls = state.q.copy(), state.balls.copy()
+    if has_race_control(task.control):
+        # In most cases a rough minimum is a good enough start.
+        if march(task, 0.0, rough_residual(task), CONVEX_MARCH, state) and march(task, 1.0, 0.0, FULL_STEPS, state):
             return CONVERGED
-        go_to(q, balls, at.q, at.balls)
-    if not march(task, 0.0, 0.0, CONVEX_MARCH, at):
-        go_to(q, balls, at.q, at.balls)
-        if not descend(task, 0.0, True, CONVEX_STEPS, at) and not march(task, 0.0, 0.0, FULL_STEPS, at):
+        go_to(q, balls, state.q, state.balls)
+    if not march(task, 0.0, 0.0, CONVEX_MARCH, state):
+        go_to(q, balls, state.q, state.balls)
+        if not descend(task, 0.0, True, CONVEX_STEPS, state) and not march(task, 0.0, 0.0, FULL_STEPS, state):
             return NOT_CONVEX_MINIMUM
-    if not rules(task.control):
+    if not has_race_control(task.control):
         return CONVERGED
-    go_to(at.q, at.balls, q, balls)
-    if march(task, 1.0, 0.0, FULL_STEPS, at):
+    go_to(state.q, state.balls, q, balls)
+    if march(task, 1.0, 0.0, FULL_STEPS, state):
         return CONVERGED
-    go_to(q, balls, at.q, at.balls)
-    if descend(task, 1.0, False, FULL_STEPS, at):
+    go_to(q, balls, state.q, state.balls)
+    if descend(task, 1.0, False, FULL_STEPS, state):
         return CONVERGED
-    go_to(q, balls, at.q, at.balls)
-    if bring_in(task, at):
+    go_to(q, balls, state.q, state.balls)
+    if bring_in(task, state):
         return CONVERGED
     return RACE_CONTROL_LOST
+
+
+# Figures of a step.
+LARGEST_LOAD, RESIDUAL, FIGURES = range(3)
+
+
+@entry
+def walk(task: Any, changes: Any, state: Any, path: Any, figures: Any) -> tuple[int, int]:
+    """Fill ``path`` (steps, 5) and ``figures`` (steps, FIGURES) by the equilibrium at each step, from the step before.
+
+    Returns the number of steps up to the first without an equilibrium, and the Newton steps in all. ``changes`` (6, steps, Z)
+    holds the six arrays of ``task.row`` at each step, in the order of ``Row``; that row is overwritten. ``state`` is as for ``find``.
+    """
+    row, newton_steps = task.row, 0
+    steps, size = path.shape[0], row.cosine.size
+    for step in range(steps):
+        for j in range(size):
+            row.cosine[j], row.sine[j] = changes[0, step, j], changes[1, step, j]
+            row.axial[j], row.radial[j] = changes[2, step, j], changes[3, step, j]
+            row.inner_reach[j], row.outer_reach[j] = changes[4, step, j], changes[5, step, j]
+        state.counts[:] = 0
+        outcome = find(task, step > 0, state)
+        newton_steps += state.counts[STEPS]
+        if outcome != CONVERGED:
+            return step, newton_steps
+        for i in range(RING):
+            path[step, i] = state.q[i]
+        largest = row.centrifugal_force
+        for j in range(size):
+            inner, _ = spring(state.balls[j, INNER_DEPTH], row.inner_stiffness)
+            outer, _ = spring(state.balls[j, OUTER_DEPTH], row.outer_stiffness)
+            if state.work[j, LOADED] > 0.0:
+                largest = max(largest, inner, outer)
+        figures[step, LARGEST_LOAD] = largest
+        _, figures[step, RESIDUAL] = unbalance(task, state)
+    return steps, newton_steps

@@ -1,8 +1,8 @@
-"""One row of balls in SI: its geometry, where its balls rest in their planes, and the forces on its inner ring with the balls eliminated.
+"""One row of balls in SI: geometry, rest positions of the balls, and forces on the inner ring with the balls eliminated.
 
-The unknowns are the ring's displacement q = (x, y, z, R theta_x, R theta_y) [m], tilts times the lever R = R_i so that all five
-are lengths, and the place X_j of each ball. The Jacobian is an arrow: 2 x 2 blocks for the balls, bordered by the ring.
-Eliminating the balls (Schur complement) leaves 5 x 5 and costs O(Z).
+The unknowns are the ring's displacement q = (x, y, z, R theta_x, R theta_y) [m] and the position X_j of each ball. Tilts
+are multiplied by the lever R = R_i, so that all five components are lengths. The Jacobian is an arrow: 2 x 2 blocks for the
+balls, bordered by the ring. Eliminating the balls (Schur complement) leaves a 5 x 5 system and costs O(Z).
 """
 
 import math
@@ -18,13 +18,12 @@ from rbdyn.quasistatic.row.ball import ball_forces, deflection, line, spring, ta
 class Row(NamedTuple):
     """One row of Z balls between two rings. Arrays have shape (Z,), lengths are in m.
 
-    ``cosine, sine``: of the azimuth of each ball. ``axial, radial``: place of the inner groove centre before any
+    ``cosine, sine``: of the azimuth of each ball. ``axial, radial``: position of the inner groove centre before any
     displacement, form errors, clearance and ring growth included. ``inner_reach, outer_reach``: groove radius less ball
     radius. ``inner_stiffness, outer_stiffness``: K of Q = K delta^1.5 [N/m^1.5]. ``lever``: radius R_i of the circle of
     inner groove centres. ``inner_groove_radius``: f_i D, the lever of a friction force about the groove centre.
-    ``centrifugal_force``: that of a ball at the common cage speed [N]; ``rest_deflection``: how deep a ball that only this
-    force loads presses into the outer race; ``rest_energy``: what
-    that stores less the work of the force [J].
+    ``centrifugal_force``: that of a ball at the common cage speed [N]. ``rest_deflection``: depth of the outer contact of a
+    ball under this force alone. ``rest_energy``: its elastic energy less the work of the force [J].
     """
 
     cosine: Array
@@ -43,7 +42,7 @@ class Row(NamedTuple):
 
 
 def component_lengths(lever: float) -> Array:
-    """What makes lengths of (x, y, z, theta_x, theta_y) and forces of (Fx, Fy, Fz, Mx, My): times and over (1, 1, 1, R, R)."""
+    """Factors (1, 1, 1, R, R): displacements times them are lengths [m], loads over them are forces [N]."""
     return np.array([1.0, 1.0, 1.0, lever, lever])
 
 
@@ -60,21 +59,21 @@ SHORTEST = 1e-7
 
 @kernel
 def groove_centre(row: Any, q: Any, j: int) -> tuple[float, float]:
-    """Place (axial, radial) of the inner groove centre at ball j [m]."""
+    """Position (axial, radial) of the inner groove centre at ball j [m]."""
     c, s = row.cosine[j], row.sine[j]
     return row.axial[j] + q[2] + q[3] * s - q[4] * c, row.radial[j] + q[0] * c + q[1] * s
 
 
 @kernel
-def moved_centre(row: Any, j: int, step: Any) -> tuple[float, float]:
-    """How far a ``step`` (5,) of the ring moves the inner groove centre at ball j, (axial, radial) in the unit of the step."""
+def centre_shift(row: Any, j: int, step: Any) -> tuple[float, float]:
+    """Shift (axial, radial) of the inner groove centre at ball j by a ``step`` (5,) of the ring, in the step's unit."""
     c, s = row.cosine[j], row.sine[j]
     return step[2] + step[3] * s - step[4] * c, step[0] * c + step[1] * s
 
 
 @kernel
-def lifted(row: Any, j: int, a_axial: float, a_radial: float) -> bool:
-    """Whether ball j, pressed to the outer race by its centrifugal force alone, is clear of the inner race."""
+def is_lifted(row: Any, j: int, a_axial: float, a_radial: float) -> bool:
+    """Whether ball j is clear of the inner race while its centrifugal force alone presses it to the outer race."""
     if row.centrifugal_force > 0.0:
         high = a_radial - row.outer_reach[j] - row.rest_deflection
         reach = row.inner_reach[j]
@@ -85,7 +84,7 @@ def lifted(row: Any, j: int, a_axial: float, a_radial: float) -> bool:
 
 @kernel
 def rest(row: Any, j: int, balls: Any, a_axial: float, a_radial: float) -> None:
-    """Put a lifted ball where it rests: on the outer race, or without centrifugal force on the line of centres."""
+    """Put a lifted ball at rest on the outer race, or without centrifugal force on the line of centres."""
     if row.centrifugal_force > 0.0:
         balls[j, 0] = 0.0
         balls[j, 1] = row.outer_reach[j] + row.rest_deflection
@@ -122,7 +121,7 @@ def balance(row: Any, j: int, a_axial: float, a_radial: float, x: float, y: floa
 
 @kernel
 def wedge(row: Any, j: int, a_axial: float, a_radial: float) -> tuple[float, float]:
-    """Where ball j just touches both races, the outermost such place; on the line of centres where it is squeezed."""
+    """Outermost position where ball j just touches both races; on the line of centres where it is squeezed."""
     length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
     ri, ro = row.inner_reach[j], row.outer_reach[j]
     cos_a, sin_a = a_radial / length, a_axial / length
@@ -140,11 +139,11 @@ def wedge(row: Any, j: int, a_axial: float, a_radial: float) -> tuple[float, flo
 
 @kernel
 def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, balls: Any) -> None:
-    """Put ball j where its energy is least for a fixed ring, orbiting with the cage: guarded Newton in two unknowns.
+    """Put ball j, orbiting with the cage, at its least energy for a fixed ring: guarded Newton in two unknowns.
 
-    Until no more than the share ``settled`` of its contact loads is out of balance.
+    It stops when the unbalanced force is below ``share`` of the contact loads.
     """
-    if lifted(row, j, a_axial, a_radial):
+    if is_lifted(row, j, a_axial, a_radial):
         rest(row, j, balls, a_axial, a_radial)
         return
     x, y = wedge(row, j, a_axial, a_radial)
@@ -158,22 +157,24 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, ball
     at_rest = contact_energy(row, j, a_axial, a_radial, 0.0, high)
     if at_rest < contact_energy(row, j, a_axial, a_radial, x, y):
         x, y = 0.0, high
-    energy, held, fa, fr, aa, ar, rr = balance(row, j, a_axial, a_radial, x, y)
+    energy, contact_load, fa, fr, aa, ar, rr = balance(row, j, a_axial, a_radial, x, y)
     damping = 0.0
     for _ in range(SETTLING_STEPS):
-        lacking = abs(fa) + abs(fr)
-        if lacking < share * held:
+        residual = abs(fa) + abs(fr)
+        if residual < share * contact_load:
             break
         one = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
         da = ((rr + damping) * fa - ar * fr) * one
         dr = ((aa + damping) * fr - ar * fa) * one
         scale, moved = 1.0, False
         while scale > SHORTEST and not moved:
-            trial, held_, fa_, fr_, aa_, ar_, rr_ = balance(row, j, a_axial, a_radial, x + scale * da, y + scale * dr)
-            # Near the bottom the energy no longer distinguishes better from worse, the forces still do.
-            if trial < energy or abs(fa_) + abs(fr_) < 0.5 * lacking:
+            trial, contact_load_, fa_, fr_, aa_, ar_, rr_ = balance(
+                row, j, a_axial, a_radial, x + scale * da, y + scale * dr
+            )
+            # Near the minimum, rounding hides differences of the energy; the forces still show them.
+            if trial < energy or abs(fa_) + abs(fr_) < 0.5 * residual:
                 x, y, moved = x + scale * da, y + scale * dr, True
-                energy, held, fa, fr, aa, ar, rr = trial, held_, fa_, fr_, aa_, ar_, rr_
+                energy, contact_load, fa, fr, aa, ar, rr = trial, contact_load_, fa_, fr_, aa_, ar_, rr_
             scale *= 0.5
         if not moved and damping > 0.0:
             break
@@ -182,40 +183,40 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, ball
 
 
 RING = 5
-# Columns of the work space of a ball: Newton step (axial, radial), its change with A (four), open or loaded, then the lines
-# of both contacts (axial, radial) and what the geometry has deeper than the ball's depths [m].
+# Columns of the work space of a ball: Newton step (axial, radial), its derivative by A (four), the flag of a loaded ball,
+# the lines of both contacts (axial, radial), and the depths of the geometry less those of the ball [m].
 BALL_WORK = 13
 LOADED, INNER_LINE, OUTER_LINE, INNER_GAP, OUTER_GAP = 6, 7, 9, 11, 12
-# Columns of ``balls``: place (axial, radial) and depth of the contacts (inner, outer) [m].
+# Columns of ``balls``: position (axial, radial) and depth of the contacts (inner, outer) [m].
 AXIAL, RADIAL, INNER_DEPTH, OUTER_DEPTH, BALL = range(5)
-# Sums over the balls; from TAKEN on what the ring takes [N].
-ENERGY, UNBALANCE, WORST, LARGEST, TAKEN = range(5)
-SUMS = TAKEN + RING
-# Residual over the contact loads of a ball that counts as settled.
+# Sums over the balls; from REACTION on, the load that the ring takes [N].
+ENERGY, UNBALANCE, WORST, LARGEST, REACTION = range(5)
+SUMS = REACTION + RING
+# Residual over the contact loads below which a ball counts as settled.
 BALANCE = 1e-11
-# A Newton step leaves at least this share of a depth.
-LEFT = 0.2
+# Least share of a depth that remains after a Newton step.
+LEAST_DEPTH_SHARE = 0.2
 
 
 @kernel
 def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> None:
-    """Set the depths of ball j to what its place gives."""
+    """Set the depths of ball j by its position."""
     x, y = balls[j, AXIAL], balls[j, RADIAL]
     balls[j, INNER_DEPTH] = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
     balls[j, OUTER_DEPTH] = deflection(x, y, row.outer_reach[j])
 
 
 @kernel
-def diverging(convex: bool, forces: Any) -> bool:
-    """Whether a ball is so far from balance that it is better settled by itself: Newton's step would show nothing."""
+def diverges(convex: bool, forces: Any) -> bool:
+    """Whether a ball is so far from balance that Newton's step is useless and the ball must be settled alone."""
     (ra, rr), (fa, fr, _) = forces[0], forces[1]
-    lacking, held = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
-    return lacking > 0.3 * held if convex else held == 0.0
+    residual, force = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
+    return residual > 0.3 * force if convex else force == 0.0
 
 
 @kernel
 def forces_on(control: Any, strength: float, row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> Any:
-    """``ball_forces`` of ball j where it stands."""
+    """``ball_forces`` of ball j at its position."""
     return ball_forces(
         control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL], balls[j, INNER_DEPTH],
         balls[j, OUTER_DEPTH],
@@ -234,15 +235,15 @@ def add_up(row: Any, j: int, forces: Any, springs: Any, balls: Any, sums: Any) -
     sums[LARGEST] = max(sums[LARGEST], abs(fa), abs(fr), abs(pull))
     c, s = row.cosine[j], row.sine[j]
     turn = fa + fm * (1.0 / row.lever)
-    sums[TAKEN] += fr * c
-    sums[TAKEN + 1] += fr * s
-    sums[TAKEN + 2] += fa
-    sums[TAKEN + 3] += turn * s
-    sums[TAKEN + 4] -= turn * c
+    sums[REACTION] += fr * c
+    sums[REACTION + 1] += fr * s
+    sums[REACTION + 2] += fa
+    sums[REACTION + 3] += turn * s
+    sums[REACTION + 4] -= turn * c
 
 
 @kernel
-def ahead(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
+def extrapolation(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
     """``force`` where the ``gaps`` (axial, radial) of the inner and the outer contact are closed, from its derivatives."""
     outer_a, outer_r = by_x[0] + by_a[0], by_x[1] + by_a[1]
     return force + (by_a[0] * gaps[0] + by_a[1] * gaps[1] + outer_a * gaps[2] + outer_r * gaps[3])
@@ -252,7 +253,7 @@ def ahead(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
 def close_gaps(
     row: Any, j: int, a_axial: float, a_radial: float, forces: Any, springs: Any, balls: Any, work: Any, sums: Any
 ) -> Any:
-    """Residual and ring forces with what the places of ball j add beyond its depths, which goes into the step only."""
+    """Residual and ring forces of ball j with its gaps closed: the step counts its position beyond its depths."""
     (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, _, _ = forces
     x, y = balls[j, AXIAL], balls[j, RADIAL]
     one_i, si, ci = line(a_axial - x, a_radial - y)
@@ -266,9 +267,9 @@ def close_gaps(
     work[j, INNER_LINE], work[j, INNER_LINE + 1], work[j, INNER_GAP] = si, ci, gap_i
     work[j, OUTER_LINE], work[j, OUTER_LINE + 1], work[j, OUTER_GAP] = so, co, gap_o
     gaps = gap_i * si, gap_i * ci, gap_o * so, gap_o * co
-    residual = ahead(ra, by_a[:2], by_x[:2], gaps), ahead(rr, by_a[2:], by_x[2:], gaps)
-    force = ahead(fa, ring_a[:2], ring_x[:2], gaps), ahead(fr, ring_a[2:4], ring_x[2:4], gaps)
-    return residual, (*force, ahead(fm, ring_a[4:], ring_x[4:], gaps))
+    residual = extrapolation(ra, by_a[:2], by_x[:2], gaps), extrapolation(rr, by_a[2:], by_x[2:], gaps)
+    force = extrapolation(fa, ring_a[:2], ring_x[:2], gaps), extrapolation(fr, ring_a[2:4], ring_x[2:4], gaps)
+    return residual, (*force, extrapolation(fm, ring_a[4:], ring_x[4:], gaps))
 
 
 @kernel
@@ -298,7 +299,7 @@ def eliminate_ball(row: Any, j: int, residual: Any, ring: Any, forces: Any, one_
 
 @kernel
 def add_to_ring(c: float, s: float, force: Any, stiffness: Any, matrix: Any, vector: Any) -> None:
-    """Add a ball at the azimuth (c, s), as ``eliminate_ball`` gives it, to the ring's system but for what symmetry gives."""
+    """Add a ball of ``eliminate_ball`` at the azimuth (c, s) to the ring's system, without the entries known by symmetry."""
     (ta, tr, tm), (aa, ar, ra, rr, ma, mr) = force, stiffness
     vector[0] -= tr * c
     vector[1] -= tr * s
@@ -330,29 +331,33 @@ def add_to_ring(c: float, s: float, force: Any, stiffness: Any, matrix: Any, vec
 
 
 @routine
-def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
-    """Ring forces at ``at.q`` and ``at.balls``, with the balls eliminated.
+def assemble(task: Any, strength: float, mixed: bool, state: Any) -> None:
+    """Ring forces at ``state.q`` and ``state.balls``, with the balls eliminated.
 
-    ``mixed``: whether the depths in ``at.balls`` are unknowns of their own; else they are set to what the places give.
-    Fills ``at.matrix``, the derivative of the load that the ring takes by q where every ball stays in balance [N/m];
-    ``at.vector``, the load less what the ring takes once the balls have moved into balance to first order [N];
-    ``at.work`` for ``follow``; ``at.sums``: energy [J], the squared length of the balls' residuals [N^2], the largest of them [N],
-    the largest force [N] and what the ring takes. Moments and couples count over the lever. Lifted balls are put to rest.
+    ``mixed``: whether the depths in ``state.balls`` are separate unknowns; else the positions set them. Fills
+
+    - ``state.matrix``: derivative by q of the load that the ring takes while every ball stays in balance [N/m]
+    - ``state.vector``: the load less that of the ring once the balls have moved into balance, to first order [N]
+    - ``state.work``: for ``follow``
+    - ``state.sums``: energy [J], squared length of the balls' residuals [N^2], the largest residual [N], the largest force [N]
+      and the load that the ring takes
+
+    Moments and couples are divided by the lever. Lifted balls are put to rest.
     """
-    # Arrays are taken out of their tuple once: inside the loop that would count references.
-    control, row, load, q, balls, work = task.control, task.row, task.load, at.q, at.balls, at.work
-    matrix, vector, sums = at.matrix, at.vector, at.sums
+    # Arrays leave their tuple once: inside the loop, numba would count references.
+    control, row, load, q, balls, work = task.control, task.row, task.load, state.q, state.balls, state.work
+    matrix, vector, sums = state.matrix, state.vector, state.sums
     for i in range(RING):
         vector[i] = load[i]
     matrix[:, :] = 0.0
     sums[:] = 0.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
-        if lifted(row, j, a_axial, a_radial):
+        if is_lifted(row, j, a_axial, a_radial):
             rest(row, j, balls, a_axial, a_radial)
             work[j, LOADED] = 0.0
             sums[LARGEST] = max(sums[LARGEST], row.centrifugal_force)
-            # By its place: at rest on the outer race.
+            # The energy of a ball at rest on the outer race.
             sums[ENERGY] += row.rest_energy
             continue
         if work[j, LOADED] == 0.0:
@@ -362,7 +367,7 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
         elif not mixed:
             measure(row, j, a_axial, a_radial, balls)
         forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
-        if diverging(strength == 0.0, forces):
+        if diverges(strength == 0.0, forces):
             settle(row, j, a_axial, a_radial, BALANCE, balls)
             measure(row, j, a_axial, a_radial, balls)
             forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
@@ -373,7 +378,7 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
             residual, ring = close_gaps(row, j, a_axial, a_radial, forces, springs, balls, work, sums)
         determinant = by_x[0] * by_x[3] - by_x[1] * by_x[2]
         if determinant == 0.0:
-            # Squeezed by less than the spacing of numbers: as good as lifted.
+            # Squeezed by less than the spacing of numbers, the ball counts as lifted.
             work[j, LOADED] = 0.0
             continue
         force, stiffness = eliminate_ball(row, j, residual, ring, forces, 1.0 / determinant, work)
@@ -388,29 +393,29 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
 
 
 @kernel
-def unbalance(task: Any, at: Any) -> tuple[float, float]:
-    """Squared length of all residuals [N^2] and the largest of them [N], the ring's free components included."""
-    sums, load, free = at.sums, task.load, task.free
+def unbalance(task: Any, state: Any) -> tuple[float, float]:
+    """Squared length of all residuals [N^2] and the largest residual [N], the ring's free components included."""
+    sums, load, free = state.sums, task.load, task.free
     total, worst = sums[UNBALANCE], sums[WORST]
     for i in range(RING):
-        left = (load[i] - sums[TAKEN + i]) * free[i]
-        total += left * left
-        worst = max(worst, abs(left))
+        residual = (load[i] - sums[REACTION + i]) * free[i]
+        total += residual * residual
+        worst = max(worst, abs(residual))
     return total, worst
 
 
 @kernel
 def ball_step(row: Any, j: int, step: Any, work: Any) -> tuple[float, float, float, float]:
-    """Moves [m] that go with the ring's ``step``: of the inner groove centre at ball j, then of the ball, (axial, radial) each."""
-    axial, radial = moved_centre(row, j, step)
+    """Shifts [m] by the ring's ``step``: of the inner groove centre at ball j, then of the ball, (axial, radial) each."""
+    axial, radial = centre_shift(row, j, step)
     x = work[j, 0] + work[j, 2] * axial + work[j, 3] * radial
     return axial, radial, x, work[j, 1] + work[j, 4] * axial + work[j, 5] * radial
 
 
 @routine
-def follow(row: Any, scale: float, work: Any, at: Any) -> None:
-    """Move ring and balls from ``at.old_q`` and ``at.old_balls`` by ``scale`` times the Newton step, the balls' in ``work``."""
-    start, balls, step, q, old_q = at.old_balls, at.balls, at.step, at.q, at.old_q
+def follow(row: Any, scale: float, work: Any, state: Any) -> None:
+    """Move ring and balls from ``state.old_q`` and ``state.old_balls`` by ``scale`` times the Newton step; ``work``: that of the balls."""
+    start, balls, step, q, old_q = state.old_balls, state.balls, state.step, state.q, state.old_q
     for i in range(RING):
         q[i] = old_q[i] + scale * step[i]
     for j in range(row.cosine.size):
@@ -422,5 +427,9 @@ def follow(row: Any, scale: float, work: Any, at: Any) -> None:
             balls[j, RADIAL] += scale * y
             inner = work[j, INNER_GAP] + work[j, INNER_LINE] * (axial - x) + work[j, INNER_LINE + 1] * (radial - y)
             outer = work[j, OUTER_GAP] + work[j, OUTER_LINE] * x + work[j, OUTER_LINE + 1] * y
-            balls[j, INNER_DEPTH] = max(start[j, INNER_DEPTH] + scale * inner, LEFT * start[j, INNER_DEPTH])
-            balls[j, OUTER_DEPTH] = max(start[j, OUTER_DEPTH] + scale * outer, LEFT * start[j, OUTER_DEPTH])
+            balls[j, INNER_DEPTH] = max(
+                start[j, INNER_DEPTH] + scale * inner, LEAST_DEPTH_SHARE * start[j, INNER_DEPTH]
+            )
+            balls[j, OUTER_DEPTH] = max(
+                start[j, OUTER_DEPTH] + scale * outer, LEAST_DEPTH_SHARE * start[j, OUTER_DEPTH]
+            )

@@ -1,16 +1,16 @@
-"""Runout of many bearings at once: races and balls drawn at random, answered in proportion.
+"""Runout of many bearings at once, with random races and balls and a linear response, and race limits for a runout class.
 
-Each bearing of a lot has races of a given height (roundness and side-sway, peak to valley) in random orders and phases
-and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_response``) reach the ring,
-each as one wave: a bearing's reading is the real part of a short sum, and a lot is a product of two matrices.
+Each bearing of a lot has races of stated height (roundness and side-sway, peak to valley) in random orders and phases. Its
+balls have random diameters and sphericity. The balls transmit only some orders to the ring (``linear_response``), each as one
+wave. The reading of a bearing is therefore the real part of a short sum, and that of a lot a product of two matrices.
 
-Under a purely axial load all balls are alike, so one ball represents all: an error e of the ball at the azimuth psi moves
-the ring by e g_x along psi, by e g_z axially, and tilts it by e g_tilt about the axis 90 degrees ahead of psi. Around
-Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and tilt, and n = kZ, which moves axially.
+Under a purely axial load all balls are equal, so one ball represents all. An error e of the ball at the azimuth psi moves
+the ring by e g_x along psi and by e g_z axially. It tilts the ring by e g_tilt about the axis 90 degrees ahead of psi. Of the
+orders n of a groove, the Z equal balls cancel all but two kinds: n = kZ +- 1 shift and tilt the ring, n = kZ move it axially.
 
-Race limits for a runout class: Zhou et al. 2024 turn a homogenisation coefficient round; here a lot of bearings is drawn and its
-yield counted. The runout of a lot is linear in the limits and so is found for all of them at once; full equilibria of some
-bearings then set the size, and the design is confirmed on a fresh lot, in proportion and in full.
+For race limits, Zhou et al. 2024 invert a homogenisation coefficient. Here ``design`` draws a lot of bearings and counts its
+yield. The runout is linear in the limits and therefore known for all limits at once. Full equilibria of some bearings correct
+the size of the limits, and a fresh lot confirms the design, linearly and in full.
 """
 
 import math
@@ -26,10 +26,9 @@ from rbdyn.base.faults import MethodError, RunError
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.ring import Row
-from rbdyn.quasistatic.runout.race_errors import RaceErrors, Turning, Waviness, ball_path
-from rbdyn.quasistatic.runout.turn import follow
+from rbdyn.quasistatic.runout.turn import RaceErrors, Turning, Waviness, ball_path, follow
 
-# Error of one ball in the differences [m]: far below any deflection, far above the solver's round-off.
+# Error of one ball in the differences [m]: far below any deflection, far above the solver's rounding.
 SMALL_ERROR = 1e-8
 CHANGES = ("axial", "radial", "inner_reach", "outer_reach")
 Waves = NDArray[np.complex128]
@@ -38,7 +37,7 @@ RACES = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway")
 
 
 class LinearResponse(NamedTuple):
-    """Displacement by unit change [m] of one ball, (4,) for axial, radial, inner_reach and outer_reach.
+    """Displacement of the ring by a unit change [m] at one ball, (4,) for axial, radial, inner_reach and outer_reach.
 
     ``radial`` towards the ball [-], ``axial`` [-], ``tilt`` about the axis 90 degrees ahead of the ball [rad/m].
     """
@@ -48,44 +47,46 @@ class LinearResponse(NamedTuple):
     tilt: Array
 
 
-def linear_response(row: Row, control: Control, load: Array, given: Array | None = None) -> LinearResponse:
+def linear_response(row: Row, control: Control, load: Array, constraint: Array | None = None) -> LinearResponse:
     """Response of a row of equal, evenly spaced balls under an axial load, by central differences.
 
-    Arguments as of ``equilibrium.solve``. Raises MethodError where load or row single out a direction, and RunError
-    with the reason where there is no equilibrium.
+    Arguments are those of ``equilibrium.solve``. Raises MethodError for another load or unequal balls, and RunError with
+    the cause where there is no equilibrium.
     """
     if np.any(np.delete(load, 2)):
-        raise MethodError("load: runout answers in proportion only under a purely axial load; set the rest to 0")
+        raise MethodError(
+            "load: the linear response of runout needs a purely axial load; set the other components to 0"
+        )
     if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
-        raise MethodError("row: balls differ already; give the nominal row")
-    middle = _settled(solve(row, control, load, given))
+        raise MethodError("row: its balls or races already have errors; give the nominal row")
+    middle = _equilibrium(solve(row, control, load, constraint))
     slopes = []
     for name in CHANGES:
         ends = []
         for change in (-SMALL_ERROR, SMALL_ERROR):
             changed = getattr(row, name).copy()
             changed[0] += change
-            ends.append(_settled(solve(row._replace(**{name: changed}), control, load, given, middle)))
+            ends.append(_equilibrium(solve(row._replace(**{name: changed}), control, load, constraint, middle)))
         slopes.append((ends[1].displacement - ends[0].displacement) / (2.0 * SMALL_ERROR))
     x, y, z, theta_x, theta_y = np.array(slopes).T
     cosine, sine = row.cosine[0], row.sine[0]
     return LinearResponse(x * cosine + y * sine, z, theta_y * cosine - theta_x * sine)
 
 
-def _settled(solution: Solution) -> Solution:
-    if not solution.found:
+def _equilibrium(solution: Solution) -> Solution:
+    if not solution.is_equilibrium:
         raise RunError(f"runout of the nominal bearing: {solution.status}")
     return solution
 
 
 @dataclass(frozen=True)
 class Lot:
-    """How the parts of a lot vary. Lengths in m.
+    """Distribution of the parts of a lot. Lengths in m.
 
-    ``lowest_order, highest_order, decay``: of each race error; amplitudes fall as order^-decay on the average and are
-    Rayleigh distributed. ``smallest_height``: heights are spread evenly from this share of the limit to the limit; 1 has
-    every race just pass inspection. ``ball_diameter_spread``: standard deviation within a bearing.
-    ``sphericity_orders, sphericity``: orders on each ball and the amplitude of each, phases random.
+    ``lowest_order, highest_order, decay``: of each race error; amplitudes are Rayleigh distributed, with a mean that falls as
+    order^-decay. ``smallest_height``: heights are uniform between this share of the limit and the limit; with 1 every race
+    is at its limit. ``ball_diameter_spread``: standard deviation within a bearing. ``sphericity_orders, sphericity``: orders
+    on each ball and their amplitude, with random phases.
     """
 
     lowest_order: int = 1
@@ -98,8 +99,11 @@ class Lot:
 
 
 class Parts(NamedTuple):
-    """Parts of the bearings of a lot. ``races``: complex amplitudes (4, bearings, orders) of forms of limit one;
-    ``diameter``: (bearings, Z) and ``sphericity``: complex amplitudes (bearings, orders, Z), in m."""
+    """Parts of the bearings of a lot.
+
+    ``races`` (4, bearings, orders): complex amplitudes for a limit of one. ``diameter`` (bearings, Z): errors of the balls [m].
+    ``sphericity`` (bearings, orders, Z): complex amplitudes [m].
+    """
 
     order: Whole
     races: Waves
@@ -109,7 +113,7 @@ class Parts(NamedTuple):
 
 
 def draw_parts(lot: Lot, balls: int, bearings: int, seed: int) -> Parts:
-    """Draw the parts of a number of bearings; a wave is Re(c exp(i order angle))."""
+    """Random parts of a number of bearings; the wave of an amplitude c is Re(c exp(i order angle))."""
     draw = np.random.default_rng(seed)
     order = np.arange(lot.lowest_order, lot.highest_order + 1)
     shape = (len(RACES), bearings, order.size)
@@ -141,7 +145,7 @@ def bearing_errors(parts: Parts, bearing: int, limits: Array) -> RaceErrors:
 
 
 class Readings(NamedTuple):
-    """Readings of indicators [m] through the turns, (bearings, steps): from races of limit one, and from the balls.
+    """Indicator readings [m] during the turns, (bearings, steps), by races of limit one and by the balls.
 
     ``radial``: along x; ``face``: on the inner ring's face at the azimuth of x.
     """
@@ -155,7 +159,7 @@ class Readings(NamedTuple):
 def readings(
     parts: Parts, response: LinearResponse, turning: Turning, steps: int, turns: int, face_radius: float
 ) -> Readings:
-    """Follow the indicators: ``radial`` and ``face`` are (4, bearings, steps), one for each of ``RACES``."""
+    """Readings of a lot; ``radial`` and ``face`` are (4, bearings, steps), in the order of ``RACES``."""
     z = parts.diameter.shape[1]
     turn = 2.0 * math.pi * np.arange(steps * turns) / steps
     cage, inner, outer = turning.cage * turn, turning.inner * turn, turning.outer * turn
@@ -178,7 +182,7 @@ def readings(
 def _passing(order: Whole, relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
     """Waves (orders, steps) by which unit amplitudes c of Re(c exp(i n angle)) shift and lift the ring.
 
-    Sum over the balls of Re(c exp(i n phi_j)) exp(i psi_j) with phi_j = psi_j - ring angle: nothing but for n = kZ -+ 1.
+    The sum over the balls of Re(c exp(i n phi_j)) exp(i psi_j), phi_j = psi_j - ring angle, is zero except for n = kZ -+ 1.
     """
     n = order[:, np.newaxis]
     with_balls, against = (n + 1) % z == 0, (n - 1) % z == 0
@@ -191,17 +195,17 @@ def _passing(order: Whole, relative: Array, cage: Array, z: int) -> tuple[Waves,
 def _ball_waves(
     parts: Parts, response: LinearResponse, spun: Array, cage: Array
 ) -> tuple[Waves, tuple[Waves, Waves], Waves]:
-    """Coefficients (bearings, waves) of the balls' errors, and those waves (waves, steps): shift, tilt, lift."""
+    """Coefficients (bearings, waves) of the balls' errors, and their waves (waves, steps): shift, tilt and lift."""
     z = parts.diameter.shape[1]
     around = np.exp(2j * math.pi * np.arange(z) / z)
-    # A larger ball takes half of its excess from both reaches.
+    # A larger ball reduces both reaches by half of its excess.
     half = -0.5 * (parts.diameter @ around)
     coefficients = [half]
     gains = [(response.radial[2:].sum(), response.tilt[2:].sum(), 0.0)]
     waves = [np.exp(1j * cage)]
     for k, order in enumerate(parts.sphericity_order):
         amplitude = parts.sphericity[:, k]
-        # The outer contact lies opposite: even orders add up, odd ones cancel.
+        # The outer contact is opposite: even orders add up, odd ones cancel.
         opposite = -np.array([1.0, (-1.0) ** order])
         shift, tilt, lift = (gain[2:] @ opposite for gain in (response.radial, response.tilt, response.axial))
         coefficients += [0.5 * (amplitude @ around), 0.5 * (amplitude @ around.conj()), amplitude.sum(axis=1)]
@@ -211,7 +215,7 @@ def _ball_waves(
     return np.array(coefficients).T, (shift, tilt), lift
 
 
-# Bisections of a size: to a ten-thousandth.
+# Bisections of a size, to one part in ten thousand.
 HALVINGS = 14
 REFINEMENTS = 3
 SWAY_SHARES = tuple(2.0 ** (0.5 * k) for k in range(-6, 7))
@@ -219,10 +223,11 @@ SWAY_SHARES = tuple(2.0 ** (0.5 * k) for k in range(-6, 7))
 
 @dataclass(frozen=True)
 class FullCheck:
-    """What full equilibria of the first bearings of a lot say about the proportion.
+    """Check of the linear response by full equilibria of the first bearings of a lot.
 
-    Differences of the runouts in proportion from the full ones over the limit: root mean square, radial and face. ``agreeing``: bearings of ``bearings`` on which both say alike whether the class is met. ``gap``: share that
-    meets it in full less share in proportion, with its standard error (as if one at least had differed).
+    ``radial_rms, face_rms``: differences of linear and full runouts over their limits. ``agreeing``: number of the
+    ``bearings`` with the same verdict on the class. ``gap``: share that meets the class in full less the linear share, with
+    its standard error, which assumes at least one different verdict.
     """
 
     bearings: int
@@ -235,13 +240,12 @@ class FullCheck:
 
 @dataclass(frozen=True)
 class RaceLimits:
-    """Limits [m] on the heights of race errors, and what they yield.
+    """Limits [m] on the heights of race errors, and their yield.
 
-    ``radial_limit, axial_limit``: K_ia and S_ia that were to be met [m]. ``yielded``: share of a fresh lot that meets
-    both, with its standard error: counted in proportion on many and corrected by what full equilibria of some say
-    (``check``). ``proportional``: without that correction.
-    ``homogenisation``: 95 % quantile of the radial runout over the sum of both roundness limits, and of the face runout
-    over the sum of both side-sways.
+    ``radial_limit, axial_limit``: limits K_ia and S_ia of the class [m]. ``yielded``: share of a fresh lot that meets both,
+    with its standard error. It is counted on many linear responses and corrected by full equilibria of some bearings
+    (``check``); ``proportional`` is the share without that correction. ``homogenisation``: 95 % quantile of the radial
+    runout over the sum of both roundness limits, and of the face runout over the sum of both side-sway limits.
     """
 
     inner_roundness: float
@@ -261,9 +265,9 @@ class RaceLimits:
 
 @dataclass(frozen=True)
 class Bench:
-    """How runout is measured: a nominal row under an axial load, as ``equilibrium.solve`` takes them.
+    """Measurement of runout: a nominal row under an axial load, as in ``equilibrium.solve``.
 
-    ``face_radius``: where the axial indicator touches the inner ring [m]; ``steps`` to a turn, ``turns`` of the ring.
+    ``face_radius``: radius at which the axial indicator touches the inner ring [m]. ``steps`` a turn, ``turns`` of the ring.
     """
 
     row: Row
@@ -273,7 +277,7 @@ class Bench:
     face_radius: float
     steps: int = 120
     turns: int = 2
-    given: Array | None = None
+    constraint: Array | None = None
 
 
 def design(
@@ -282,36 +286,37 @@ def design(
     *,
     radial_limit: float,
     axial_limit: float,
-    wanted: float = 0.95,
+    target_yield: float = 0.95,
     outer_share: float = 1.0,
     sway_shares: Sequence[float] = SWAY_SHARES,
     bearings: int = 4000,
     seed: int = 1,
     solved: int = 0,
 ) -> RaceLimits:
-    """Largest race errors with which the share ``wanted`` of a lot keeps both runouts [m].
+    """Largest race errors with which the share ``target_yield`` of a lot keeps both runouts [m].
 
-    ``outer_share``: limit of an outer race over that of the inner one. ``sway_shares``: side-sway limits over roundness
-    limits that are tried; the one that leaves the largest product of both is taken, so that neither is held tight for
-    the other's sake. ``solved``: how many bearings are solved in full, again and again to set the size of all limits and
-    once more of the fresh lot; 0 leaves all to the proportion. Raises MethodError where the balls alone
-    fail the class or no race error reaches the ring, and as ``linear_response`` and ``turn.follow``.
+    ``outer_share``: limit of an outer race over that of the inner race. ``sway_shares``: trial ratios of side-sway limits
+    to roundness limits; the one with the largest product of all limits is selected, so that no limit is needlessly tight.
+    ``solved``: number of bearings with full equilibria, in each correction of the size and in the fresh lot; with 0 all
+    is linear. Raises MethodError where the balls alone fail the class or no race error reaches the ring, and as
+    ``linear_response`` and ``turn.follow``.
     """
-    if not 0.0 < wanted < 1.0:
-        raise MethodError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
-    response = linear_response(bench.row, bench.control, bench.load, bench.given)
+    if not 0.0 < target_yield < 1.0:
+        raise MethodError(f"yield = {target_yield:g}: must be between 0 and 1; give a share such as 0.95")
+    response = linear_response(bench.row, bench.control, bench.load, bench.constraint)
     parts, read = _lot(bench, lot, response, bearings, seed)
     allowed = np.array([radial_limit, axial_limit])
     shares = (np.array([1.0, outer_share, share, share * outer_share]) for share in sway_shares)
-    limits = max((_widest(each, read, allowed, wanted) for each in shares), key=lambda tried: float(tried.prod()))
+    trials = (_largest_limits(ratios, read, allowed, target_yield) for ratios in shares)
+    limits = max(trials, key=lambda trial: float(trial.prod()))
     for _ in range(REFINEMENTS if solved else 0):
-        # Runout all but follows the size of the races: its quantile is brought to the limit. That of the lot is known in
-        # proportion, and from a few bearings how much larger the full one is.
+        # Runout is nearly proportional to the size of the races, so scaling brings its quantile to the limit. The linear
+        # response gives the quantile of the lot, and a few bearings the ratio of full to linear runouts.
         reached = (np.column_stack(runouts(read, limits)) / allowed).max(axis=1)
         full = (full_lot(bench, parts, limits, solved) / allowed).max(axis=1)
-        larger = np.quantile(full, wanted) / np.quantile(reached[:solved], wanted)
-        limits = limits / float(larger * np.quantile(reached, wanted))
-    # A design is best on the lot that it was fitted to: count it on another.
+        larger = np.quantile(full, target_yield) / np.quantile(reached[:solved], target_yield)
+        limits = limits / float(larger * np.quantile(reached, target_yield))
+    # A design is optimistic on its own lot, so a fresh lot counts.
     parts, read = _lot(bench, lot, response, bearings, seed + 1)
     radial, face = runouts(read, limits)
     good = (radial <= radial_limit) & (face <= axial_limit)
@@ -346,7 +351,7 @@ def full_runouts(bench: Bench, parts: Parts, limits: Array, bearing: int) -> tup
     """Radial and face runout [m] of one bearing of a lot by full equilibria, read as in ``readings``."""
     errors = bearing_errors(parts, bearing, limits)
     path = ball_path(errors, bench.turning, bench.steps, bench.turns)
-    place = follow(bench.row, bench.control, bench.load, path, bench.turns, bench.given).path
+    place = follow(bench.row, bench.control, bench.load, path, bench.turns, bench.constraint).path
     return float(np.ptp(place[:, 0])), float(np.ptp(place[:, 2] - bench.face_radius * place[:, 4]))
 
 
@@ -360,21 +365,21 @@ def _lot(bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: 
     return parts, readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
 
 
-def _widest(shares: Array, read: Readings, allowed: Array, wanted: float) -> Array:
-    """Largest limits in these shares with which the share ``wanted`` keeps what is ``allowed``, by bisection."""
+def _largest_limits(shares: Array, read: Readings, allowed: Array, target_yield: float) -> Array:
+    """Largest limits in the ratio ``shares`` with which the share ``target_yield`` keeps the ``allowed`` runouts."""
     radial_races, face_races = np.tensordot(shares, read.radial, 1), np.tensordot(shares, read.face, 1)
 
     def passes(size: float) -> bool:
         radial = np.ptp(size * radial_races + read.radial_balls, axis=1)
         face = np.ptp(size * face_races + read.face_balls, axis=1)
-        return float(((radial <= allowed[0]) & (face <= allowed[1])).mean()) >= wanted
+        return float(((radial <= allowed[0]) & (face <= allowed[1])).mean()) >= target_yield
 
     if not passes(0.0):
-        raise MethodError("the balls alone fail the class; take better balls or a wider class")
+        raise MethodError("the balls alone fail the class; use better balls or a wider class")
     low, high = 0.0, float(allowed[0])
     while passes(high):
         if high > 1e6 * allowed[0]:
-            raise MethodError("no order of these race errors reaches the ring; let the lot have more orders")
+            raise MethodError("no order of these race errors reaches the ring; give the lot more orders")
         low, high = high, 2.0 * high
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)

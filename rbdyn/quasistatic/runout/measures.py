@@ -1,14 +1,15 @@
-"""Runout of the path that a ring takes, circles about a set of points in a plane, and limits by tolerance class (ISO 492).
+"""Measures of the runout of a ring's path, circles about points in a plane, and limits by tolerance class (ISO 492).
 
-Three ways to put the radial motion into a number, none of which gives another:
-- ``indicator``: what a fixed indicator reads (its largest range over all directions). Class limits K_ia mean this. An
-  eccentric groove shows wholly, as twice its eccentricity.
-- ``minimum_zone``, ``least_squares``: distance between the circles that hold the orbit of the ring's centre between
-  them, the first the minimum zone of ISO 1101 ("distance between the maximum and minimum envelope circles", Zhou et al. 2024). An eccentric groove moves the
-  centre on a circle and does not show at all.
-- ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as of a spindle.
+Three independent measures describe the radial motion:
 
-``tolerance_classes.csv`` holds the limits of radial ball bearings with their sources.
+- ``indicator``: reading of a fixed indicator, its largest range over all directions, as in the class limits K_ia. An
+  eccentric groove shows as twice its eccentricity.
+- ``minimum_zone``, ``least_squares``: distance between two concentric circles around the orbit of the ring's centre. The
+  first is the minimum zone of ISO 1101, the "distance between the maximum and minimum envelope circles" of Zhou et al. 2024.
+  An eccentric groove moves the centre on a circle and does not show.
+- ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as for spindles.
+
+``tolerance_classes.csv`` has the limits of radial ball bearings with their sources.
 """
 
 import math
@@ -28,7 +29,7 @@ ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
 
 @dataclass(frozen=True)
 class RunningAccuracy:
-    """Largest permitted runouts [m]; None where no source was found or the class sets none.
+    """Largest permitted runouts [m]; None where the class sets no limit or no source is known.
 
     ``radial``: K_ia, of the assembled bearing's inner ring; ``face``: S_d, of its side face with the bore; ``axial``:
     S_ia, of the assembled bearing's inner ring; ``outer_radial``: K_ea, of the assembled bearing's outer ring.
@@ -43,18 +44,20 @@ class RunningAccuracy:
 def running_accuracy(
     tolerance_class: ToleranceClass, bore: float, outside_diameter: float | None = None
 ) -> RunningAccuracy:
-    """Limits of a class for a bore and, where K_ea is wanted, an outside diameter [m].
+    """Limits of a class for a bore and, for K_ea, an outside diameter [m].
 
-    Raises MethodError for a class or a bore that the tables do not hold.
+    Raises MethodError for a class or a bore outside the tables.
     """
     if tolerance_class not in get_args(ToleranceClass):
-        known = ", ".join(get_args(ToleranceClass))
-        raise MethodError(f"tolerance class {tolerance_class!r} is not known; choose one of {known}")
+        choices = ", ".join(get_args(ToleranceClass))
+        raise MethodError(f"tolerance class {tolerance_class!r} is unknown; choose one of {choices}")
     row = _row(tolerance_class, "bore", 1e3 * bore)
     if row is None:
-        held = _rows(tolerance_class, "bore")
-        reach = f"above {held[0]['above']} mm and up to {held[-1]['up_to']} mm"
-        raise MethodError(f"a bore of {1e3 * bore:g} mm: class {tolerance_class} is held here {reach}")
+        rows = _rows(tolerance_class, "bore")
+        raise MethodError(
+            f"a bore of {1e3 * bore:g} mm is outside the table of class {tolerance_class}; give one above "
+            f"{rows[0]['above']} mm and up to {rows[-1]['up_to']} mm"
+        )
     outer = None if outside_diameter is None else _row(tolerance_class, "outside", 1e3 * outside_diameter)
     limits = (*(row[name] for name in ("K_ia", "S_d", "S_ia")), outer["K_ea"] if outer else "")
     return RunningAccuracy(*(1e-6 * float(limit) if limit else None for limit in limits))  # type: ignore[arg-type]
@@ -72,7 +75,7 @@ def _row(tolerance_class: str, of: str, millimetres: float) -> dict[str, str] | 
     return next((row for row in rows if millimetres <= float(row["up_to"]) * (1.0 + 1e-12)), None)
 
 
-# Places round the face where the axial indicator may stand.
+# Number of positions of the axial indicator round the face.
 PLACES = 72
 STEPS = 60
 
@@ -81,9 +84,9 @@ STEPS = 60
 class Runout:
     """Runout [m] of a path of whole turns.
 
-    ``axial``: range of the axial displacement. ``face``: range of an axial indicator that stands at the worst place on
-    the ring's face, where tilt counts too. Synchronous: of the mean over turns at equal ring angle, by indicators;
-    asynchronous: the largest spread between turns at equal ring angle, zero for one turn.
+    ``axial``: range of the axial displacement. ``face``: range of an axial indicator at the worst position on the ring's
+    face, tilt included. Synchronous: indicator reading of the mean over turns at equal ring angle. Asynchronous: largest
+    spread between turns at equal ring angle, zero for one turn.
     """
 
     indicator: float
@@ -102,14 +105,17 @@ class Runout:
 def runout(path: Array, turns: int, face_radius: float) -> Runout:
     """Runout of a path (turns * steps, 5) of displacements x, y, z [m], theta_x, theta_y [rad].
 
-    ``face_radius``: where an axial indicator touches the ring [m]. Raises MethodError unless the steps fill whole turns.
+    ``face_radius``: radius at which an axial indicator touches the ring [m]. Raises MethodError unless the steps fill whole
+    turns.
     """
-    steps, left = divmod(len(path), turns)
-    if left or steps < 3:
-        what = f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps"
-        raise MethodError(f"{what}; fix the number of turns")
+    steps, remainder = divmod(len(path), turns)
+    if remainder or steps < 3:
+        raise MethodError(
+            f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps; fix the "
+            "number of turns"
+        )
     orbit, axial = path[:, :2], path[:, 2]
-    # Far from the origin, digits of the small motion would be lost.
+    # About the mean, the small motion loses no digits.
     orbit = orbit - orbit.mean(axis=0)
     by_turn, axial_by_turn = orbit.reshape(turns, steps, 2), axial.reshape(turns, steps)
     angle = 2.0 * math.pi * np.arange(len(path)) / steps
@@ -129,17 +135,17 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
 
 
 def face_runout(path: Array, radius: float, places: int = PLACES) -> float:
-    """Largest range [m] of an axial indicator at ``radius`` [m] over ``places`` fixed places round the face."""
+    """Largest range [m] of an axial indicator at ``radius`` [m] over ``places`` fixed positions round the face."""
     place = 2.0 * math.pi * np.arange(places) / places
     lift = path[:, 3:4] * np.sin(place) - path[:, 4:5] * np.cos(place)
     return float(np.ptp(path[:, 2:3] + radius * lift, axis=0).max())
 
 
 def error_motion(angle: Array, reading: Array) -> float:
-    """Range [m] of readings less the once-per-turn part c cos(angle) + s sin(angle) that makes it least.
+    """Least range [m] of readings less a once-per-turn part c cos(angle) + s sin(angle).
 
-    A linear programme: the minimum zone of the polar plot of the readings (ANSI B89.3.4) in the limit of a base circle
-    that is large against them.
+    A linear programme gives the minimum zone of the polar plot of the readings (ANSI B89.3.4), in the limit of a large
+    base circle.
     """
     scale = float(np.ptp(reading))
     if scale == 0.0:
@@ -158,7 +164,7 @@ def error_motion(angle: Array, reading: Array) -> float:
 
 
 class Zone(NamedTuple):
-    """Two circles about one centre (x, y) that hold all points between them; radii in the unit of the points."""
+    """Two circles about one centre (x, y) with all points between them; radii in the unit of the points."""
 
     x: float
     y: float
@@ -172,7 +178,7 @@ class Zone(NamedTuple):
 
 
 def convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of (n, 2) points, anticlockwise; the ends of a line, or one point, where flat."""
+    """Corners of the convex hull of (n, 2) points, anticlockwise; of points on a line its ends, of equal points one."""
     ordered = np.unique(points, axis=0)
     if len(ordered) < 3:
         return ordered
@@ -212,7 +218,7 @@ def least_squares_circle(points: Array) -> Zone:
         directions = away / distance[:, np.newaxis]
         system = np.column_stack((directions, np.ones(len(points))))
         step = np.linalg.lstsq(system, distance, rcond=1e-10)[0][:2]
-        # A flat or nearly flat set has its best circle far away: keep to a centre among the points.
+        # The best circle of nearly flat points is far away: the centre must stay near the points.
         limit = np.ptp(points, axis=0).max()
         if np.hypot(*step) > limit:
             break
@@ -223,18 +229,18 @@ def least_squares_circle(points: Array) -> Zone:
 
 
 def zone_about(points: Array, x: float, y: float) -> Zone:
-    """The zone of (n, 2) points about a given centre."""
+    """The zone of (n, 2) points about the centre (x, y)."""
     distance = np.hypot(points[:, 0] - x, points[:, 1] - y)
     return Zone(float(x), float(y), float(distance.min()), float(distance.max()))
 
 
 def minimum_zone(points: Array) -> Zone:
-    """Narrowest zone whose centre lies within the convex hull of (n, 2) points.
+    """Narrowest zone with its centre within the convex hull of (n, 2) points.
 
-    Without that bound an elongated orbit would lie between circles of infinite radius. From the least-squares centre,
-    the width is made least by linear programmes in the step of the centre, the distances linearised, within a trust
-    region; at the optimum four points touch the circles, where this converges quadratically. A local minimum: for
-    points round a centre, the minimum zone.
+    Without that bound an elongated orbit would be between circles of infinite radius. Starting from the least-squares
+    centre, linear programmes with linearised distances minimise the width over steps within a trust region. At the optimum
+    four points touch the circles, where the method converges quadratically. The minimum is local; for points round a
+    centre it is the minimum zone.
     """
     corners = convex_hull(points)
     size = float(np.ptp(points, axis=0).max())
@@ -246,12 +252,12 @@ def minimum_zone(points: Array) -> Zone:
     best = least_squares_circle(points)
     if np.any(normal @ (best.x, best.y) > offset):
         best = zone_about(points, *points.mean(axis=0))
-    # Distances smaller than this are round-off.
+    # Distances below this are rounding.
     rounding = 8.0 * np.finfo(float).eps * float(np.abs(points).max())
     trust = size
     for _ in range(STEPS):
-        step, predicted = _best_step(points, best, normal, offset, trust)
-        gain = best.width - predicted
+        step, width = _best_step(points, best, normal, offset, trust)
+        gain = best.width - width
         if gain <= max(1e-10 * best.width, rounding):
             return best
         trial = zone_about(points, best.x + step[0], best.y + step[1])
@@ -263,10 +269,10 @@ def minimum_zone(points: Array) -> Zone:
 
 
 def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: float) -> tuple[Array, float]:
-    """Step of the centre that makes the linearised zone narrowest, and the width it promises."""
+    """Step of the centre to the narrowest linearised zone, and the width of that zone."""
     away = points - (zone.x, zone.y)
     distance = np.hypot(*away.T)
-    # At a point itself any direction would do.
+    # For a centre at a point, any direction is valid.
     directions = away / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
     middle, scale = 0.5 * (zone.inner + zone.outer), max(zone.width, math.ulp(zone.outer))
     ones = np.ones((len(points), 1))

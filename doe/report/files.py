@@ -1,0 +1,282 @@
+"""The files of a study: summary.json, the report, answer.txt, tables and pictures; and its answer on the terminal."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from doe import clearance
+from doe.dimension_chain.solution import ALLOCATED
+from doe.report.page import html_report, markdown_report, notes, reference
+from doe.report.sections.answer import (
+    advice,
+    asked_record,
+    changes,
+    confirmation_record,
+    gains_record,
+    judged_limits_record,
+    verdict,
+)
+from doe.report.sections.design import failure_table, runs_record
+from doe.report.sections.fit import diagnostics, fit_record, fit_tables
+from doe.report.sections.front import front_record, predicted_record
+from doe.report.sections.record import drop_undefined, part, readable
+from doe.report.sections.search import (
+    adaptive_record,
+    archive_table,
+    compared_record,
+    limiting_sentence,
+    search_sentences,
+)
+from doe.report.sections.unknown import robust_record
+from doe.running.store import grouped
+from doe.study_file import Study
+from doe.workflow.adaptive import Adaptive
+from doe.workflow.confirmation import statement
+from doe.workflow.pick import SearchedPick
+from doe.workflow.runs import RUNS_TABLE, evaluation
+from doe.workflow.whole import StudyResult
+from rbdyn.base import terminal
+from rbdyn.base.blocks import Block, Detail, Heading
+from rbdyn.base.records import finite, save_table
+from rbdyn.base.storage import digest_of, sign
+from rbdyn.result import versions, write_json
+
+FORMAT = "doe.study/1"
+# Shaft turns of the motion in the pictures.
+DRAWN_TURNS = 10.0
+
+
+def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
+    """Write everything into ``folder``; returns the record of the study, whose ``files`` names them.
+
+    summary.json is written last: where it is, all else is whole.
+    """
+    from doe.report import pictures as plots
+
+    study, record = outcome.study, summary(outcome)
+    (folder / "summary.json").unlink(missing_ok=True)
+    tables = {
+        RUNS_TABLE: _runs_table(record),
+        **fit_tables(outcome.surfaces),
+        "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]]
+        if outcome.adaptive is None
+        else archive_table(study, outcome.adaptive),
+        "confirmation.csv": _confirmation_table(outcome, record),
+        "part_dimensions.csv": [
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
+            for name, chain in outcome.chains.items()
+            for part in chain.allocation
+        ],
+    }
+    if outcome.reference_values is not None:
+        tables["beside_reference.csv"] = _reference_table(outcome)
+    for name, rows in tables.items():
+        save_table(rows, folder / name)
+    pictures = []
+    for surface in outcome.surfaces:
+        pictures.append(f"surface_{surface.name}.png")
+        plots.response_surface(study, surface, folder / pictures[-1])
+    plots.pareto_front(outcome, folder / "pareto_front.png")
+    if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
+        pictures.append("robust_front.png")
+        plots.robust_front(outcome.robust.responses, outcome.robust.front, folder / pictures[-1])
+    if outcome.adaptive is not None:
+        pictures.append("adaptive_search.png")
+        plots.adaptive_search(record, folder / pictures[-1])
+    points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
+    motions = clearance.histories(study, points, DRAWN_TURNS)
+    pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
+    texts = {
+        "report.html": html_report(record, clearance.motion_record(motions)),
+        "report.md": markdown_report(record, pictures),
+        "answer.txt": answer_text(record),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    record["files"] = [*texts, "summary.json", *tables, *pictures]
+    record["answer_sha256"] = digest_of((folder / "answer.txt").read_bytes())
+    sign(record)
+    write_json(folder / "summary.json", record)
+    return record
+
+
+def answer_text(record: dict[str, Any]) -> str:
+    """answer.txt, of the record of ``doe study --json``."""
+    clean = drop_undefined(record)
+    failures = failure_table(part(clean, "failures") or [])
+    return terminal.text(readable([*verdict(clean), *advice(clean), failures], clean))
+
+
+def blocks(record: dict[str, Any]) -> list[Block]:
+    """Blocks for the terminal of the record of ``doe study --json``: the verdict first, the fits only at full detail."""
+    clean = drop_undefined(record)
+    fits = [replace(block, detail=Detail.ALL) for block in diagnostics(clean, {}).blocks]
+    published = reference(clean, {})
+    context = readable([*published.blocks, changes(clean)], clean)
+    titles = (published.title if part(clean, "beside_reference") else "", "The answer" if context else "")
+    before, after = (Heading(title, detail=Detail.USUAL) for title in titles)
+    answer = [*advice(clean), *notes(clean, {}).blocks]
+    return readable([*verdict(clean), *fits, before, *context, after, *answer], clean)
+
+
+def summary(outcome: StudyResult) -> dict[str, Any]:
+    """JSON of ``doe study``."""
+    study, gains = outcome.study, outcome.gains["pick"]
+    record: dict[str, Any] = {
+        "format": FORMAT,
+        "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
+        "limits": judged_limits_record(outcome),
+        "limits_sentence": outcome.limits_sentence,
+        "tried": outcome.tries,
+        "edge": outcome.edge.as_dict(),
+        "asked": settings_record(study),
+        "design": study_design_record(outcome),
+        "fit": fit_record(outcome.surfaces),
+        "front": front_record(study, outcome.surfaces, outcome.front),
+        "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
+        "pick": study.by_factor(outcome.pick.point) | study.categories,
+        "operating_clearances_mm": outcome.clearances.operating,
+        "clearance_class": outcome.clearances.class_sentence,
+        "confirmation": confirmation_record(outcome),
+        "gains": gains_record(gains),
+        "statement": statement(gains),
+        "whirl_sentence": outcome.whirl_sentence,
+        "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
+        "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
+        "notes": list(outcome.notes),
+        "failures": grouped(outcome.failures),
+        "cost": dict(outcome.cost),
+        "versions": versions(),
+        "inputs": outcome.inputs,
+        "seeds": {
+            "design": study.file.design.seed,
+            "front": study.file.front.seed,
+            "adaptive": study.file.adaptive.seed,
+        },
+    }
+    if outcome.adaptive is not None:
+        record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
+    if outcome.searched_pick is not None:
+        record["adaptive"]["chosen"] = _chosen_record(outcome.searched_pick)
+    if outcome.robust is not None:
+        record["robust"] = robust_record(outcome.robust, study.factors)
+    if outcome.tolerances is not None:
+        record["tolerances"] = outcome.tolerances.as_dict(study.factors)
+        record["tolerances_sentence"] = outcome.tolerances.sentence
+    return record
+
+
+def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]:
+    """The search, its fronts compared with others, and all of it in ``sentences``; ``held`` is the one on the limits of the pick."""
+    sentences = search_sentences(outcome)
+    sentences_record = {"held": limiting_sentence(outcome), "sentences": sentences, "sentence": " ".join(sentences)}
+    volumes = (
+        {} if outcome.front_comparison is None else compared_record(outcome.study, adaptive, outcome.front_comparison)
+    )
+    return adaptive_record(outcome.study, adaptive) | {"compared": volumes} | sentences_record
+
+
+def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
+    """Why the pick is this point of the searched front, and the share of its parts that still dominate the baseline."""
+    aware = pick.aware
+    return {
+        "row": pick.row,
+        "reason": pick.reason,
+        "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
+    }
+
+
+def settings_record(study: Study) -> dict[str, Any]:
+    """Scene, factors with their ranges, responses with their goals."""
+    scene = clearance.design_scenes(study, study.baseline[None])[0]
+    return {
+        "study_file": study.path.name,
+        "scene_file": study.scene.file,
+        "scene": scene.model_dump(mode="json", exclude_none=True),
+        **asked_record(study),
+        "replicates": scene.numerics.replicates,
+        "turns": scene.numerics.turns,
+        "confirmation_replicates": study.file.confirmation.replicates,
+    }
+
+
+def study_design_record(outcome: StudyResult) -> dict[str, Any]:
+    """Points with their results, the quality of the design, and failed runs."""
+    study, design, runs = outcome.study, outcome.design, outcome.runs
+    rows = {place: row for row, place in enumerate(runs.places)}
+    return {
+        "kind": study.file.design.kind,
+        "runs": len(design.coded),
+        "factors": study.factors,
+        "responses": study.responses,
+        "points": [
+            {**run, "responses": _responses(outcome, rows.get(place))}
+            for place, run in enumerate(runs_record(study, design))
+        ],
+        "evaluation": evaluation(study, design),
+        "failures": grouped(runs.failures),
+    }
+
+
+def _responses(outcome: StudyResult, row: int | None) -> dict[str, Any]:
+    """Results of a run by response; none of a failed one."""
+    if row is None:
+        return {}
+    runs = outcome.runs
+    return {
+        name: {"value": float(value), "error": finite(error)}
+        for name, value, error in zip(outcome.study.responses, runs.values[row], runs.errors[row], strict=True)
+    }
+
+
+def _runs_table(record: dict[str, Any]) -> list[dict[str, Any]]:
+    """The runs with results."""
+    return [
+        {
+            **{key: run[key] for key in ("run", "kind", "block")},
+            **{f"coded_{name}": x for name, x in run["coded"].items()},
+            **run["factors"],
+            **{name: quantity["value"] for name, quantity in run["responses"].items()},
+            **{f"{name}_error": quantity["error"] for name, quantity in run["responses"].items()},
+        }
+        for run in record["design"]["points"]
+        if run["responses"]
+    ]
+
+
+def _reference_table(outcome: StudyResult) -> list[dict[str, Any]]:
+    study, runs = outcome.study, outcome.runs
+    assert outcome.reference_values is not None
+    return [
+        {
+            "run": run + 1,
+            **dict(zip(study.factors, runs.actual[run], strict=True)),
+            **{f"{name}_ours": x for name, x in zip(study.responses, runs.values[run], strict=True)},
+            **{f"{name}_theirs": x for name, x in zip(study.responses, theirs, strict=True)},
+        }
+        for run, theirs in enumerate(outcome.reference_values)
+    ]
+
+
+def _confirmation_table(outcome: StudyResult, record: dict[str, Any]) -> list[dict[str, Any]]:
+    """A row for each point and response."""
+    rows = []
+    for name, point in record["confirmation"].items():
+        joint = outcome.confirmed[name].error
+        for (response, quantity), error in zip(point["responses"].items(), joint, strict=True):
+            gain, limit = point.get("gains", {}).get(response, {}), point["limits"].get(response)
+            rows.append(
+                {
+                    "point": name,
+                    **point["factors"],
+                    "response": response,
+                    **quantity,
+                    "improvement_percent": gain.get("percent"),
+                    "improvement_error_percent": gain.get("error_percent"),
+                    "verdict": gain.get("verdict", ""),
+                    "joint_error": error,
+                    "limit": f"{limit['sense']} {limit['bound']:g}" if limit else "",
+                    "limit_verdict": limit["verdict"] if limit else "",
+                }
+            )
+    return rows

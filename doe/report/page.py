@@ -1,0 +1,280 @@
+"""A whole study as one HTML page that can be mailed, and the same answer and tables as Markdown.
+
+The page fetches nothing, and all but the interactive pictures can be read without scripts and on paper. ``sections`` lists its
+chapters in the order in which they are read; what a record lacks is left out. The scripts, the style sheet and the controls
+are files of ``html``; ``page_data`` holds the numbers for the scripts, and nothing else.
+"""
+
+import json
+import math
+import string
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from html import escape
+from importlib.resources import files
+from pathlib import PurePath
+from typing import Any
+
+from doe.report.sections import answer, bearing, chain, design, fit, front
+from doe.report.sections.answer import tolerance_of
+from doe.report.sections.design import failure_table
+from doe.report.sections.front import bounds, complete, fronts, picks
+from doe.report.sections.record import (
+    Factor,
+    Record,
+    drop_undefined,
+    factors,
+    fits,
+    part,
+    readable,
+    record_table,
+    responses,
+    rounded_down,
+)
+from rbdyn.base import html, markdown
+from rbdyn.base.blocks import Block, Bullets, Detail, Note, Section, Table, Widget
+from rbdyn.base.words import filled_page, label, quantity, shown
+
+# In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
+SCRIPTS = {
+    "page": ("page.js", "tables.js"),
+    "surface": ("model.js", "emulator.js", "viridis.js", "contours.js", "surface.js", "surface_view.js"),
+    "front": ("front.js",),
+    "bearing": ("motion.js",),
+}
+# Letters of packed numbers, each worth its place, in the order of base 64; ``motion.js`` has the same.
+LETTERS = string.ascii_uppercase + string.ascii_lowercase + string.digits + "+/"
+# Of two letters: distinct numbers less one that keeps zero exact and one for rounding.
+STEPS = len(LETTERS) ** 2 - 2
+
+
+def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str:
+    """A study as one HTML page.
+
+    summary : record of ``doe study --json``; parts that are missing or null are left out.
+    motion : record of ``doe.clearance.motion_record``; without it nothing moves.
+    """
+    record = drop_undefined(dict(summary))
+    moving = drop_undefined(dict(motion or {}))
+    chapters = sections(record, moving)
+    widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
+    marks = {
+        "TITLE": escape(title(record)),
+        "STYLE": text("report.css"),
+        "CONTENTS": "".join(f'<li><a href="#{section.key}">{escape(section.title)}</a></li>' for section in chapters),
+        "SECTIONS": "\n".join(html.section(section, _widget) for section in chapters),
+        "DATA": _json(page_data(record, moving)),
+        "SCRIPTS": "\n".join(f"<script>\n{script}</script>" for script in _scripts(widgets)),
+    }
+    return filled_page(text("page.html"), marks)
+
+
+def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
+    """Markdown of the record of ``doe study --json``; ``pictures`` are files next to it."""
+    record = drop_undefined(dict(summary))
+    return markdown.page(title(record), sections(record), pictures)
+
+
+def title(summary: Record) -> str:
+    """The title of the study, or the name of its file in words."""
+    settings = summary.get("asked") or {}
+    stem = PurePath(settings.get("study_file") or "clearance study").stem.replace("_", " ")
+    return settings.get("title") or stem[:1].upper() + stem[1:]
+
+
+def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
+    """Sections with something to say, of a record without undefined values (``drop_undefined``)."""
+    chapters = [chapter(summary, motion or {}) for chapter in CHAPTERS]
+    whole = [replace(section, blocks=readable(section.blocks, summary)) for section in chapters if section]
+    return [section for section in whole if section.blocks]
+
+
+def text(name: str) -> str:
+    """A file of the page."""
+    return files("doe.report").joinpath("html", name).read_text(encoding="utf-8")
+
+
+def _widget(name: str) -> str:
+    """Controls of an interactive picture."""
+    return text(f"{name}.html")
+
+
+def _scripts(widgets: set[str]) -> list[str]:
+    """Scripts of the page and of the widgets on it."""
+    scripts = []
+    for widget, names in SCRIPTS.items():
+        if widget in widgets | {"page"}:
+            if widget == "bearing":
+                scripts.append(files("rbdyn").joinpath("plots", "bearing.js").read_text(encoding="utf-8"))
+            scripts += [text(name) for name in names]
+    return scripts
+
+
+def _json(record: Mapping[str, Any]) -> str:
+    """Data inside a script element: no name in it can end the element."""
+    return json.dumps(record, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
+    """Factors, surfaces, runs, fronts and motion, ready for JSON."""
+    inputs = factors(summary)
+    names = [response["name"] for response in responses(summary)]
+    marks = picks(summary)
+    record = {
+        "factors": [_factor(summary, factor) for factor in inputs],
+        "responses": [{"name": name, **_named(name)} for name in names],
+        "surfaces": _surfaces(summary),
+        "runs": [
+            {
+                "run": point.get("run"),
+                "factors": [part(point, "factors", factor.name) for factor in inputs],
+                "values": {name: part(point, "responses", name, "value") for name in names},
+            }
+            for point in part(summary, "design", "points") or []
+        ],
+        "marks": {
+            name: [part(point, "factors", factor.name) for factor in inputs]
+            for name, point in marks.items()
+            if name in ("baseline", "pick") and complete(point, summary)
+        },
+        "fronts": [
+            {"words": points.words, "points": [_point(point, inputs, names) for point in points.points]}
+            for points in fronts(summary)
+        ],
+        "compared": {name: _point(point, inputs, names) for name, point in marks.items()},
+        "motion": {name: _moving(run["moving"]) for name, run in motion.items() if part(run, "moving")},
+    }
+    if emulators := part(summary, "adaptive", "emulators"):
+        region = [part(summary, "adaptive", "region", factor.name) for factor in inputs]
+        record["emulators"] = emulators | {"region": region}
+    return record
+
+
+def _factor(summary: Record, factor: Factor) -> dict[str, Any]:
+    keys = ("name", "words", "unit", "letter", "centre", "step", "low", "high", "decimals")
+    tolerance = tolerance_of(summary, factor)
+    return {key: getattr(factor, key) for key in keys} | {"tolerance": rounded_down(tolerance) if tolerance else None}
+
+
+def _named(name: str) -> dict[str, str]:
+    words, unit = quantity(name)
+    return {"words": words, "unit": unit}
+
+
+def _point(point: Record, inputs: Sequence[Factor], names: Sequence[str]) -> dict[str, Any]:
+    """Short keys, for there are many: x factors, y responses, e half-widths, r values with tolerances."""
+    values = {
+        "x": [_rounded(part(point, "factors", factor.name)) for factor in inputs],
+        "y": [_rounded(part(point, "responses", name)) for name in names],
+        "e": [_rounded(part(point, "errors", name), 2) for name in names] if point.get("errors") else None,
+        "r": [_rounded(part(point, "robust", name)) for name in names] if point.get("robust") else None,
+    }
+    return {key: row for key, row in values.items() if row is not None}
+
+
+def _rounded(value: float | None, digits: int = 6) -> float | None:
+    return None if value is None else float(f"{value:.{digits}g}")
+
+
+def _moving(motion: Record) -> dict[str, Any]:
+    """The motion of a point, its series of every roller packed."""
+    return {
+        key: packed(value) if isinstance(value, list) and len(value) > motion["frames"] else value
+        for key, value in motion.items()
+    }
+
+
+def packed(numbers: Sequence[float]) -> dict[str, Any]:
+    """Numbers as ``step`` (``first`` + k), each k of ``letters`` in two: to a four-thousandth of their range, zero exactly."""
+    low, high = min(numbers), max(numbers)
+    step = float(f"{(high - low) / STEPS:.6g}") or 1.0
+    first = math.floor(low / step)
+    counts = [round(number / step) - first for number in numbers]
+    return {"step": step, "first": first, "letters": "".join(LETTERS[k // 64] + LETTERS[k % 64] for k in counts)}
+
+
+def _surfaces(summary: Record) -> list[dict[str, Any]]:
+    """Terms and coefficients; with the covariance also what a 95 % confidence interval needs."""
+    from scipy.stats import t
+
+    surfaces, limits = [], bounds(summary)
+    for name, fitted in fits(summary).items():
+        coefficients = fitted["coefficients"]
+        covariance, model_error = fitted.get("covariance"), fitted.get("model_error") or {}
+        residual = next((row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None)
+        freedom = model_error.get("dof") or residual
+        surfaces.append(
+            {
+                "name": name,
+                "bounds": limits.get(name, []),
+                **_named(name),
+                "terms": list(coefficients),
+                "coefficients": list(coefficients.values()),
+                "covariance": covariance,
+                "student": float(t.ppf(0.975, freedom)) if covariance and residual else None,
+                "missed": model_error.get("variance"),
+                "power": fitted.get("transform"),
+            }
+        )
+    return surfaces
+
+
+def reference(summary: Record, motion: Mapping[str, Any]) -> Section:
+    """Levels, effects and ranks compared with a published table, with the reasons for what differs."""
+    levels, effects, words = [], [], []
+    for name, row in (part(summary, "beside_reference") or {}).items():
+        for whose in ("ours", "theirs"):
+            triple = row.get(f"{whose}_min_mean_max") or ("",) * 3
+            ranks = shown(row.get("rank_correlation"), 2) if whose == "ours" else ""
+            levels.append((f"{label(name)}, {whose}", *map(shown, triple), ranks))
+        for factor, effect in (row.get("linear_effects") or {}).items():
+            sign = "same" if effect.get("same_sign") else "opposite"
+            sizes = (_effect(effect, whose) for whose in ("ours", "theirs"))
+            effects.append((label(name), label(factor), *sizes, sign))
+        words.append(" ".join(filter(None, (row.get("verdict"), row.get("why")))))
+    levels_header = ("response", "least", "mean", "largest", "rank correlation")
+    header = ("response", "factor", "ours", "theirs", "sign")
+    caption = "Linear effects per coded unit (* significant at 5 %)"
+    blocks: list[Block] = [
+        Bullets([sentence for sentence in words if sentence], detail=Detail.USUAL),
+        Table("Levels", levels_header, levels, detail=Detail.USUAL),
+        Table(caption, header, effects, text_columns=(1, 4), detail=Detail.USUAL),
+    ]
+    return Section("reference", "Compared with the published table", blocks)
+
+
+def _effect(effect: Record, whose: str) -> str:
+    """An effect, starred where it is significant."""
+    size = effect.get(whose)
+    return "" if size is None else f"{size:+.3g}{'*' if effect.get(f'{whose}_significant') else ''}"
+
+
+def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Seeds, versions and cost: what it takes to get the same numbers again."""
+    captions = (("seeds", "Seeds"), ("versions", "Versions"), ("cost", "Cost, times in seconds"))
+    tables = [record_table(caption, part(summary, key)) for key, caption in captions]
+    return Section("settings", "Settings, versions, cost", tables)
+
+
+def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
+    """Runs that failed, and limits of the model that the runs met."""
+    failures = failure_table(part(summary, "failures") or [])
+    remarks = [Note(str(note)) for note in part(summary, "notes") or []]
+    return Section("notes", "Notes and failures", [failures, *remarks])
+
+
+CHAPTERS = (
+    answer.answer,
+    answer.settings,
+    design.design,
+    fit.surfaces,
+    fit.diagnostics,
+    front.front,
+    answer.confirmation,
+    chain.chains,
+    bearing.power,
+    bearing.motion,
+    reference,
+    settings,
+    notes,
+)

@@ -1,0 +1,142 @@
+"""Pictures of a study as PNG files: response surfaces, the search, the Pareto front, and the robust front."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from doe.report import still
+from doe.report.sections.record import Record
+from doe.report.sections.search import search_stills
+from doe.response_surface import Surface
+from doe.study_file import Study
+from doe.workflow.robust import RobustFront
+from doe.workflow.runs import design_of
+from doe.workflow.whole import StudyResult
+from rbdyn.base.words import label, quantity
+
+# Most pictures in a row.
+COLUMNS = 3
+
+
+def response_surface(study: Study, surface: Surface, path: Path) -> None:
+    """Surface over the first factor and each other one, the rest at their centre, with contours below."""
+    factors = len(study.factors)
+    reach = design_of(study).reach
+    grid = np.linspace(-reach, reach, 41)
+    figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
+    for panel in range(1, factors):
+        coded = np.zeros((grid.size, grid.size, factors))
+        coded[..., 0], coded[..., panel] = np.meshgrid(grid, grid, indexing="ij")
+        actual = study.actual(coded)
+        values = surface.predict(coded)
+        axis = figure.add_subplot(1, factors - 1, panel, projection="3d")
+        x, y = actual[..., 0], actual[..., panel]
+        axis.plot_surface(x, y, values, cmap="viridis", alpha=0.9, linewidth=0)
+        span = np.ptp(values) or abs(float(values.mean())) or 1.0
+        floor = values.min() - 0.35 * span
+        axis.contour(x, y, values, zdir="z", offset=floor, cmap="viridis", levels=10, linewidths=0.9)
+        top = values.max()
+        for bound in _bounds(study, surface.name):
+            if floor < bound < top + 0.5 * span:
+                corners = [np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)]
+                plane = np.full((2, 2), bound)
+                axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
+                top = max(top, bound)
+            if values.min() < bound < values.max():
+                axis.contour(x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0)
+        axis.set_zlim(floor, top)
+        axis.set_xlabel(label(study.factors[0]), labelpad=8)
+        axis.set_ylabel(label(study.factors[panel]), labelpad=8)
+        axis.set_zlabel(label(surface.name))
+        rest = [place for place in range(1, factors) if place != panel]
+        named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
+        fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
+        notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in _bounds(study, surface.name))]
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
+        axis.tick_params(labelsize=8)
+        for one in (axis.xaxis, axis.yaxis, axis.zaxis):
+            one.set_major_locator(MaxNLocator(4))
+        axis.view_init(elev=24, azim=-128)
+    figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _bounds(study: Study, name: str) -> list[float]:
+    response = next(entry for entry in study.file.response if entry.name == name)
+    return [bound for bound in (response.lower, response.upper) if bound is not None]
+
+
+def adaptive_search(record: Record, path: Path) -> None:
+    """Hypervolume against runs compared with other fronts, and where each run was spent and why, of the record of a study."""
+    progress, places = search_stills(record)
+    still.save([*progress, *places], COLUMNS, path)
+
+
+def pareto_front(outcome: StudyResult, path: Path) -> None:
+    """Every pair of responses: the fronts, and baseline and pick both on the surfaces and simulated."""
+    study, surfaces = outcome.study, outcome.surfaces
+    clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
+    if outcome.front.tolerance_aware is not None:
+        clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))
+    if outcome.adaptive is not None:
+        search = outcome.adaptive.search
+        clouds.append(("front predicted by emulators", search.predictions[search.representatives], "tab:olive"))
+        clouds.append(("its points, simulated anew", outcome.adaptive.front.values, "tab:green"))
+    for axis, (i, j) in _pairs(len(surfaces), path, 6):
+        for words, values, color in clouds:
+            axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
+        for words, point, marker, color in (
+            ("baseline", outcome.baseline, "s", "black"),
+            ("pick", outcome.pick, "*", "tab:red"),
+        ):
+            coded = study.coded(point.point)
+            prediction = [float(surface.predict(coded)) for surface in surfaces]
+            size = 13 if marker == "*" else 6
+            for x, simulated, face in ((prediction, "on the surfaces", color), (point.values, "simulated", "none")):
+                axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
+        for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
+            for bound in _bounds(study, surfaces[response].name):
+                words = f"limit {label(surfaces[response].name)} {bound:g}" if number == 0 else ""
+                draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
+        axis.set_xlabel(label(surfaces[i].name))
+        axis.set_ylabel(label(surfaces[j].name))
+
+
+def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
+    """Every pair of gains that hold over the unknown inputs: predicted along the front, and simulated."""
+    for axis, (i, j) in _pairs(len(responses), path, 2):
+        gains = 100.0 * front.gains
+        axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="predicted by emulators")
+        for (name, point), marker in zip(front.confirmed.items(), "*o^v", strict=False):
+            x, y = 100.0 * point.gains[[i, j]]
+            words = f"{name}, simulated: better in all in {100.0 * point.better.all.value:.0f} %"
+            color = "tab:red" if marker == "*" else "black"
+            axis.plot(x, y, marker, mfc="none", color=color, markersize=9, label=words)
+        axis.axhline(0.0, color="tab:gray", linewidth=1.0)
+        axis.axvline(0.0, color="tab:gray", linewidth=1.0)
+        axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")
+        axis.set_ylabel(f"gain in {quantity(responses[j])[0]} [%]")
+
+
+def _pairs(count: int, path: Path, columns: int) -> Iterator[tuple[Axes, tuple[int, int]]]:
+    """Axes for every pair of so many responses to draw on, saved with one legend of so many ``columns`` in the end."""
+    pairs = list(combinations(range(count), 2))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
+    yield from zip(axes[0], pairs, strict=True)
+    for axis in axes[0]:
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    # Below the figure, where no point lies.
+    first = axes[0][0].get_legend_handles_labels()
+    figure.legend(*first, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=columns, fontsize=8)
+    figure.savefig(path, dpi=130, bbox_inches="tight")
+    plt.close(figure)

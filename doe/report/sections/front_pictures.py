@@ -1,0 +1,287 @@
+"""Pictures of the Pareto front: every pair of responses, parallel coordinates, and the search.
+
+They are stills. ``front.js`` adds the marked point, which it finds by the axes that each picture states in ``data-front``.
+"""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from doe.report.sections.record import Factor, Record, half_width, part
+from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
+from rbdyn.base.words import label, quantity, shown
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+Range = tuple[float, float]
+
+
+# Marker, size [pt] and colour of a point by its name, so that no two are told apart by colour alone.
+MARKS = {
+    "baseline": ("s", 8.0, "ink"),
+    "pick": ("*", 14.0, "vermilion"),
+    "knee": ("D", 8.0, "orange"),
+    "desirability": ("^", 9.0, "green"),
+    "weights": ("v", 9.0, "purple"),
+    "without tolerances": ("P", 10.0, "vermilion"),
+}
+
+
+OTHER = ("h", 9.0, "purple")
+
+
+# Colour of the points of a front, and whether they are rings.
+FRONTS = {"front": ("blue", False), "robust": ("purple", True), "direct": ("green", True)}
+
+
+DOT, RING = 5.2, 1.8  # diameter of a point and thickness of a ring [pt]
+
+
+LEGEND_ROW = 17.0  # [pt]
+
+
+PARALLEL: dict[str, Any] = {
+    "width": 760.0, "height": 260.0, "left_margin": 12.0, "bottom_margin": 20.0, "top_margin": 40.0
+}  # fmt: skip
+
+
+# Look of a limit of a response.
+LIMIT: dict[str, Any] = {"color": COLOURS["vermilion"], "linewidth": 1.6, "dashes": (4.4, 1.9)}
+
+
+@dataclass(frozen=True)
+class Front:
+    """A set of points to look through; ``role`` tells them apart in pictures."""
+
+    role: str
+    words: str
+    points: list[Record]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A factor or a response along which points are drawn: the ``kind`` of value, its name and its place among its kind."""
+
+    kind: str
+    name: str
+    place: int
+    ends: Range
+
+    def values(self, points: Iterable[Record]) -> list[float]:
+        """Its value at each point."""
+        return [point[self.kind][self.name] for point in points]
+
+    def share(self, point: Record) -> float:
+        """Where the value of a point is between the ends, 0 to 1."""
+        low, high = self.ends
+        return float((point[self.kind][self.name] - low) / (high - low))
+
+
+def pair_still(
+    one: tuple[int, str],
+    two: tuple[int, str],
+    sets: Sequence[Front],
+    marks: Mapping[str, Record],
+    confirmed: Mapping[str, Record],
+    limits: Mapping[str, Sequence[float]],
+) -> Still:
+    """The fronts over two responses, given as place and name, with their limits and with what simulation confirmed."""
+    simulated = {
+        name: pair for name, point in confirmed.items() if (pair := _simulated(point, one[1], two[1])) is not None
+    }
+    points = [*marks.values(), *(point for front in sets for point in front.points)]
+    axes = []
+    for along, (place, name) in enumerate((one, two)):
+        values = [point["responses"][name] for point in points] + [pair[0][along] for pair in simulated.values()]
+        axes.append(Coordinate("responses", name, place, span([*values, *limits.get(name, ())])))
+    words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
+    still = Still(words, partial(_pair, axes, sets, marks, simulated, limits))
+    return replace(still, data={"front": _data("pair", axes, still)})
+
+
+def _simulated(point: Record, one: str, two: str) -> tuple[Point, tuple[float | None, float | None]] | None:
+    """Two responses of a confirmed point with the half-widths of their intervals; None where one of them failed."""
+    pair = [part(point, "responses", name) or {} for name in (one, two)]
+    x, y = (response.get("value") for response in pair)
+    return None if x is None or y is None else ((x, y), (half_width(pair[0]), half_width(pair[1])))
+
+
+def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:
+    """What ``front.js`` needs to find a point: kind, place and ends of every axis, and the frame."""
+    rows = [[one.kind, one.place, *one.ends] for one in axes]
+    return json.dumps({"kind": kind, "axes": rows, "frame": still.frame}, separators=(",", ":"))
+
+
+def _pair(
+    axes: Sequence[Coordinate],
+    sets: Sequence[Front],
+    marks: Mapping[str, Record],
+    simulated: Mapping[str, tuple[Point, tuple[float | None, float | None]]],
+    limits: Mapping[str, Sequence[float]],
+    axis: "Axes",
+) -> None:
+    across, up = axes
+    axis.set(xlim=across.ends, ylim=up.ends, xlabel=label(across.name), ylabel=label(up.name))
+    for draw, response in ((axis.axvline, across), (axis.axhline, up)):
+        for bound in limits.get(response.name, ()):
+            draw(bound, **LIMIT)
+    for front in sets:
+        _dots(axis, front.role, across.values(front.points), up.values(front.points))
+    for name, point in marks.items():
+        _mark(axis, name, (point["responses"][across.name], point["responses"][up.name]))
+    for name, (place, half_widths) in simulated.items():
+        for line in error_bars(place, half_widths, (across.ends, up.ends)):
+            axis.plot(*zip(*line, strict=True), color=COLOURS["ink"], linewidth=1.4)
+        _mark(axis, name, place, simulated=True)
+
+
+def error_bars(
+    place: Point, half_widths: tuple[float | None, float | None], ends: tuple[Range, Range]
+) -> list[list[Point]]:
+    """Lines of half-widths along x and y about a place, as far as the frame reaches."""
+    x, y = place
+    lines: list[list[Point]] = []
+    for along, ((low, high), half) in enumerate(zip(ends, half_widths, strict=True)):
+        if half:
+            tips = max(place[along] - half, low), min(place[along] + half, high)
+            lines.append([(x, tip) if along else (tip, y) for tip in tips])
+    return lines
+
+
+def _dots(axis: "Axes", role: str, x: Sequence[float], y: Sequence[float]) -> None:
+    """The points of a front as one path of round dots, a tenth of the text of a mark for each."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    corners = [place for place in zip(x, y, strict=True) for _ in range(2)]
+    path = Path(corners, [Path.MOVETO, Path.LINETO] * len(x))
+    path.should_simplify = False
+    colour, ring = FRONTS[role]
+    layers = [(colour, DOT)] if not ring else [(colour, DOT + 0.5 * RING), ("paper", DOT - 0.5 * RING)]
+    for layer, (shade, width) in enumerate(layers):
+        patch = PathPatch(path, edgecolor=COLOURS[shade], facecolor="none", linewidth=width, capstyle="round")
+        name_marks(patch, f"dots {role}" if layer == 0 else "inside")
+        axis.add_patch(patch)
+
+
+def _mark(axis: "Axes", name: str, place: Point, simulated: bool = False) -> None:
+    """A point with a name, hollow where it is simulated."""
+    words = name.replace("_", " ")
+    marker, size, shade = MARKS.get(words, OTHER)
+    colour, paper = COLOURS[shade], COLOURS["paper"]
+    face, edge, thick = (paper, colour, 1.6) if simulated else (colour, paper, 0.8)
+    (line,) = axis.plot(
+        *place, marker, markersize=size, markerfacecolor=face, markeredgecolor=edge, markeredgewidth=thick
+    )
+    name_marks(line, "mark", [f"{words}, simulated" if simulated else words])
+
+
+def legend_still(sets: Sequence[Front], marks: Mapping[str, Record], confirmed: bool, limited: bool) -> Still:
+    """What the marks of the pictures mean; a hollow mark is the same point, simulated."""
+    count = len(sets) + len(marks) + confirmed + limited
+    draw = partial(_legend, sets, list(marks), confirmed, limited)
+    height = 20.0 + LEGEND_ROW * -(-count // 2)
+    return Still("Marks of the pictures of the front", draw, height=height, left_margin=4.0, bottom_margin=4.0)
+
+
+def _legend(sets: Sequence[Front], names: Sequence[str], confirmed: bool, limited: bool, axis: "Axes") -> None:
+    from matplotlib.lines import Line2D
+
+    axis.set_axis_off()
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o"}
+    handles = []
+    for front in sets:
+        colour, ring = FRONTS[front.role]
+        look: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markeredgewidth": RING} if ring else {}
+        handles.append(
+            Line2D([], [], **dot, **look, color=COLOURS[colour], markersize=DOT, label=f"front {front.words}")
+        )
+    for name in names:
+        marker, size, colour = MARKS.get(name, OTHER)
+        handles.append(Line2D([], [], linestyle="", marker=marker, color=COLOURS[colour], markersize=size, label=name))
+    if confirmed:
+        hollow: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markersize": 8.0, "color": COLOURS["ink"]}
+        handles.append(Line2D([], [], linestyle="", marker="s", **hollow, label="hollow: simulated"))
+    if limited:
+        handles.append(Line2D([], [], **LIMIT, label="limit"))
+    axis.legend(handles=handles, ncol=2, loc="upper left", borderaxespad=0.0)
+
+
+def parallel_still(
+    inputs: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, Record]
+) -> Still:
+    """Parallel coordinates: an axis for each factor and response, a line for each point."""
+    keys = [("factors", place, factor.name) for place, factor in enumerate(inputs)]
+    keys += [("responses", place, name) for place, name in enumerate(names)]
+    points = [*(point for front in sets for point in front.points), *marks.values()]
+    axes = [Coordinate(kind, name, place, span((p[kind][name] for p in points), 0.02)) for kind, place, name in keys]
+    words = f"Parallel coordinates of {len(points) - len(marks)} points of the front"
+    both = {name: marks[name] for name in ("baseline", "pick") if name in marks}
+    still = Still(words, partial(_parallel, axes, sets, both), **PARALLEL)
+    return replace(still, data={"front": _data("parallel", axes, still)})
+
+
+def _parallel(axes: Sequence[Coordinate], sets: Sequence[Front], marks: Mapping[str, Record], axis: "Axes") -> None:
+    from matplotlib.collections import LineCollection
+
+    middles = [number + 0.5 for number in range(len(axes))]
+    axis.set(xlim=(0.0, len(axes)), ylim=(0.0, 1.0), xticks=[], yticks=[])
+    axis.spines[:].set_visible(False)
+    for front in sets:
+        lines = [
+            [(x, coordinate.share(point)) for x, coordinate in zip(middles, axes, strict=True)]
+            for point in front.points
+        ]
+        threads = LineCollection(lines, colors=COLOURS[FRONTS[front.role][0]], linewidths=0.6, alpha=0.35)
+        name_marks(threads, f"threads {front.role}")
+        axis.add_collection(threads, autolim=False)
+    for name, point in marks.items():
+        heights, dashes = [coordinate.share(point) for coordinate in axes], "--" if name == "baseline" else "-"
+        axis.plot(middles, heights, dashes, color=COLOURS[MARKS[name][2]], linewidth=2.2)
+        for place in zip(middles, heights, strict=True):
+            _mark(axis, name, place)
+    for number, coordinate in enumerate(axes):
+        _upright(axis, number, coordinate)
+
+
+def _upright(axis: "Axes", number: int, coordinate: Coordinate) -> None:
+    """One of the parallel axes with its name and ticks."""
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+    middle, (low, high) = number + 0.5, coordinate.ends
+    axis.axvline(middle, color=COLOURS["line"], linewidth=1.0)
+    # Names in two lines by turns, so that long ones keep apart.
+    axis.annotate(label(coordinate.name), (middle, 1.0), (0.0, 24.0 - 18.0 * (number % 2)), textcoords="offset points",
+                  ha="center", va="bottom", fontsize=12.0, annotation_clip=False)  # fmt: skip
+    formatter = ScalarFormatter(useOffset=False)
+    formatter.create_dummy_axis()
+    assert formatter.axis is not None
+    formatter.axis.set_view_interval(low, high)
+    ticks = [x for x in MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= x <= high]
+    for x, words in zip(ticks, formatter.format_ticks(ticks), strict=True):
+        text = axis.text(middle - 0.05, (x - low) / (high - low), words, ha="right", va="center", fontsize=SMALL)
+        name_marks(text, "halo")
+
+
+def span(values: Iterable[float], margin: float = 0.06) -> Range:
+    """A range that holds all finite values, with a margin; never empty."""
+    finite = [value for value in values if math.isfinite(value)] or [0.0]
+    low, high = min(finite), max(finite)
+    room = margin * (high - low) or 0.1 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def hypervolume(history: Sequence[float]) -> Still:
+    """Hypervolume by generation."""
+    words = f"Hypervolume rises from {shown(history[0])} to {shown(history[-1])} in {len(history)} generations"
+    return Still(words, partial(_hypervolume, history), width=400.0, height=220.0)
+
+
+def _hypervolume(history: Sequence[float], axis: "Axes") -> None:
+    axis.plot(range(1, len(history) + 1), history)
+    axis.set(xlim=(0.0, len(history)), xlabel="generation", ylabel="hypervolume")

@@ -1,0 +1,496 @@
+"""Model adequacy of a least-squares fit: analysis of variance, backward elimination, residual diagnostics, model error.
+
+- ``anova``: partial (type III) sums of squares, lack of fit, pure error; ``goodness``: R2 and similar figures
+- ``eliminate``: backward elimination of terms
+- ``diagnose``: leverage, studentized residuals, Cook's distance, normality, outliers
+- ``compare``: scatter of the runs compared with their known variances; ``model_error``: lack of fit as an error of predictions
+
+Weighted fits have weighted sums. Repeated runs count within a block. Differences of blocks are a separate source and no part
+of the model, so R2 refers to the scatter within blocks.
+
+Known variances come from replicates of the simulation. The residuals over them give a test of lack of fit that needs no
+repeated design points. Repeated points show whether the replicates contain all of the scatter. A variance of few replicates
+is itself uncertain, and the tests allow for it. With weights from few replicates they are conservative: with 8 replicates,
+5 % tests reject a true surface in 1 to 2 % of fits, with equal weights in 5 %.
+
+Where lack of fit is significant, the response is the model plus a random field of mean zero and constant variance. Its
+correlation length is one coded unit, so that distinct runs of a design are nearly independent. The variance of the field is
+a variance component, estimated by the expectation of the sum of squares: the mean square of lack of fit less that of pure
+error, over the share of the runs in it. An interval combines the error of the coefficients and the field as root sum square.
+Student's t has the degrees of freedom of the source of the field. Without significant lack of fit there is no field, and
+intervals are those of textbooks.
+
+Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.4-2.7 and 7.5; Belsley, Kuh and Welsch,
+Regression Diagnostics (1980); Cook and Weisberg, Residuals and Influence in Regression (1982); Shapiro and Wilk (1965).
+Field: Sacks, Welch, Mitchell and Wynn, Design and analysis of computer experiments, Stat. Sci. 4 (1989). Its variance: Searle,
+Casella and McCulloch, Variance Components (1992). Known variances: Satterthwaite, An approximate distribution of estimates of
+variance components (1946); Welch (1951).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, Literal, TypedDict, cast
+
+import numpy as np
+from scipy import special, stats
+
+from doe.designs.design import replicate_groups
+from doe.designs.model import Terms, needed
+from doe.response_surface.least_squares import LeastSquares
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import Record, derived, finite, keyed, outside_json
+
+KEEP_BELOW = 0.05  # p-value up to which a term stays in a reduced model
+EXACT = 1e-12  # 1 - leverage below which the fit passes through a run, whatever its value
+INFLUENTIAL = 1.0  # Cook's distance above which omitting a run moves the surface beyond its own error
+HIGH_LEVERAGE = 2.0  # leverage in units of the mean leverage
+SIGNIFICANT = 0.05  # p-value up to which a test shows a model error
+REACH = 1.0  # correlation length of the model error in coded units, half the edge of the cube of a design
+Source = Literal["repeats", "known variance"]
+
+
+class AnovaRow(TypedDict):
+    """One row of an analysis of variance; ``ss`` of a term is partial (type III).
+
+    ``df`` is None for a variance that is known exactly.
+    """
+
+    source: str
+    ss: float | None
+    df: int | None
+    ms: float | None
+    f: float | None
+    p: float | None
+
+
+class Removal(TypedDict):
+    """A removed term, with its F and p among the terms at that time."""
+
+    term: str
+    f: float
+    p: float
+
+
+def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, block: Whole) -> list[AnovaRow]:
+    """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
+
+    ``solution`` has the columns of ``terms``, then those of the blocks.
+    """
+    model_df, residual = len(terms) - 1, solution.residual_sum
+    error = solution.mean_square, solution.dof
+    block_columns = range(len(terms), len(solution.coefficients))
+    groups = replicate_groups(points, block)
+    within = sum_within(response, solution.weights, block)
+    about_mean = sum_within(response, solution.weights, np.zeros_like(block))
+    return [
+        row("model", max(within - residual, 0.0), model_df, *error),
+        *(entry for entry in term_rows(terms, solution) if entry["source"] != "1"),
+        *([row("block", solution.partial_sum(block_columns), len(block_columns), *error)] * bool(block_columns)),
+        row("residual", residual, solution.dof),
+        *_lack_of_fit(response, solution, groups),
+        AnovaRow(source="total", ss=about_mean, df=len(response) - 1, ms=None, f=None, p=None),
+    ]
+
+
+def row(source: str, ss: float | None, df: int, error: float | None = None, error_dof: float = 0) -> AnovaRow:
+    """A row with its mean square, and its F test against the mean square ``error`` if present."""
+    mean_square = None if ss is None else ratio(ss, df)
+    f = None if mean_square is None or error is None else ratio(mean_square, error)
+    p = None if f is None else float(stats.f.sf(f, df, error_dof))
+    return AnovaRow(source=source, ss=ss, df=df, ms=mean_square, f=f, p=p)
+
+
+def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
+    """Partial sum of squares, F and p of each coefficient."""
+    count = len(terms)
+    squares = (solution.coefficients[:count] ** 2 / np.diag(solution.inverse)[:count]).tolist()
+    return [row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)]
+
+
+def find(rows: list[AnovaRow], source: str) -> AnovaRow:
+    """The row of a source."""
+    return next(entry for entry in rows if entry["source"] == source)
+
+
+def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tuple[AnovaRow, AnovaRow]:
+    pure_df = len(response) - len(np.unique(groups))
+    if pure_df == 0:
+        return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)
+    pure = sum_within(response, solution.weights, groups)
+    lack = max(solution.residual_sum - pure, 0.0)
+    return (row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df), row("pure_error", pure, pure_df))
+
+
+def sum_within(values: Array, weights: Array, group: Whole) -> float:
+    """Weighted sum of squares about the mean of each group, exactly zero for equal values."""
+    total = 0.0
+    for label in np.unique(group):
+        # Relative to the first value, equal values have no rounding.
+        offset, weight = values[group == label] - values[group == label][0], weights[group == label]
+        total += float((weight * (offset - weight @ offset / weight.sum()) ** 2).sum())
+    return total
+
+
+def goodness(solution: LeastSquares, response: Array, prediction: Array, block: Whole) -> dict[str, Any]:
+    """R2 and similar figures on the scatter within blocks, PRESS and precision, as defined by Myers et al."""
+    within = sum_within(response, solution.weights, block)
+    free = len(response) - len(np.unique(block))
+    missed, variance = press(solution), observation_variance(solution)
+    size = len(solution.coefficients)
+    mean = float(solution.weights @ response / solution.weights.sum())
+    return {
+        "r2": complement(solution.residual_sum, within),
+        "adjusted_r2": complement(solution.mean_square, within / free),
+        "predicted_r2": None if missed is None else complement(missed, within),
+        "press": missed,
+        "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
+        "adequate_precision": ratio(float(np.ptp(prediction)), math.sqrt(size * variance / len(response))),
+    }
+
+
+def press(solution: LeastSquares) -> float | None:
+    """Prediction sum of squares, each run against the fit without it; None where the fit passes through a run."""
+    free = 1.0 - solution.leverage
+    if (free <= EXACT).any():
+        return None
+    return float((solution.weights * (solution.residuals / free) ** 2).sum())
+
+
+def observation_variance(solution: LeastSquares) -> float:
+    """Variance of a new run about the surface; for unequal weights that of the mean run."""
+    return solution.mean_square * float((1.0 / solution.weights).mean())
+
+
+def ratio(a: float, b: float) -> float | None:
+    """a / b, or None where that is undefined."""
+    return a / b if b > 0 and math.isfinite(a / b) else None
+
+
+def complement(part: float, whole: float) -> float | None:
+    """1 - part / whole, or None where that is undefined."""
+    share = ratio(part, whole)
+    return None if share is None else 1.0 - share
+
+
+def eliminate(terms: Terms, solve_for: Callable[[Terms], LeastSquares]) -> tuple[Terms, list[Removal]]:
+    """Backward elimination: the remaining terms, and the removed ones in order.
+
+    It removes the term of largest p above `KEEP_BELOW` again and again. Hierarchy keeps the constant and the factors of
+    remaining interactions and squares. ``solve_for`` fits a set of terms.
+    """
+    removed: list[Removal] = []
+    while True:
+        removable = [
+            Removal(term=entry["source"], f=entry["f"], p=entry["p"])
+            for entry in term_rows(terms, solve_for(terms))
+            if entry["f"] is not None and entry["p"] is not None and entry["p"] > KEEP_BELOW
+            if not needed(entry["source"], terms)
+        ]
+        if not removable:
+            return terms, removed
+        removed.append(max(removable, key=lambda removal: (removal["p"], removal["term"])))
+        terms = tuple(term for term in terms if term != removed[-1]["term"])
+
+
+class RunDiagnostics(TypedDict):
+    """One run, on the scale of the fit. ``run`` counts from 1.
+
+    ``standardized`` is the internally studentized residual r / (s sqrt(1 - h)), ``studentized`` the
+    externally studentized one, with s from the fit without the run; None where undefined.
+    """
+
+    run: int
+    observed: float
+    predicted: float
+    residual: float
+    standardized: float | None
+    studentized: float | None
+    leverage: float
+    cook: float | None
+
+
+class Diagnostics(TypedDict):
+    """Runs and tests: Shapiro-Wilk on the standardized residuals, the largest studentized one by Bonferroni.
+
+    ``high_leverage`` and ``influential`` list runs (from 1).
+    """
+
+    runs: list[RunDiagnostics]
+    normality: dict[str, float | str | None]
+    outlier: dict[str, float | int | str | None]
+    high_leverage: list[int]
+    influential: list[int]
+
+
+def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
+    """Diagnostics of a least-squares fit to ``response`` (n,)."""
+    free = 1.0 - solution.leverage
+    tested = (free > EXACT) & (solution.mean_square > 0)
+    weighted = solution.residuals * np.sqrt(solution.weights)
+    safe = np.where(tested, free, 1.0)
+    standardized = np.where(tested, weighted / np.sqrt(safe * (solution.mean_square or 1.0)), np.nan)
+    # A run with the whole residual leaves no scatter for its own test.
+    rest = solution.dof - standardized**2
+    judged = tested & (rest > EXACT * solution.dof) & (solution.dof > 1)
+    rescaled = standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0))
+    studentized = np.where(judged, rescaled, np.nan)
+    cook = standardized**2 * solution.leverage / safe / len(solution.coefficients)
+    prediction, runs = response - solution.residuals, range(1, len(response) + 1)
+    figures = response, prediction, solution.residuals, standardized, studentized, solution.leverage, cook
+    rows = zip(runs, *([finite(value) for value in column.tolist()] for column in figures), strict=True)
+    high = solution.leverage > HIGH_LEVERAGE * len(solution.coefficients) / len(response)
+    return Diagnostics(
+        runs=[cast(RunDiagnostics, dict(zip(RunDiagnostics.__annotations__, row, strict=True))) for row in rows],
+        normality=_normality(standardized[tested]),
+        outlier=_outlier(studentized, solution.dof - 1),
+        high_leverage=(np.flatnonzero(high) + 1).tolist(),
+        influential=(np.flatnonzero(np.nan_to_num(cook) > INFLUENTIAL) + 1).tolist(),
+    )
+
+
+def _normality(standardized: Array) -> dict[str, float | str | None]:
+    if len(standardized) < 3 or np.ptp(standardized) == 0:
+        return {"test": "Shapiro-Wilk", "w": None, "p": None}
+    test = stats.shapiro(standardized)
+    return {"test": "Shapiro-Wilk", "w": float(test.statistic), "p": float(test.pvalue)}
+
+
+def _outlier(studentized: Array, dof: int) -> dict[str, float | int | str | None]:
+    defined = np.flatnonzero(np.isfinite(studentized))
+    test = "Bonferroni on the largest externally studentized residual"
+    if not defined.size:
+        return {"test": test, "run": None, "studentized": None, "p": None}
+    run = int(defined[np.abs(studentized[defined]).argmax()])
+    p = min(1.0, defined.size * 2 * float(stats.t.sf(abs(studentized[run]), dof)))
+    return {"test": test, "run": run + 1, "studentized": float(studentized[run]), "p": p}
+
+
+def describe_diagnostics(diagnostics: Diagnostics, alpha: float) -> list[str]:
+    """Residual tests in sentences."""
+    tests = _say_normality(diagnostics["normality"]["p"], alpha), _say_outlier(diagnostics["outlier"], alpha)
+    return [*filter(None, tests), _say_runs(diagnostics)]
+
+
+def _say_normality(p: float | str | None, alpha: float) -> str:
+    if not isinstance(p, float):
+        return ""
+    if p > alpha:
+        return f"the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
+    return (
+        f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): p values and intervals are rough; look for an "
+        "outlier, a missing term or a transform."
+    )
+
+
+def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> str:
+    p = outlier["p"]
+    if not isinstance(p, float):
+        return ""
+    run = f"run {outlier['run']} (studentized residual {outlier['studentized']:+.2f}, Bonferroni {p_text(p)})"
+    if p > alpha:
+        return f"no run is an outlier; the most extreme is {run}."
+    return f"{run} is an outlier: check this run before you trust or remove it."
+
+
+def _say_runs(diagnostics: Diagnostics) -> str:
+    parts = []
+    if diagnostics["influential"]:
+        listed = _list(diagnostics["influential"])
+        parts.append(f"{listed} alone would move the surface beyond its own error (Cook's distance above 1)")
+    if diagnostics["high_leverage"]:
+        parts.append(f"{_list(diagnostics['high_leverage'])}: high leverage (above twice the mean)")
+    return f"{'; '.join(parts)}." if parts else "no run has undue leverage or influence."
+
+
+def p_text(p: float) -> str:
+    """Text of a p value."""
+    return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
+
+
+def _list(runs: list[int]) -> str:
+    return f"run{'s' if len(runs) > 1 else ''} {', '.join(map(str, runs))}"
+
+
+class KnownVariance(Record):
+    """Comparison of a fit with known variances.
+
+    ``chi_square``: of the residual over the known variance, with ``df`` and ``p``. ``pure_error``: ANOVA row of the replicate
+    variance at the repeated points. Its ``f`` is pure error over this variance and its ``p`` two-sided, both None without
+    repeats. ``covariance``: of the surface's coefficients by the known variances alone, with ``standard_errors``. ``dof``: of
+    the variance of one run, None where it is known exactly.
+    """
+
+    chi_square: float
+    df: int
+    p: float | None
+    mean_square_ratio: float = derived(lambda self: self.chi_square / self.df)
+    pure_error_ratio: float | None = derived(lambda self: self.pure_error["f"])
+    pure_error_p: float | None = derived(lambda self: self.pure_error["p"])
+    dof: float | None = keyed("variance_dof")
+    standard_errors: Array = derived(lambda self: np.sqrt(np.diag(self.covariance)))
+    covariance: Array
+    pure_error: AnovaRow = outside_json()
+
+
+def compare(
+    fit: LeastSquares, matrix: Array, response: Array, variances: Array, replicates: Whole, groups: Whole, count: int
+) -> KnownVariance:
+    """Compare the residual and the pure error of a fit with the ``variances`` (n,) of the runs.
+
+    ``matrix`` (n, p): of the fit, with the surface in its first ``count`` columns. ``groups`` (n,): repeated points.
+    ``replicates`` (n,): number behind each variance, 0 for variances taken as exact. With weights 1 / variance the residual
+    sum is the chi-square; with equal weights it is divided by the mean variance.
+    """
+    unit = fit.weights * variances
+    weighted = bool(np.ptp(fit.weights) > 0)
+    few = replicates[replicates > 1]
+    dof = 1.0 / float(np.mean(1.0 / (few - 1))) if few.size else None
+    df = fit.dof
+    chi_square = fit.residual_sum / float(unit.mean())
+    project = fit.inverse[:count] @ (matrix * fit.weights[:, None]).T
+    return KnownVariance(
+        chi_square=chi_square,
+        df=df,
+        p=_upper_tail(unit, dof, weighted, chi_square, df),
+        pure_error=_pure_error_row(fit, response, unit, groups, dof, weighted),
+        covariance=(project * variances) @ project.T,
+        dof=dof,
+    )
+
+
+def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
+    """The comparison in sentences."""
+    chi_square = f"chi-square of the residual over the known variance is {variance.chi_square:.4g} on {variance.df} degrees of freedom"
+    if variance.p is None:
+        test = f"{chi_square}; a test needs more replicates a run."
+    elif variance.p > alpha:
+        test = f"{chi_square} ({p_text(variance.p)}): the known variance explains the residual."
+    else:
+        test = f"{chi_square} ({p_text(variance.p)}): the residual exceeds the known variance."
+    share = math.sqrt(variance.mean_square_ratio)
+    errors = f"standard errors come from the residual and are {share:.3g} times those of the known variance alone."
+    sentences = [test, errors]
+    f, p = variance.pure_error_ratio, variance.pure_error_p
+    if f is None or p is None:
+        return sentences
+    scatter = f"the variance of repeated runs is {f:.3g} times that of their replicates ({p_text(p)})"
+    if p > alpha:
+        return [*sentences, f"{scatter}: the two agree, so the errors of the runs are reliable."]
+    if f > 1:
+        return [
+            *sentences,
+            f"{scatter}: the runs differ by more than their replicates show; rely on tests against pure error.",
+        ]
+    return [
+        *sentences,
+        f"{scatter}: the errors of the runs are too large, or repeated runs share seeds; rely on tests against pure error.",
+    ]
+
+
+def _upper_tail(unit: Array, dof: float | None, weighted: bool, chi_square: float, df: int) -> float | None:
+    """Probability of a larger sum of squares, None where the replicates are too few.
+
+    The unit of the sum is a variance known to ``dof`` degrees of freedom a run.
+    """
+    if dof is None:
+        return float(special.chdtrc(df, chi_square))
+    if not weighted:
+        # The mean of all variances, each known to ``dof`` degrees of freedom.
+        total = dof * float(unit.sum() ** 2 / (unit**2).sum())
+        return float(special.fdtrc(df, total, chi_square / df))
+    if dof <= 4:
+        return None
+    # Each squared residual over its own estimated variance is an F(1, dof). A multiple of a chi-square has the same
+    # mean and variance.
+    mean = dof / (dof - 2)
+    spread = 2 * dof**2 * (dof - 1) / ((dof - 2) ** 2 * (dof - 4))
+    scale = spread / (2 * mean)
+    return float(special.chdtrc(df * mean / scale, chi_square / scale))
+
+
+def _pure_error_row(
+    solution: LeastSquares, response: Array, unit: Array, groups: Whole, dof: float | None, weighted: bool
+) -> AnovaRow:
+    labels, sizes = np.unique(groups, return_counts=True)
+    df = len(groups) - len(labels)
+    if df == 0:
+        return AnovaRow(source="replicate_variance", ss=None, df=None, ms=float(unit.mean()), f=None, p=None)
+    means = [(1 - 1 / size) * unit[groups == label].sum() for label, size in zip(labels, sizes, strict=True)]
+    mean_square = float(sum(means)) / df
+    f = ratio(sum_within(response, solution.weights, groups) / df, mean_square)
+    repeated = unit[sizes[np.searchsorted(labels, groups)] > 1]
+    tail = None if f is None else _upper_tail(repeated, dof, weighted, f * df, df)
+    total_dof = None if dof is None else round(dof * len(repeated))
+    p = None if tail is None else 2 * min(tail, 1 - tail)
+    ss = None if total_dof is None else mean_square * total_dof
+    return AnovaRow(source="replicate_variance", ss=ss, df=total_dof, ms=mean_square, f=f, p=p)
+
+
+class ModelError(Record):
+    """Variance of the lack of fit at a point, on the scale of the fit, with its ``dof`` and its ``source``."""
+
+    variance: float
+    dof: int
+    source: Source = keyed("told_by")
+    standard_deviation: float = derived(lambda self: math.sqrt(self.variance))
+
+
+def model_error(
+    solution: LeastSquares, matrix: Array, groups: Whole, table: list[AnovaRow], known_variance: KnownVariance | None
+) -> ModelError | None:
+    """The model error of a fit, None without a significant test at 5 %.
+
+    ``matrix`` (n, p): of the fit. ``groups`` (n,): repeated points. The tests compare lack of fit with pure error, and the
+    residual with the known variance of the replicates; the larger significant error counts. A known variance that the
+    repeated runs refute does not count.
+    """
+    share = _share(solution, matrix, groups)
+    if share <= 0.0:
+        return None
+    lack, pure = find(table, "lack_of_fit"), find(table, "pure_error")
+    candidates = []
+    if lack["p"] is not None and lack["p"] <= SIGNIFICANT and lack["ss"] is not None and lack["df"]:
+        beyond = lack["ss"] - lack["df"] * (pure["ms"] or 0.0)
+        candidates.append(ModelError(beyond / share, lack["df"], "repeats"))
+    if (
+        known_variance is not None
+        and known_variance.p is not None
+        and known_variance.p <= SIGNIFICANT
+        and not _is_refuted(known_variance)
+    ):
+        beyond = solution.residual_sum * (1.0 - known_variance.df / known_variance.chi_square)
+        candidates.append(ModelError(beyond / share, known_variance.df, "known variance"))
+    return max(
+        (candidate for candidate in candidates if candidate.variance > 0.0),
+        key=lambda candidate: candidate.variance,
+        default=None,
+    )
+
+
+def correlation(one: Array, other: Array) -> Array:
+    """Correlation (n, l) of the model error at coded points (n, k) and (l, k)."""
+    apart = ((one[:, None, :] - other[None, :, :]) ** 2).sum(axis=-1)
+    return np.exp(-apart / REACH**2)
+
+
+def draw_fields(error: ModelError | None, coded: Array, draws: int, random: np.random.Generator) -> Array | None:
+    """Random model errors (draws, n) at coded points (n, k); None without a model error."""
+    if error is None:
+        return None
+    values, vectors = np.linalg.eigh(correlation(coded, coded))
+    root = vectors * np.sqrt(values.clip(0.0) * error.variance)
+    wide = np.sqrt(error.dof / random.chisquare(error.dof, (draws, 1)))
+    return wide * (random.standard_normal((draws, len(coded))) @ root.T)
+
+
+def _share(solution: LeastSquares, matrix: Array, groups: Whole) -> float:
+    """Expected residual sum of a field of variance 1: the trace of its part outside the model."""
+    member = (groups[:, None] == np.unique(groups)[None, :]) * np.sqrt(solution.weights)[:, None]
+    scaled = matrix * np.sqrt(solution.weights)[:, None]
+    inside = scaled.T @ member
+    return float((member**2).sum() - np.einsum("pg,pq,qg", inside, solution.inverse, inside))
+
+
+def _is_refuted(known_variance: KnownVariance) -> bool:
+    f, p = known_variance.pure_error["f"], known_variance.pure_error["p"]
+    return f is not None and p is not None and f > 1.0 and p <= SIGNIFICANT

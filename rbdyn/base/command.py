@@ -1,0 +1,259 @@
+"""Shared parts of the commands, without any physics: exit codes, messages, JSON, the output folder, progress, options, templates."""
+
+import errno
+import json
+import os
+import re
+import string
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from typer.core import TyperCommand
+
+from rbdyn.base.blocks import Table
+from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
+from rbdyn.base.forecast import Remaining, clock_words
+from rbdyn.base.loading import INTERRUPTED
+from rbdyn.base.storage import digest_of
+from rbdyn.base.streams import FAILED
+from rbdyn.base.terminal import show
+from rbdyn.result import read_json, write_json
+
+# Exit code of a command whose input is at fault.
+BAD_INPUT = 2
+# File that names the command and the input of a folder of results.
+MARK = "made_by.json"
+
+
+@contextmanager
+def guarded(as_json: bool) -> Iterator[None]:
+    """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
+    try:
+        yield
+    except InputError as error:
+        _leave(as_json, BAD_INPUT, error.faults)
+    except RunError as error:
+        _leave(as_json, FAILED, [str(error)])
+    except KeyboardInterrupt as error:
+        _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was saved'}"])
+    except MemoryError as error:
+        _leave(as_json, FAILED, [f"out of memory: {error or 'none is free'}; ask for fewer points, samples or turns"])
+    except OSError as error:
+        sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
+        _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
+
+
+def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
+    """Print the sentences and end with the exit code."""
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+    failed = {"status": "interrupted" if code == INTERRUPTED else f"failed: {sentences[0]}"}
+    if as_json:
+        print_json({"status": "refused", "faults": sentences} if code == BAD_INPUT else failed)
+    raise typer.Exit(code)
+
+
+def print_json(record: dict[str, Any]) -> None:
+    """One JSON object on standard output."""
+    print(json.dumps(record, indent=1, allow_nan=False))
+
+
+def hand_over(
+    record: Callable[[], dict[str, Any]],
+    as_json: bool,
+    answer: Callable[[], None],
+    folder: Path | None = None,
+    files: Sequence[str] = (),
+) -> None:
+    """Print the ``record`` as JSON, else let ``answer`` print and list the ``files`` written to the ``folder``."""
+    if as_json:
+        print_json(record())
+        return
+    answer()
+    if folder:
+        print(f"written to {folder}: {', '.join(files)}")
+
+
+@contextmanager
+def checkpoint_message(path: Path | None) -> Iterator[None]:
+    """Let the message of Ctrl-C name the ``path`` that holds the finished parts, once it exists."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if path is None or not path.exists():
+            raise
+        raise KeyboardInterrupt(f"finished parts are saved in {path}; start the command again to resume") from None
+
+
+def output_folder(path: Path, command: str, source: Path) -> Path:
+    """Make the folder that ``--out`` names for the results of ``command`` on the file ``source``.
+
+    A folder belongs to one command and one file, which its ``made_by.json`` names. Results of the same file (the same place or
+    the same content) are overwritten. A folder of another file is refused. All commands of ``doe`` count as one, because they
+    share the store of a study. Raises InputError.
+    """
+    mark, source = path / MARK, source.resolve()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        digest = digest_of(source.read_bytes())
+        # Relative to the folder, so that folder and file can move together.
+        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
+        owner = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
+        if owner["command"] != command or (own["file"] != owner["file"] and digest != owner["sha256"]):
+            raise InputError(
+                [
+                    f"--out {path}: holds results of {owner['command']} from {os.path.normpath(path / owner['file'])}; "
+                    "name another folder or remove this one"
+                ]
+            )
+        write_json(mark, own)
+    except OSError as error:
+        raise InputError([f"--out {path}: cannot be written to ({error.strerror}); name another folder"]) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
+    return path
+
+
+@contextmanager
+def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
+    """Show progress on a terminal, nothing elsewhere; yields ``progress(count, total)``.
+
+    ``workers``: number of runs at once; None for all processors.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda count, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
+
+    remaining = Remaining(workers or os.cpu_count() or 1)
+
+    class TimeLeft(ProgressColumn):
+        """Time left by ``Remaining``: rich forgets its own estimate where a run takes longer than half a minute."""
+
+        def render(self, task: Task) -> Text:
+            return Text(clock_words(remaining.seconds), style="progress.remaining")
+
+    def progress(count: int, total: int) -> None:
+        remaining.update(count, total)
+        bar.update(task, completed=count, total=total)
+
+    with Progress(
+        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+    ) as bar:
+        task = bar.add_task(title, total=None)
+        yield progress
+
+
+def notice(quiet: bool) -> Callable[[str], None] | None:
+    """Function that prints a note to standard error at once; None for a quiet command."""
+    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print one table."""
+    show([Table(title, header, rows)])
+
+
+def flag(*names: str, says: str, **more: Any) -> Any:
+    """An option without a value; help shows no type for it."""
+    return typer.Option(*names, metavar="", help=says, **more)
+
+
+def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
+    """An option with a value; ``default`` describes the value without the option."""
+    return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
+
+
+def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
+    """A class of command, for ``cls``, that refuses ``former`` options and names the replacement of each."""
+
+    class Refusing(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """Refuse former options before any other."""
+            option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
+            if option is not None:
+                with guarded("--json" in args):
+                    raise InputError([f"{option}: this option was removed; {former[option]}"])
+            return super().parse_args(ctx, args)
+
+    return Refusing
+
+
+def folder_option(says: str, default: str = "nothing is written") -> Any:
+    """``--out`` of a command whose files differ from those of ``Out``."""
+    return valued("DIR", says, default, "--out")
+
+
+def verbose_flag(says: str) -> Any:
+    """``--verbose`` of a command whose details differ from those of ``Verbose``."""
+    return flag("--verbose", "-v", says=says)
+
+
+def _print_version(requested: bool) -> None:
+    if requested:
+        from importlib.metadata import version
+
+        print(f"rbdyn {version('rbdyn')}")
+        raise typer.Exit()
+
+
+Version = Annotated[bool, flag("--version", says="Print the version.", callback=_print_version, is_eager=True)]
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
+Set = Annotated[
+    list[str] | None, valued("KEY.PATH=VALUE", "Replace a key; repeatable.", "the scene as written", "--set")
+]
+Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.turns of the scene")]
+Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
+Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
+Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
+Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
+Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
+Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
+
+
+# Column in which the comment on a key starts.
+COLUMN = 35
+
+
+def fill_template(template: str, values: Mapping[str, Any]) -> str:
+    """The template with its ``{names}`` filled in, comments in a column.
+
+    A line whose value is None, a table without keys and an empty comment are left out.
+    """
+    lines = [_fill_line(line, values) for line in template.splitlines() if _has_values(line, values)]
+    full = (line for line, after in pairwise([*lines, ""]) if not (line.startswith("[") and not after))
+    return "\n".join(full).replace("\n\n\n", "\n\n")
+
+
+def _has_values(line: str, values: Mapping[str, Any]) -> bool:
+    return all(values[name] is not None for _, name, _, _ in string.Formatter().parse(line) if name)
+
+
+def _fill_line(line: str, values: Mapping[str, Any]) -> str:
+    assignment, _, reason = (part.format_map(values) for part in line.partition(" # "))
+    return f"{assignment:<{COLUMN}} # {reason}" if reason else assignment
+
+
+DECIMAL_COMMA = re.compile(r"(\d),(\d)")
+
+
+def plain_number(text: str) -> float:
+    """A number that is typed. Raises MethodError for a decimal comma and for what is no number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise MethodError(comma_fault(text) or "is no number; write a plain number") from None
+
+
+def comma_fault(text: str) -> str:
+    """What to write in place of a decimal comma; empty where there is none."""
+    with_point = DECIMAL_COMMA.sub(r"\1.\2", text.strip())
+    return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}" if with_point != text.strip() else ""

@@ -1,0 +1,102 @@
+"""Blocks as HTML; every text is escaped here."""
+
+from collections.abc import Callable
+from html import escape
+from itertools import groupby
+
+from rbdyn.base.blocks import (
+    Block,
+    Bullets,
+    Figures,
+    Heading,
+    Note,
+    Paragraph,
+    Section,
+    Table,
+    Tile,
+    Tiles,
+    Widget,
+    says,
+)
+
+# Classes of the style sheet by the role of a paragraph.
+CLASSES = {"": "", "statement": ' class="statement"', "small": ' class="note"'}
+
+
+def section(part: Section, widget: Callable[[str], str] = lambda name: "") -> str:
+    """A section with its heading; ``widget`` writes the place of a named interactive picture."""
+    body = []
+    blocks = [block for block in part.blocks if says(block)]
+    # Small tables that follow each other are set next to each other where there is room.
+    for together, group in groupby(blocks, lambda block: isinstance(block, Table) and not block.folded):
+        pieces = [widget(block.name) if isinstance(block, Widget) else render(block) for block in group]
+        body += [f'<div class="tables">{"".join(pieces)}</div>'] if together else pieces
+    heading = f'<h2 id="{part.key}_title">{escape(part.title)}</h2>'
+    opening = f'<section id="{part.key}" aria-labelledby="{part.key}_title">'
+    return f"{opening}\n{heading}\n{''.join(body)}\n</section>"
+
+
+def render(block: Block) -> str:
+    """HTML of a block without scripts. Raises TypeError for a widget."""
+    match block:
+        case Paragraph(text, role):
+            return f"<p{CLASSES[role]}>{prose(text)}</p>"
+        case Note(text):
+            return f"<p>{prose(text)}</p>"
+        case Heading(text):
+            return f"<h3>{escape(text)}</h3>"
+        case Bullets(items):
+            return f"<ul>{''.join(f'<li>{prose(item)}</li>' for item in items)}</ul>"
+        case Tiles():
+            return _tiles(block)
+        case Table():
+            return _table(block)
+        case Figures(pictures, caption, key):
+            name = f' id="{key}"' if key else ""
+            words = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+            four = " four" if len(pictures) == 4 and not key else ""
+            images = "".join(picture if isinstance(picture, str) else picture() for picture in pictures)
+            return f'<figure{name}><div class="pictures{four}">{images}</div>{words}</figure>'
+    raise TypeError(f"{type(block).__name__} has no HTML of its own")
+
+
+def prose(text: str) -> str:
+    """Escaped text without line breaks between a number and its sign or unit."""
+    return escape(text).replace(" %", "&nbsp;%").replace(" ± ", "&nbsp;±&nbsp;")
+
+
+def _tiles(block: Tiles) -> str:
+    return f'<dl class="tiles">{"".join(map(_tile, block.tiles))}</dl>'
+
+
+def _tile(tile: Tile) -> str:
+    unit = f' <span class="unit">{escape(tile.unit)}</span>' if tile.unit else ""
+    further = "".join(
+        f'<span class="beneath">{escape(f"{name} {value} {tile.unit}".rstrip())}</span>' for name, value in tile.further
+    )
+    return f'<div class="tile"><dt>{escape(tile.name)}</dt><dd><strong>{escape(tile.value)}{unit}</strong>{further}</dd></div>'
+
+
+def _table(table: Table) -> str:
+    words = {0, *table.text_columns}
+    heads = enumerate(table.header)
+    header = "".join(f"<th scope='col'{_kind(place, words)}>{escape(cell)}</th>" for place, cell in heads)
+    rows = []
+    for name, *cells in table.rows:
+        columns = "".join(f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1))
+        rows.append(f"<tr><th scope='row'>{escape(name)}</th>{columns}</tr>")
+    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    caption, sort = escape(table.caption), ' class="sortable"' if table.sortable else ""
+    inside = f"<caption>{caption}</caption><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody>"
+    body = f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}>{inside}</table></div>{note}'
+    folded = f"<details><summary>{caption}</summary>{body}</details>"
+    return folded if table.folded else f'<div class="table">{body}</div>'
+
+
+def _cell(text: str) -> str:
+    """Escaped text of a cell; a narrow page may break it before its error only."""
+    return escape(text).replace(" %", "&nbsp;%").replace("± ", "±&nbsp;")
+
+
+def _kind(place: int, words: set[int]) -> str:
+    return " class='words'" if place in words else ""

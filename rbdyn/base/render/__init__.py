@@ -1,1 +1,0 @@
-"""One tree of blocks, rendered three times: ``terminal``, ``markdown``, ``html``."""

@@ -1,0 +1,542 @@
+"""Sweeps: equilibria over one or several keys of a scene, each started from its neighbour.
+
+The points form a grid of ``Axis`` values, one axis a key. The walk goes along the last key there and back like a snake, so
+that each point has a solved neighbour. Every point is validated like a scene from a file. Where a row has several
+equilibria (see ``light_load_share``), a start from the neighbour may end in another one than a cold start.
+``sweep`` returns a ``SweepResult``, which is a table, saved and loaded.
+"""
+
+import itertools
+import json
+import math
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import InputError, number_list, refuse, validated
+from rbdyn.base.records import finite, plain, save_table
+from rbdyn.base.storage import Checkpoint, code_version, run_key
+from rbdyn.base.words import counted
+from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.result import (
+    BallResult,
+    DoubleDeckerReport,
+    Remark,
+    ball_columns,
+    ball_records,
+    remarks,
+    ring_columns,
+    row_columns,
+    tipping,
+)
+from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
+from rbdyn.result import read_record, versions, write_json
+from rbdyn.scene import BallScene, Scene, balls_only
+from rbdyn.scene.ball import SingleRowScene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+FORMAT = "rbdyn.sweep/2"
+# Points of a stored line: writing a line takes as long as solving a few points.
+ROW = 100
+MOST_POINTS = 100_000
+FIX = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
+Progress = Callable[[int, int], None]
+Reporter = Progress | None
+Group = tuple[Whole, Array]
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Equilibria over a grid of scene keys, in the order of ``keys``, the last one running fastest.
+
+    ``keys``: values of each key. ``columns``: figures of the points, units in the names, NaN without an equilibrium;
+    ``statuses`` state the cause. ``figures``: those of the balls in SI by row of balls, as pairs (points, (points, Z, 6)), one
+    for each number Z of balls; empty in a loaded sweep. ``notes``: the topic ("about"), the "note" of its first point, and all
+    its "points", counted from 0 in the order of the table. ``cold``: number of points not started from their neighbour.
+    ``wall_s``: wall time.
+    """
+
+    keys: dict[str, tuple[float, ...]]
+    columns: dict[str, Array]
+    statuses: tuple[str, ...]
+    cold: int
+    wall_s: float
+    scene: dict[str, Any]
+    figures: dict[str, list[tuple[Whole, Array]]] = field(default_factory=dict, repr=False)
+    notes: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each key."""
+        return tuple(len(values) for values in self.keys.values())
+
+    @property
+    def status(self) -> str:
+        """ "ok", or how many points failed."""
+        count = sum(status != OK for status in self.statuses)
+        return OK if count == 0 else f"{count} of {counted(len(self.statuses), 'point')} failed"
+
+    @property
+    def failures(self) -> dict[str, list[int]]:
+        """Points without an equilibrium by cause, counted from 0 in the order of the table.
+
+        A cause is the part of a status before its colon.
+        """
+        causes: dict[str, list[int]] = {}
+        for place, status in enumerate(self.statuses):
+            if status != OK:
+                causes.setdefault(status.partition(":")[0], []).append(place)
+        return causes
+
+    def key_values(self, place: int) -> dict[str, float]:
+        """Values of the keys at a point."""
+        indices = np.unravel_index(place, self.shape)
+        return {key: values[int(index)] for (key, values), index in zip(self.keys.items(), indices, strict=True)}
+
+    def where(self, places: Sequence[int]) -> str:
+        """Number of points, and the values of the keys at the first of them."""
+        first = ", ".join(f"{key} = {value:g}" for key, value in self.key_values(places[0]).items())
+        return f"{counted(len(places), 'point')}{', the first' if len(places) > 1 else ''} at {first}"
+
+    def grid(self, column: str) -> Array:
+        """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
+        return self.columns[column].reshape(self.shape)
+
+    def table(self) -> "pd.DataFrame":
+        """A row a point: keys, figures, status, and the topics of its notes."""
+        import pandas as pd
+
+        words: list[list[str]] = [[] for _ in self.statuses]
+        for note in self.notes:
+            for place in note["points"]:
+                words[place].append(note["about"])
+        about = ["; ".join(topics) for topics in words]
+        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": about})
+
+    def balls(self) -> "pd.DataFrame":
+        """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
+
+        Failed points have none. Raises RuntimeError for a loaded sweep, which has no balls.
+        """
+        import pandas as pd
+
+        if not self.figures:
+            raise RuntimeError("a loaded sweep has no balls; run the sweep again")
+        frames = []
+        places = self._places()
+        solved = np.array([status == OK for status in self.statuses])
+        for name, groups in self.figures.items():
+            for points, balls in groups:
+                good = points[solved[points]]
+                size = balls.shape[1]
+                columns = {key: np.repeat(values[good], size) for key, values in places.items()}
+                columns["row"] = np.full(good.size * size, name)
+                columns["ball"] = np.tile(np.arange(1, size + 1), good.size)
+                ball_figures = ball_columns(balls[solved[points]])
+                frames.append(pd.DataFrame(columns | {key: value.ravel() for key, value in ball_figures.items()}))
+        return pd.concat(frames, ignore_index=True)
+
+    def balls_at(self, place: int) -> dict[str, list[dict[str, float]]]:
+        """Records of the balls of a point by row, as in ``BallResult``. Raises RuntimeError as ``balls``."""
+        if not self.figures:
+            raise RuntimeError("a loaded sweep has no balls; run the sweep again")
+        records = {}
+        for name, groups in self.figures.items():
+            records[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
+        return records
+
+    def points(self) -> list[dict[str, Any]]:
+        """A record a point, with None for infinite and missing figures."""
+        places, names = self._places(), list(self.columns)
+        values = [[finite(value) for value in self.columns[name].tolist()] for name in names]
+        keys = [column.tolist() for column in places.values()]
+        return [
+            {
+                **dict(zip(places, (column[place] for column in keys), strict=True)),
+                "status": status,
+                **(dict(zip(names, (column[place] for column in values), strict=True)) if status == OK else {}),
+            }
+            for place, status in enumerate(self.statuses)
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form, with the table by points and without references to this object."""
+        return {
+            "format": FORMAT,
+            "status": self.status,
+            "keys": {key: list(values) for key, values in self.keys.items()},
+            "points": self.points(),
+            "failures": [
+                {
+                    "cause": cause,
+                    "points": len(points),
+                    "first": self.key_values(points[0]),
+                    "status": self.statuses[points[0]],
+                }
+                for cause, points in self.failures.items()
+            ],
+            "notes": plain(self.notes),
+            "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
+            "versions": versions(),
+            "scene": plain(self.scene),
+        }
+
+    def save(self, path: Path | str) -> None:
+        """Write the table as CSV to a path that ends in ".csv", else all as JSON."""
+        if str(path).endswith(".csv"):
+            save_table(self.table(), path, "%.9g")
+        else:
+            write_json(path, self.as_dict())
+
+    @classmethod
+    def load(cls, path: Path | str) -> "SweepResult":
+        """Read a sweep saved as JSON. Raises InputError when the file is missing or no sweep."""
+        return read_record(path, FORMAT, "sweep", cls._of_json)
+
+    @classmethod
+    def _of_json(cls, data: dict[str, Any]) -> "SweepResult":
+        keys = {key: tuple(values) for key, values in data["keys"].items()}
+        points = data["points"]
+        names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
+        columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
+        cost = data["cost"]
+        statuses = tuple(point["status"] for point in points)
+        return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
+
+    def _places(self) -> dict[str, NDArray[Any]]:
+        """Values of the keys at every point, a column a key."""
+        grids = np.meshgrid(*(np.array(values) for values in self.keys.values()), indexing="ij")
+        return {key: grid.ravel() for key, grid in zip(self.keys, grids, strict=True)}
+
+
+def _number(point: dict[str, Any], name: str) -> float:
+    """Value of a saved figure; at an equilibrium, null is an infinite life without load, or NaN."""
+    if point["status"] != OK:
+        return math.nan
+    value = point[name]
+    if value is None:
+        return math.inf if name.startswith("L10") or "_L10" in name else math.nan
+    return float(value)
+
+
+def sweep(
+    scene: BallScene | Scene | Path | str,
+    keys: Mapping[str, Sequence[float]],
+    progress: Reporter = None,
+    kept_in: Path | None = None,
+) -> SweepResult:
+    """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
+
+    List items count from 1, as in ``operation.load_N[3]``. Values must rise or fall. A point without an equilibrium has its
+    cause as status. The file ``kept_in`` stores a line every ``ROW`` points, from which an interrupted sweep continues.
+    Raises InputError for keys that cannot be swept, and for an invalid point, with its name.
+    """
+    scene = balls_only(scene)
+    axes = axes_of(scene, keys)
+    order = snake(axes)
+    began = time.perf_counter()
+    task = {"scene": scene.model_dump(mode="json"), "keys": {axis.key: axis.values for axis in axes}}
+    key = run_key(task, code_version(__name__)) if kept_in else ""
+    solved = _walk(scenes(scene, axes, order), len(order), progress or (lambda *_: None), Checkpoint(kept_in), key)
+    if kept_in is not None:
+        # A file that cannot be removed does no harm: its key names the sweep.
+        with suppress(OSError):
+            kept_in.unlink(missing_ok=True)
+    shape = tuple(len(axis.values) for axis in axes)
+    # From the order of the snake to that of the table.
+    visited = np.ravel_multi_index(np.array(order).T, shape)
+    back = np.argsort(visited)
+    table = [solved[place] for place in back]
+    names = dict.fromkeys(name for point in table for name in point.figures)
+    return SweepResult(
+        {axis.key: axis.values for axis in axes},
+        {name: np.array([point.figures.get(name, np.nan) for point in table]) for name in names},
+        tuple(point.status for point in table),
+        sum(point.cold for point in table),
+        time.perf_counter() - began,
+        task["scene"],
+        {name: _by_size([point.balls[name] for point in table]) for name in table[0].balls},
+        notes_by_topic(
+            [(place, remark) for place, point in enumerate(table) for remark in point.remarks],
+            np.arange(len(table)),
+            [point.status for point in table],
+        ),
+    )
+
+
+def notes_by_topic(
+    entries: Sequence[tuple[int, Remark]], visited: Whole, statuses: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Notes by topic: the sentence of the first point in the table, and all points, counted from 0.
+
+    ``entries``: remarks, each with the place of its first point on the walk. ``visited``: place in the table of each point
+    of the walk.
+    """
+    groups: dict[str, list[tuple[int, int, Remark]]] = {}
+    for first, remark in entries:
+        for k in np.flatnonzero(remark.where).tolist():
+            if statuses[first + k] == OK:
+                groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
+    notes = []
+    for word, group in groups.items():
+        _, k, remark = min(group, key=lambda one: one[0])
+        notes.append({"about": word, "note": remark.sentence(k), "points": sorted(place for place, _, _ in group)})
+    return notes
+
+
+def _by_size(balls: Sequence[Array]) -> list[Group]:
+    """Arrays (Z, 6) grouped by Z, with their places."""
+    sizes: dict[int, list[int]] = {}
+    for place, one in enumerate(balls):
+        sizes.setdefault(len(one), []).append(place)
+    return [(np.array(places), np.array([balls[place] for place in places])) for places in sizes.values()]
+
+
+class PointRecord(NamedTuple):
+    """One point: status, its figures, those of the balls by row, remarks and solutions of the rows.
+
+    ``cold``: whether its start was not the point before.
+    """
+
+    status: str
+    figures: dict[str, float]
+    balls: dict[str, Array]
+    remarks: list[Remark]
+    rows: tuple[Solution, ...]
+    cold: bool
+
+    def as_text(self) -> str:
+        """JSON, every number with all its digits."""
+        sentences = [(one.word, one.sentence(0)) for one in self.remarks]
+        return json.dumps(self._replace(remarks=sentences), default=np.ndarray.tolist)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """Inverse of ``as_text``."""
+        status, figures, balls, remarks, rows, cold = json.loads(text)
+        return cls(
+            status,
+            figures,
+            {name: np.array(values) for name, values in balls.items()},
+            [Remark(word, np.array([True]), partial(lambda sentence, _: sentence, note)) for word, note in remarks],
+            tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
+            cold,
+        )
+
+
+def _walk(
+    points: Iterable[tuple[tuple[float, ...], BallScene]], total: int, progress: Progress, store: Checkpoint, key: str
+) -> list[PointRecord]:
+    """Every point, each started from the one before; points that ``store`` has under the ``key`` are not solved again."""
+    # All points are validated before the first solve.
+    bearings = [scene for _, scene in points]
+    solved: list[PointRecord] = []
+    while row := store.get(f"{key} {len(solved)}"):
+        solved += map(PointRecord.from_text, row)
+    for place in range(len(solved), total):
+        solved.append(_solve(bearings[place], solved[-1].rows if solved else ()))
+        progress(place + 1, total)
+        if store.path is not None and (place + 1) % ROW == 0:
+            store.put(f"{key} {place + 1 - ROW}", [point.as_text() for point in solved[-ROW:]])
+    return solved
+
+
+def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
+    """One point, started from the rows ``before`` it where these have as many balls and the solve succeeds."""
+    names = ("row",) if isinstance(scene, SingleRowScene) else ("inner", "outer")
+    rows = dict(zip(names, scene.outermost_rows, strict=False))  # a single row is both of the outermost ones
+    sizes = [row.balls for row in rows.values()]
+    started = [len(row.balls) for row in before] == sizes
+    result = equilibrium(scene, before if started else ())
+    if started and not result.is_equilibrium:
+        result, started = equilibrium(scene), False
+    if not result.is_equilibrium:
+        nothing = {name: np.full((size, FIGURES), np.nan) for name, size in zip(rows, sizes, strict=True)}
+        return PointRecord(result.status, {}, nothing, [], (), not started)
+    figures, balls, remarks = _figures(scene, result)
+    # Only remarks about this point are kept.
+    return PointRecord(
+        result.status, figures, balls, [one for one in remarks if one.where[0]], result.rows, not started
+    )
+
+
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Array], list[Remark]]:
+    """Figures of one point, figures of its balls by row, and remarks."""
+    report = result.reached
+    assert report.reaction is not None
+    reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
+    stiffness = np.array(report.stiffness["matrix_SI"])
+    columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
+    balls, notes = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
+    names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
+    for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
+        balls[name] = solution.figures
+        notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
+        prefix = "" if name == "row" else f"{name}_row_"
+        columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
+    figures = {name: float(value[0]) for name, value in columns.items()}
+    if isinstance(report, DoubleDeckerReport):
+        figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, notes
+
+
+class Axis(NamedTuple):
+    """One key that is swept: its dotted name, its path in a nested scene and its values."""
+
+    key: str
+    path: KeyPath
+    values: tuple[float, ...]
+
+
+Axes = Sequence[Axis]
+Order = Sequence[tuple[int, ...]]  # of indices of the values at each point
+
+
+def keys_of_texts(texts: Sequence[str]) -> dict[str, list[float]]:
+    """Keys and values of ``key=start:stop:count`` (evenly spaced) or ``key=a,b,c`` texts. Raises InputError."""
+    keys: dict[str, list[float]] = {}
+    for text in texts:
+        key, sign, values = text.partition("=")
+        key = key.strip()
+        if not sign or not key:
+            raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
+        if key in keys:
+            raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
+        keys[key] = number_list(values, f"--sweep {text}", FIX, 2, MOST_POINTS)
+    return keys
+
+
+def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis, ...]:
+    """The axes of a sweep, the first key outermost. Raises InputError for keys and values that cannot be swept."""
+    if not keys:
+        raise InputError(["sweep: no key to sweep; name one, such as operation.inner_speed_rpm"])
+    data = tables(scene)
+    faults: list[str] = []
+    axes = []
+    for key, values in keys.items():
+        try:
+            axes.append(_axis(data, key, [float(value) for value in values]))
+        except InputError as error:
+            faults += error.faults
+        except (TypeError, ValueError):
+            faults.append(f"{key}: the values {_listing(values)} are not numbers; give a list of numbers")
+    refuse(faults)
+    count = math.prod(len(axis.values) for axis in axes)
+    if count > MOST_POINTS:
+        raise InputError([f"sweep: {count} points are more than {MOST_POINTS}; take fewer values"])
+    return tuple(axes)
+
+
+def _axis(data: dict[str, Any], key: str, values: Sequence[float]) -> Axis:
+    steps = np.diff(values)
+    if len(values) == 0 or not np.all(np.isfinite(values)):
+        raise InputError([f"{key}: the values {_listing(values)} are not all finite; write plain numbers"])
+    if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise InputError([f"{key}: the values {_listing(values)} must rise or fall from each to the next; sort them"])
+    path = _path(key)
+    now = _now(data, path, key)
+    if isinstance(now, int):
+        uneven = [value for value in values if not value.is_integer()]
+        if uneven:
+            raise InputError([f"{key} = {uneven[0]:g}: must be a whole number; write whole values"])
+        values = [int(value) for value in values]
+    return Axis(key, path, tuple(values))
+
+
+def _path(key: str) -> KeyPath:
+    path: list[str | int] = []
+    for part in key.split("."):
+        match = re.fullmatch(r"(\w+)((?:\[[1-9]\d*\])*)", part)
+        if match is None:
+            raise InputError([f"{key}: not a key; write it as operation.inner_speed_rpm or operation.load_N[3]"])
+        path.append(match[1])
+        path += [int(index) - 1 for index in re.findall(r"\d+", match[2])]
+    return tuple(path)
+
+
+def _now(data: Any, path: KeyPath, key: str) -> Any:
+    """Value of a key in the scene, None for a missing one. Raises InputError where the key cannot be a number."""
+    place = ""
+    for step in path:
+        if isinstance(step, int):
+            if not isinstance(data, list):
+                raise InputError([f"{key}: the scene has no list {place}; write it into the scene first"])
+            if step >= len(data):
+                raise InputError([f"{key}: {place} has {len(data)} items; take one of them"])
+            place += f"[{step + 1}]"
+        elif isinstance(data, dict) or data is None:
+            place += f".{step}" if place else step
+        else:
+            fix = "write it out as a table of numbers first" if isinstance(data, str) else "check the key"
+            raise InputError([f"{key}: {place} = {data!r} is not a table; {fix}"])
+        data = data[step] if isinstance(step, int) else (data or {}).get(step)
+    if isinstance(data, dict):
+        raise InputError([f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}"])
+    if isinstance(data, list):
+        raise InputError([f"{key}: is a list, not a number; name one item, such as {key}[1]"])
+    if isinstance(data, str | bool):
+        raise InputError([f"{key} = {data!r}: is not a number and cannot be swept; compare scenes with --set"])
+    return data
+
+
+def tables(scene: BallScene) -> dict[str, Any]:
+    """The scene as nested tables, without keys of no value."""
+    return scene.model_dump(mode="json", exclude_none=True)
+
+
+def snake(axes: Axes) -> list[tuple[int, ...]]:
+    """Indices of the values at each point, ordered so that from point to point only one changes, and by one."""
+    order: list[tuple[int, ...]] = [()]
+    for axis in axes:
+        ahead = range(len(axis.values))
+        order = [
+            (*head, index)
+            for place, head in enumerate(order)
+            for index in (ahead if place % 2 == 0 else reversed(ahead))
+        ]
+    return order
+
+
+def scenes(scene: BallScene, axes: Axes, order: Order) -> Iterator[tuple[tuple[float, ...], BallScene]]:
+    """Values and validated scene of each point. Raises InputError naming an invalid point."""
+    whole, kind = tables(scene), type(scene)
+    # Tables without a swept key are valid already; the others remain parts of ``whole``, which names them in a fault.
+    touched = {name: whole.setdefault(name, {}) for name in (str(axis.path[0]) for axis in axes)}
+    data = {name: getattr(scene, name) for name in kind.model_fields} | touched
+    holders = [_holder(data, axis.path) for axis in axes]
+    for indices in order:
+        values = tuple(axis.values[index] for axis, index in zip(axes, indices, strict=True))
+        for (table, name), value in zip(holders, values, strict=True):
+            table[name] = value
+        try:
+            point = kind.model_validate(data)
+        except ValidationError:
+            named = ", ".join(f"{axis.key} = {value:g}" for axis, value in zip(axes, values, strict=True))
+            point = validated(kind, whole, f"sweep point ({named})")
+        yield values, point
+
+
+def _holder(data: Any, path: KeyPath) -> tuple[Any, str | int]:
+    """The table or list at the end of a path, and the last step; missing tables are added."""
+    for step, ahead in itertools.pairwise(path):
+        data = data.setdefault(step, {}) if isinstance(step, str) and isinstance(ahead, str) else data[step]
+    return data, path[-1]
+
+
+def _listing(values: Any) -> str:
+    text = ", ".join(f"{value:g}" if isinstance(value, float) else repr(value) for value in values)
+    return text if len(text) <= 60 else text[:57] + "..."

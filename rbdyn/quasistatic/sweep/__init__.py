@@ -1,1 +1,0 @@
-"""Equilibria over keys of a scene: ``points``, ``figures``, ``result``; ``run`` joins them."""

@@ -1,0 +1,170 @@
+"""``doe new`` with limits, tolerances and dimension chains of a scene's parts."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import pytest
+from doe_command import doe
+
+from doe.commands.new_parts import clearance_parts, manufacture_of
+from doe.dimension_chain import chain_from, solve
+from doe.study_file.sections import StudyChain, chain_table
+from rbdyn.base.faults import InputError
+from rbdyn.properties.tolerances import grade_tolerances
+from rbdyn.scene import Scene
+
+SMALL = ("--rollers", "12", "--roller", "5x5", "--pitch", "30")
+INNER = ("--rollers", "18", "--roller", "13x22", "--pitch", "95", "--guidance", "inner", "--bore", "70")
+LARGE = ("--rollers", "5", "--roller", "30x30", "--pitch", "120", "--guidance", "roller")
+BEARINGS = {"outer": SMALL, "inner": INNER, "roller": LARGE}
+# Short runs, so that the study takes seconds.
+QUICK = ("numerics.turns=3", "numerics.discard_turns=2", "numerics.replicates=2", "numerics.impact_window_turns=1",
+         "numerics.companion=false", "numerics.extend=false")  # fmt: skip
+
+
+@pytest.fixture
+def scene(command, tmp_path, request):
+    """Path of a scene of one's own bearing."""
+    path = tmp_path / "own.toml"
+    path.write_text(command("new", "own", *BEARINGS[getattr(request, "param", "outer")]).stdout, encoding="utf-8")
+    return path
+
+
+def written(path, *arguments):
+    """The study that ``doe new`` writes, as text and as tables."""
+    ran = doe("new", path, *arguments)
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout, tomllib.loads(ran.stdout)
+
+
+def test_command_line_limits(scene):
+    """Command line: each limit is a line of its response, = means <=, both ends may stand; others are watched."""
+    _, plain = written(scene)
+    assert not any({"upper", "lower"} & response.keys() for response in plain["response"])
+    limits = ("power_loss_W<=250", " impact_force_N = 140 ", "impact_force_N>=1e0", "cage_slip<=0.1")
+    text, study = written(scene, *(word for limit in limits for word in ("--limit", limit)))
+    responses = {response["name"]: response for response in study["response"]}
+    assert (responses["impact_force_N"]["lower"], responses["impact_force_N"]["upper"]) == (1.0, 140.0)
+    assert responses["power_loss_W"]["upper"] == 250.0 and "upper" not in responses["whirl_deviation_ratio"]
+    assert responses["cage_slip"] == {"name": "cage_slip", "upper": 0.1, "model": "quadratic", "goal": "none"}
+    assert "tolerance = 0.005, the half width" in text and "chain" not in study and "tolerances" not in study
+    without = {key: value for key, value in study.items() if key != "response"}
+    assert without == {key: value for key, value in plain.items() if key != "response"}
+
+
+def test_command_line_limits_that_are_refused(scene):
+    """Command line: a name, a number, a sign or a pair that cannot be is one sentence each, all at once; exit 2."""
+    limits = {
+        "loss<=3": "no response has that name; choose one of impact_force_N, whirl_deviation_ratio, power_loss_W, cage_speed_rpm, cage_slip",
+        "impact_force_N<=abc": "abc is no number; write a plain number",
+        "impact_force_N<=0,5": "0,5 has a decimal comma; write 0.5",
+        "impact_force_N<=inf": "inf is not a finite number; write a plain number",
+        "impact_force_N": 'is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
+        "impact_force_N<3": 'is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
+    }
+    typed = [*limits, "cage_slip>=0.1", "cage_slip<=0.05", "power_loss_W<=3", "power_loss_W=2"]
+    refused = doe("new", scene, *(word for limit in typed for word in ("--limit", limit)))
+    assert refused.returncode == 2 and refused.stdout == ""
+    assert refused.stderr.splitlines() == [
+        *(f"--limit {limit}: {sentence}" for limit, sentence in limits.items()),
+        "--limit power_loss_W=2: power_loss_W has the upper limit 3 already; keep one of them",
+        "--limit cage_slip: the lower limit 0.1 is not below the upper limit 0.05; swap or widen them",
+    ]
+    assert json.loads(doe("new", scene, "--limit", "x=1", "--json").stdout)["status"] == "refused"
+
+
+@pytest.mark.parametrize(
+    ("scene", "names"),
+    [("outer", ["radial", "guide", "pocket"]), ("inner", ["radial", "guide", "pocket"]), ("roller", ["radial", "pocket"])],
+    indirect=["scene"],
+)  # fmt: skip
+def test_command_line_chains_resolve_to_the_clearances(scene, names, tmp_path):
+    """Command line: the links of each chain close to the scene's clearance, and at it have parts of the grade that is written."""
+    text, study = written(scene, "--chains")
+    assert [chain["name"] for chain in study["chain"]] == names and "tolerances" not in study
+    drawn = Scene.load(scene)
+    clearances = {
+        "radial_clearance_mm": drawn.bearing.radial_clearance_mm,
+        "guide_clearance_mm": drawn.cage.guide_clearance_mm,
+        "pocket_clearance_mm": drawn.cage.pocket_clearance_mm,
+    }
+    for chain in study["chain"]:
+        closed = sum(link["coefficient"] * link["nominal_mm"] for link in chain["link"])
+        assert closed == pytest.approx(clearances[chain["factor"]], abs=1e-9)
+        table = chain_table(StudyChain(**chain), tmp_path, clearances[chain["factor"]])
+        solved = solve(chain_from(table, "study"), samples=2000)
+        grades = {part.grade for part in solved.allocation if part.grade}
+        assert len(grades) == 1 and f"# {grades.pop()} (ISO 286-1): " in text
+        assert solved.status.startswith("ok") and solved.worst_case_mm[0] >= table["closing_link"]["lower_mm"] - 1e-9
+        assert all(part.moved_mm == pytest.approx(0.0, abs=1e-9) for part in solved.allocation)
+    if "guide" in names:
+        land = next(link for chain in study["chain"] for link in chain["link"] if link["name"] == "guide_land")
+        assert land["nominal_mm"] == pytest.approx(drawn.land_diameter_mm, abs=5e-4)
+
+
+def test_command_line_tolerances(scene):
+    """Command line: half widths of the grades of ISO 286-1, a front that counts with them, and the widest; all pass the study's checks."""
+    text, study = written(scene, "--tolerances")
+    grades = {size: grade_tolerances(size) for size in (33.333, 33.213, 5.15)}
+    tolerances = {factor["name"]: factor["tolerance"] for factor in study["factor"]}
+    assert tolerances["guide_clearance_mm"] == pytest.approx(0.5 * (grades[33.333]["IT7"] + grades[33.213]["IT7"]))
+    assert tolerances["pocket_clearance_mm"] == pytest.approx(0.5 * grades[5.15]["IT7"] + 0.001)
+    assert study["front"]["tolerance_aware"] == "quantile" and study["tolerances"]["keep"] == 0.5
+    assert (
+        "IT3 (ISO 286-1): outer_raceway 4 um and inner_raceway 4 um, rollers within 1 um of nominal; IT5 would be wider than a step"
+        in text
+    )
+    assert "chain" not in study
+
+
+def test_unit_grades_follow_the_step(scene):
+    """Unit: the usual grade where the step holds it, else the next finer one, at last also narrower rollers."""
+    parts = clearance_parts(Scene.load(scene))["radial_clearance_mm"]
+    wide, narrow, narrowest = (manufacture_of(parts, step) for step in (0.02, 0.005, 0.0001))
+    assert (
+        wide.rule.startswith("IT5") and "wider" not in wide.rule and wide.half_width == pytest.approx(0.012, abs=2e-3)
+    )
+    assert narrow.half_width <= 0.005 and "IT5 would be wider than a step" in narrow.rule
+    assert narrowest.rollers == 0.0005 and narrowest.rule.startswith("IT01")
+    assert parts.clearance == pytest.approx(Scene.load(scene).bearing.radial_clearance_mm)
+
+
+def test_unit_parts_beyond_iso_286_are_refused(scene):
+    """Unit: a raceway beyond 500 mm has no grade here; the sentence says what to leave out."""
+    large = clearance_parts(Scene.load(scene))["radial_clearance_mm"]
+    beyond = large._replace(parts=tuple(part._replace(nominal=20.0 * part.nominal) for part in large.parts))
+    with pytest.raises(
+        InputError, match=r"^radial_clearance_mm: outer_raceway of 700\.3\d* mm lies outside .*; leave --tol"
+    ):
+        manufacture_of(beyond, 0.01)
+
+
+def test_command_line_lips_of_a_cage_that_rollers_guide(scene, command, tmp_path):
+    """Command line: pocket lips that the scene states are a factor, with a chain of their own."""
+    path = tmp_path / "lips.toml"
+    guided = command("new", "own", *LARGE).stdout
+    path.write_text(guided.replace("[cage] ", "[cage]\npocket_radial_clearance_mm = 0.5 #"), encoding="utf-8")
+    _, study = written(path, "--chains", "--tolerances")
+    chain = next(chain for chain in study["chain"] if chain["name"] == "lips")
+    assert chain["factor"] == "pocket_radial_clearance_mm" and chain["link"][0]["nominal_mm"] == 30.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", list(BEARINGS), indirect=True)
+def test_command_line_from_a_drawing_to_parts(scene, tmp_path):
+    """Command line: a study with limits, tolerances and chains runs to its end, and every chain has parts."""
+    text, study = written(
+        scene, "--tolerances", "--chains", "--limit", "power_loss_W<=5000", "--limit", "cage_slip<=0.9"
+    )
+    path = tmp_path / "study.toml"
+    quick = ", ".join(f'"{assignment}"' for assignment in QUICK)
+    lines = [f"set = [{quick}]" if line.startswith("set = ") else line for line in text.splitlines()]
+    path.write_text("\n".join(lines).replace("replicates = 16 ", "replicates = 2 "), encoding="utf-8")
+    ran = doe("study", path, "--out", tmp_path / "study", "--json")
+    assert ran.returncode == 0, ran.stderr
+    record = json.loads(ran.stdout)
+    assert record["status"] == "ok" and set(record["limits"]) >= {"power_loss_W", "cage_slip"}
+    parts = (tmp_path / "study" / "part_dimensions.csv").read_text(encoding="utf-8").splitlines()
+    assert {line.split(",")[0] for line in parts[1:]} == {chain["name"] for chain in study["chain"]}
