@@ -1,5 +1,6 @@
 """Unknown inputs of a scene: ``doe uncertainty`` and ``doe calibrate``."""
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -82,9 +83,9 @@ def calibrate(
     """Identify the unknown inputs of a scene from measurements on a rig, and state whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
-        from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
+        from doe.report.sections.calibration import blocks, cost_of, files_of, record_of, stored, write
         from doe.running.runner import ANSWER
-        from doe.workflow.calibration import calibration_stages, find_calibration, question_of, read_question
+        from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
         from doe.workflow.status import content_digest
 
         question = read_question(path, data, free or (), overrides or ())
@@ -95,10 +96,12 @@ def calibrate(
             inputs = content_digest(path)
             with noted_agenda(folder, "doe calibrate", workers, quiet, inputs=inputs, question=identity) as agenda:
                 agenda.plan(calibration_stages(question))
+                predicted = None if scheduler else agenda.state_first(pace(question))
                 with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
                     result = find_calibration(question, simulations)
+                    turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
                 agenda.enter(ANSWER)
-                record = record_of(result, identity)
+                record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
                 write(result, record, folder)
                 agenda.finish(files_of(record))
                 noted = agenda
