@@ -1,6 +1,7 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,7 @@ def simulate(
     stop: Stop | None = None,
     target: float | None = None,
     notice: Notice = log,
+    overrides: Iterable[str] = (),
 ) -> SimulationResult:
     """Simulate all replicates of a scene, which may be the path of its file.
 
@@ -59,11 +61,12 @@ def simulate(
     - ``target``: relative error to reach, which chooses tolerance, turns and replicates (``rbdyn.dynamics.target``)
     - ``notice(sentence)`` is called early with the time that the runs still take; by default it is a warning of the logger
       "rbdyn", None for silence
+    - ``overrides``: keys of the scene with other values, such as ``["cage.mass_g=50"]``
 
-    Raises InputError for another kind of bearing and for an impossible target or number of workers. Raises RunError when a
-    replicate cannot go on, KeyboardInterrupt on Ctrl-C.
+    Raises InputError for a faulty scene or override, another kind of bearing, and an impossible target or number of workers.
+    Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
     """
-    scene = rollers_only(scene)
+    scene = rollers_only(scene, overrides)
     if target is not None:
         from rbdyn.dynamics.target import reach
 
