@@ -70,9 +70,9 @@ def _figures(result: SimulationResult) -> "dict[str, Quantity]":
 
 def _pulses(result: SimulationResult) -> "dict[str, Quantity | None]":
     return {
-        "rate of pulses at one pocket [Hz]": result.pulse_rate,
-        "mean height of the pulses [N]": result.pulse_height,
-        "mean impulse of the pulses [N s]": result.pulse_impulse,
+        "rate of pulses at one pocket [Hz]": result.pulse_rate_hz,
+        "mean height of the pulses [N]": result.pulse_height_N,
+        "mean impulse of the pulses [N s]": result.pulse_impulse_N_s,
     }
 
 
