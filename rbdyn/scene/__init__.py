@@ -11,7 +11,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -438,12 +438,15 @@ class Scene(SceneFile):
         return material_of(getattr(self.materials, part))
 
 
-def scene_of(source: Scene | BallScene | Path | str) -> Scene | BallScene:
-    """The scene itself, or that of a file. Raises InputError for anything else and for the faults of the file."""
+def scene_of(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> Scene | BallScene:
+    """The scene itself, or that of a file, with ``key.path=value`` overrides.
+
+    Raises InputError for anything else, for the faults of the file and for those of the overrides.
+    """
     if isinstance(source, Scene | BallScene):
-        return source
+        return source.overridden(overrides) if overrides else source
     if isinstance(source, str | PathLike):
-        return Scene.load(Path(source))
+        return Scene.load(Path(source), overrides)
     raise InputError(
         [
             f"scene = {one_line(repr(source), LONGEST_NAME)}: must be a Scene or the path of a scene file; Scene.from_dict takes "
@@ -452,17 +455,17 @@ def scene_of(source: Scene | BallScene | Path | str) -> Scene | BallScene:
     )
 
 
-def rollers_only(source: Scene | BallScene | Path | str) -> Scene:
+def rollers_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> Scene:
     """The scene, as ``scene_of``, of a roller bearing. Raises InputError for a ball bearing."""
-    scene = scene_of(source)
+    scene = scene_of(source, overrides)
     if isinstance(scene, Scene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
 
 
-def balls_only(source: Scene | BallScene | Path | str) -> BallScene:
+def balls_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> BallScene:
     """The scene, as ``scene_of``, of a ball bearing. Raises InputError for a roller bearing."""
-    scene = scene_of(source)
+    scene = scene_of(source, overrides)
     if isinstance(scene, BallScene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])

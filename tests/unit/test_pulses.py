@@ -164,7 +164,7 @@ def test_a_result_reports_pulses_where_they_are_asked_for() -> None:
     assert record_["pulse_height_N"]["value"] > 10.0 and record_["pulse_rate_hz"]["statistical_error"] > 0.0
     assert any(note.startswith("pulses: forces at one pocket above 10 N, below 5000 Hz") for note in result.notes)
     none = simulate(scene.changed({**pulses, "numerics.pulse_threshold_N": 1e6}), notice=None)
-    assert none.pulse_height is not None and none.pulse_height.value == 0.0
+    assert none.pulse_height_N is not None and none.pulse_height_N.value == 0.0
     assert any(note.endswith("none is so high, so lower numerics.pulse_threshold_N") for note in none.notes)
 
 

@@ -290,8 +290,8 @@ def pulse_figures(scene: Scene, runs: Runs, companions: Runs, share: float) -> d
     """
     if not scene.pulse_samples_per_turn:
         return {}
-    figures = {"pulse_rate": PULSE_RATE, "pulse_height": PULSE_HEIGHT, "pulse_impulse": PULSE_IMPULSE}
-    per_pocket = {"pulse_rate": 1.0 / scene.bearing.rollers}
+    figures = {"pulse_rate_hz": PULSE_RATE, "pulse_height_N": PULSE_HEIGHT, "pulse_impulse_N_s": PULSE_IMPULSE}
+    per_pocket = {"pulse_rate_hz": 1.0 / scene.bearing.rollers}
     return {
         name: quantity(figure, runs, companions, share, 0.0, per_pocket.get(name, 1.0))
         for name, figure in figures.items()
@@ -307,7 +307,7 @@ def pulse_notes(scene: Scene, pulses: Mapping[str, Quantity]) -> tuple[str, ...]
         f"pulses: forces at one pocket above {numerics.pulse_threshold_N:g} N, below {numerics.pulse_bandwidth_hz:g} Hz, "
         f"with a dead time of {numerics.pulse_dead_time_ms:g} ms"
     )
-    height, impulse = pulses["pulse_height"].value, pulses["pulse_impulse"].value
+    height, impulse = pulses["pulse_height_N"].value, pulses["pulse_impulse_N_s"].value
     if height == 0.0:
         return (f"{definition}; none is so high, so lower numerics.pulse_threshold_N",)
     if as_short_as_the_filter(height, impulse, numerics.pulse_bandwidth_hz):
