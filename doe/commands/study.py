@@ -53,7 +53,9 @@ def study(
         digest = inputs_digest(loaded, adaptive, robust)
         if not (verbose or retry) and (record := finished_record(folder, digest)):
             if not as_json:
-                print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
+                from doe.report.files import blocks
+
+                show(blocks(record), Detail.of(quiet))
                 print(f"Finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
             _leave_by(record, as_json)
             return

@@ -189,8 +189,8 @@ def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[R
         among = "of the front, without a baseline"
     else:
         rows = np.flatnonzero(dominates(costs, baseline))
-        among = f"among the {rows.size} of {len(costs)} front points that dominate the baseline"
+        among = f"among the {rows.size} (of {len(costs)}) front points that beat the baseline in every response"
         if rows.size == 0:
             rows = np.arange(len(costs))
-            among = "of the front; no point of the front dominates the baseline"
+            among = "of the front; no point of the front beats the baseline in every response"
     return {rule: int(rows[score(rule, costs, goals)[rows].argmax()]) for rule in RULES}, among

@@ -8,18 +8,18 @@ from doe import clearance
 from doe.dimension_chain.solution import ALLOCATED
 from doe.report.page import html_report, markdown_report, notes, reference
 from doe.report.sections.answer import (
-    advice,
     asked_record,
     changes,
     confirmation_record,
+    first_screen,
     gains_record,
     judged_limits_record,
-    verdict,
 )
-from doe.report.sections.design import failure_table, runs_record
+from doe.report.sections.chain import chains
+from doe.report.sections.design import runs_record
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, predicted_record
-from doe.report.sections.record import drop_undefined, part, readable
+from doe.report.sections.record import drop_undefined, readable
 from doe.report.sections.search import (
     adaptive_record,
     archive_table,
@@ -36,7 +36,7 @@ from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import RUNS_TABLE, evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Block, Detail, Heading
+from rbdyn.base.blocks import Block, Detail
 from rbdyn.base.records import finite, save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.result import versions, write_json
@@ -102,21 +102,17 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
 
 def answer_text(record: dict[str, Any]) -> str:
     """answer.txt, of the record of ``doe study --json``."""
-    clean = drop_undefined(record)
-    failures = failure_table(part(clean, "failures") or [])
-    return terminal.text(readable([*verdict(clean), *advice(clean), failures], clean))
+    return terminal.text(blocks(record))
 
 
 def blocks(record: dict[str, Any]) -> list[Block]:
-    """Blocks for the terminal of the record of ``doe study --json``: the verdict first, the fits only at full detail."""
+    """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
     clean = drop_undefined(record)
-    fits = [replace(block, detail=Detail.ALL) for block in diagnostics(clean, {}).blocks]
-    published = reference(clean, {})
-    context = readable([*published.blocks, changes(clean)], clean)
-    titles = (published.title if part(clean, "beside_reference") else "", "The answer" if context else "")
-    before, after = (Heading(title, detail=Detail.USUAL) for title in titles)
-    answer = [*advice(clean), *notes(clean, {}).blocks]
-    return readable([*verdict(clean), *fits, before, *context, after, *answer], clean)
+    details = [changes(clean), *chains(clean, {}).blocks, *reference(clean, {}).blocks, *diagnostics(clean, {}).blocks]
+    return readable(
+        [*first_screen(clean), *notes(clean, {}).blocks, *(replace(block, detail=Detail.ALL) for block in details)],
+        clean,
+    )
 
 
 def summary(outcome: StudyResult) -> dict[str, Any]:
@@ -141,6 +137,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "gains": gains_record(gains),
         "statement": statement(gains),
         "whirl_sentence": outcome.whirl_sentence,
+        "rivals_sentences": outcome.rivals_sentences,
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
         "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
         "notes": list(outcome.notes),

@@ -32,7 +32,7 @@ from doe.report.sections.record import (
     rounded_down,
 )
 from rbdyn.base import html, markdown
-from rbdyn.base.blocks import Block, Bullets, Detail, Note, Section, Table, Widget
+from rbdyn.base.blocks import Block, Bullets, Note, Section, Table, Widget
 from rbdyn.base.words import filled_page, label, quantity, shown
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
@@ -236,9 +236,9 @@ def reference(summary: Record, motion: Mapping[str, Any]) -> Section:
     header = ("response", "factor", "ours", "theirs", "sign")
     caption = "Linear effects per coded unit (* significant at 5 %)"
     blocks: list[Block] = [
-        Bullets([sentence for sentence in words if sentence], detail=Detail.USUAL),
-        Table("Levels", levels_header, levels, detail=Detail.USUAL),
-        Table(caption, header, effects, text_columns=(1, 4), detail=Detail.USUAL),
+        Bullets([sentence for sentence in words if sentence]),
+        Table("Levels", levels_header, levels),
+        Table(caption, header, effects, text_columns=(1, 4)),
     ]
     return Section("reference", "Compared with the published table", blocks)
 

@@ -59,6 +59,17 @@ def chance_above(room: ArrayLike, half_width: ArrayLike, freedom: ArrayLike) -> 
 
 
 WHIRL = "whirl_deviation_ratio"
+# Verdicts on gains: the first is good news, the others are not.
+REAL, LOSS, NOISE = (
+    "real, more than its error",
+    "a real loss, more than its error",
+    "inside its own noise: no gain is shown",
+)
+
+
+def point_words(name: str) -> str:
+    """The name of a confirmed point as people read it."""
+    return "pick without tolerances" if name == "without_tolerances" else name.replace("_", " ")
 
 
 @dataclass(frozen=True)
@@ -216,11 +227,9 @@ def statement(gains: Sequence[Gain]) -> str:
     """
     count = len(gains)
     by_words = {
-        "real, more than its error": [gain for gain in gains if gain.percent > gain.error_among(count)],
-        "a real loss, more than its error": [gain for gain in gains if -gain.percent > gain.error_among(count)],
-        "inside its own noise: no gain is shown": [
-            gain for gain in gains if abs(gain.percent) <= gain.error_among(count)
-        ],
+        REAL: [gain for gain in gains if gain.percent > gain.error_among(count)],
+        LOSS: [gain for gain in gains if -gain.percent > gain.error_among(count)],
+        NOISE: [gain for gain in gains if abs(gain.percent) <= gain.error_among(count)],
     }
     parts = [
         f"{', '.join(_improved(gain, count) for gain in group)}: {words}" for words, group in by_words.items() if group

@@ -48,6 +48,7 @@ from doe.workflow.pick import (
     neighbourhood,
     widest_tolerances_of,
 )
+from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
 from doe.workflow.runs import STORE, Runs, check_augment, check_runs, design_of, ordered_runs, region_of, run_design
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
@@ -279,6 +280,12 @@ class StudyResult:
         return whirl_sentence(self.study, self.confirmed)
 
     @property
+    def rivals_sentences(self) -> list[str]:
+        """Why no point that is better in every response as simulated is the pick; none where there is no such point."""
+        forecast = Forecast(self.study, self.surfaces, self.front, self.adaptive, self.searched_pick)
+        return rivals_sentences(forecast, self.confirmed)
+
+    @property
     def limits_sentence(self) -> str:
         """The verdicts in words, with the probability of keeping the limits over the unknown inputs; empty without limits."""
         verdict_words = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tries)
@@ -352,7 +359,7 @@ def run_study(
         published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *step_failures, *selection.failures),
-        notes=(*runs.notes, *notes, *_advice(study, surfaces, searched, robustness)),
+        notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
 

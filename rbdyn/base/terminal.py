@@ -139,13 +139,13 @@ def fitting_parts(texts: Sequence[Sequence[str]], room: int) -> list[list[tuple[
     A column is never narrower than its longest word and its short cells, such as a value with its error. The first column is in
     every part, and its names are broken between words where that saves a part. Cells too wide for the room next to it are broken.
     """
-    whole = [max((_length(line) for text in column for line in text.splitlines()), default=1) for column in texts]
+    lengths = [[_length(line) for text in column for line in text.splitlines()] or [1] for column in texts]
     least = [_least(column) for column in texts]
     named = [_longest(word for text in texts[0] for word in text.split()), *least[1:]]
     ways = [_parts(widths, room - FRAME) for widths in (least, named)]
     widths, parts = min(ways, key=lambda way: len(way[1]))
     return [
-        list(zip(part, _widths([(widths[place], whole[place]) for place in part], room - FRAME), strict=True))
+        list(zip(part, _widths([(widths[place], lengths[place]) for place in part], room - FRAME), strict=True))
         for part in parts
     ]
 
@@ -189,14 +189,19 @@ def _pieces(text: str) -> list[str]:
     return [text] if len(text) <= SHORT or "±" in text else text.split()
 
 
-def _widths(ends: Sequence[tuple[int, int]], room: int) -> list[int]:
-    """Widths of columns between their least and their whole width, the narrowest widened first."""
-    widths = [least for least, _ in ends]
+def _widths(columns: Sequence[tuple[int, Sequence[int]]], room: int) -> list[int]:
+    """Widths of columns from the least width and the lengths of the cells of each.
+
+    The column with the most broken cells is widened first, of equal ones the narrowest.
+    """
+    widths = [least for least, _ in columns]
     spare = room - sum(width + PADDING for width in widths)
     while spare > 0:
-        short = [place for place, (_, whole) in enumerate(ends) if widths[place] < whole]
-        if not short:
+        broken = [
+            sum(length > width for length in lengths) for width, (_, lengths) in zip(widths, columns, strict=True)
+        ]
+        if not any(broken):
             break
-        widths[min(short, key=lambda place: widths[place])] += 1
+        widths[min(range(len(widths)), key=lambda place: (-broken[place], widths[place]))] += 1
         spare -= 1
     return widths

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, notes
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, shown
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def blocks(result: BallResult) -> list[Block]:
-    """Balls, places, contacts, life and stiffness of each row, forces of the rings, notes; nothing without an equilibrium."""
+    """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; nothing without an equilibrium."""
     if not result.is_equilibrium:
         return []
-    rows = [
-        block
-        for name, row in result.row_reports.items()
-        for block in (*_row_tables(f"{name} row" if name else "", row), *map(Paragraph, _row_sentences(row)))
-    ]
+    titles = {name: f"{name} row" if name else "" for name in result.row_reports}
+    rows: list[Block] = []
+    for name, row in result.row_reports.items():
+        rows += [Heading(titles[name]), *map(Paragraph, _row_sentences(row))]
+    tables = [block for name, row in result.row_reports.items() for block in _row_tables(titles[name], row)]
     sentences = []
     report = result.reached
     if isinstance(report, DoubleDeckerReport):
@@ -38,7 +38,13 @@ def blocks(result: BallResult) -> list[Block]:
         sentences.append(_runout(result.runout))
     from rbdyn.compiled.kernel import compiler_notes
 
-    return [*rows, *map(Paragraph, sentences), *notes(result.notes or ()), *notes(compiler_notes(), Detail.ALL)]
+    return [
+        *rows,
+        *map(Paragraph, sentences),
+        *tables,
+        *notes(result.notes or ()),
+        *notes(compiler_notes(), Detail.ALL),
+    ]
 
 
 def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":

@@ -146,22 +146,24 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
+        # The first concern the input, the next the figures of this run, the last what the model leaves out.
         notes=(
             *scene.unit_notes,
             *scene.catalogue_notes,
-            *scene.lubricant.estimates,
-            *scene.section_notes,
-            *light_load_notes(scene),
-            *film_drive_notes(scene),
-            *race_notes(scene, races),
-            *heat_notes(scene, figures["power_loss_W"].value),
-            *friction_notes(maker),
-            *_notes(scene, power_gap),
-            *whirl_notes(scene, orbit),
-            *pulse_notes(scene, pulses),
-            *left_out_notes(scene, figures["power_loss_W"].value),
+            *_balance_notes(scene, power_gap),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault, tighter),
+            *whirl_notes(scene, orbit),
+            *pulse_notes(scene, pulses),
+            *heat_notes(scene, figures["power_loss_W"].value),
+            *friction_notes(maker),
+            *race_notes(scene, races),
+            *film_drive_notes(scene),
+            *light_load_notes(scene),
+            *_model_notes(scene),
+            *left_out_notes(scene, figures["power_loss_W"].value),
+            *scene.section_notes,
+            *scene.lubricant.estimates,
             *stiffness_notes(scene, runs),
         ),
         versions=versions(),
@@ -195,13 +197,18 @@ def _parts(clearance: OperatingClearance | None) -> dict[str, float] | None:
     }
 
 
-def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
+def _balance_notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
+    if power_gap <= LARGEST_POWER_GAP:
+        return ()
+    return (
+        f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
+        "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold",
+    )
+
+
+def _model_notes(scene: Scene) -> tuple[str, ...]:
+    """What the chosen laws miss."""
     notes = []
-    if power_gap > LARGEST_POWER_GAP:
-        notes.append(
-            f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
-            "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
-        )
     if cutoff := scene.numerics.whirl_cutoff_hz:
         notes.append(f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)")
     if scene.traction.model == "four_constant":

@@ -174,10 +174,10 @@ def test_pick_is_the_one_that_the_study_stands_by():
     text = html_report(record)
     compared = data_of(text)["compared"]
     assert compared["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
-    assert compared["without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
+    assert compared["pick without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
     words = " ".join(Outline(text).words)
     assert "Why this point: by what manufacture leaves of it." in words
-    simulated = words[words.index("predicted by the surfaces and simulated, without tolerances") :]
+    simulated = words[words.index("predicted by the surfaces and simulated, pick without tolerances") :]
     # Its own simulated gain, not that of the pick.
     assert "11.16 ± 0.65 % less" in simulated[:400] and "5.5" not in simulated[:200]
 
@@ -406,8 +406,8 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
         assert all(len(ticks) <= 6 for ticks in (axis.get_xticks(), axis.get_yticks(), axis.get_zticks()))
 
 
-def test_the_verdict_over_what_is_not_known_comes_first():
-    """Before any clearance or gain; names of responses are spelt, points of the robust front stand in a table."""
+def test_the_odds_of_the_gains_follow_these():
+    """Odds that are no good news warn; names of responses are spelt, points of the robust front stand in a table."""
     names = RESPONSES
     sentence = (
         "Of 100 cases the pick is better in all of these in 57 (51 to 63): the gains depend on what is not known."
@@ -419,10 +419,12 @@ def test_the_verdict_over_what_is_not_known_comes_first():
         "better": {name: [0.8, 0.7, 0.9] for name in names},
         "all": [0.57, 0.51, 0.63],
     }
-    record = summary() | {"robust": {"sentences": [sentence], "front": {"confirmed": [point]}}}
+    record = summary() | {"robust": {"sentences": [sentence], "all": point["all"], "front": {"confirmed": [point]}}}
     page = html_report(record, motion())
-    words, section = " ".join(Outline(page).words), page[page.index('id="answer"') :]
-    assert section[: section.index("</p>")].endswith(sentence)
-    assert words.index(sentence) < words.index("Over the unknown inputs")
+    words = " ".join(Outline(page).words)
+    assert f'class="warning"><strong>Warning:</strong> {sentence}' in page and "--robust states" not in page
+    assert words.index("Changes confirmed") < words.index(sentence) < words.index("Over the unknown inputs")
+    sure = record | {"robust": record["robust"] | {"all": [0.97, 0.94, 0.99]}}
+    assert f'class="statement">{sentence}' in html_report(sure)
     assert "3.1 %, 80 (70 to 90)" in words and "57 (51 to 63)" in words
     assert sentence in markdown_report(record, [])

@@ -80,7 +80,7 @@ def test_pick_dominates_the_baseline(two):
     assert (pick < two.baseline_values).any()
     better = (two.values <= two.baseline_values).all(axis=1)
     assert knee_depth(two.values)[two.pick] == knee_depth(two.values)[better].max()
-    assert "dominate the baseline" in two.pick_reason
+    assert "beat the baseline in every response" in two.pick_reason
 
 
 def test_pick_is_the_knee_without_a_baseline_or_above_it(three):
@@ -88,7 +88,7 @@ def test_pick_is_the_knee_without_a_baseline_or_above_it(three):
     assert "without a baseline" in three.pick_reason
     best = front(bowls(2), LOWER, UPPER, population=20, generations=10, baseline=[0.5, 0.0, 0.0])
     assert best.pick == best.knee
-    assert "no point of the front dominates" in best.pick_reason
+    assert "no point of the front beats the baseline" in best.pick_reason
 
 
 def test_knee_of_two_bowls_is_halfway(two):

@@ -121,7 +121,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     compared = record["adaptive"]["compared"]
     assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.index("The pick has") < page.index("The search ended because") < page.index('class="tiles"')
+    assert page.index('class="tiles"') < page.index("The pick has") < page.index("The search ended because")
 
 
 def foretelling(predict, faces=()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,23 +118,28 @@ def test_a_pick_that_misses_is_followed_by_the_next_best_until_one_keeps_the_lim
     assert told["verdict"] == "kept" and told["bound"] == 35.0 and {"value", "error"} <= set(told)
 
 
-def test_a_broken_limit_is_said_first_and_fails_the_study_also_when_asked_again(tmp_path, monkeypatch):
+def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_again(tmp_path, monkeypatch):
     biased(monkeypatch.setattr, 30.0)
     path = limited_study(tmp_path, more=[("tries = 4", "tries = 2")])
     arguments = ["study", str(path), "--out", str(tmp_path / "out"), "-q"]
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact force <= 35")
+        warning, gains = map(
+            shown.stdout.index, ("Warning: LIMIT BROKEN at the pick: impact force <= 35", "Changes confirmed")
+        )
+        assert shown.stdout.startswith("Chosen clearances") and warning < gains
         assert "2 points simulated" in shown.stdout
     assert "Finished before" in again.stdout
     record = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert record["status"] == "broken"
     assert record["confirmation"]["baseline"]["limits"]["impact_force_N"]["verdict"] == "broken"
     answer = (tmp_path / "out" / "answer.txt").read_text(encoding="utf-8")
-    assert answer.startswith("LIMIT BROKEN")
+    assert "Warning: LIMIT BROKEN" in answer and "doe study study.toml --robust" in answer
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "✗ broken" in page and ">limit<" in page
+    assert re.search(r'class="warning"><strong>Warning:</strong> LIMIT BROKEN', page)
+    assert not re.search(r'class="statement">[^<]*(LIMIT|a real loss|no gain)', page)
     assert "LIMIT BROKEN" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "broken" in (tmp_path / "out" / "confirmation.csv").read_text(encoding="utf-8")
 

@@ -7,14 +7,17 @@ from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
 
-from doe.report.sections.chain import chain_blocks
+from doe.report.sections.chain import refused, yield_words
 from doe.report.sections.record import (
     SENSES,
     Factor,
     Record,
+    allocation,
     change,
+    dimension,
     factors,
     half_width,
+    moved,
     nearest,
     of_hundred,
     part,
@@ -23,13 +26,24 @@ from doe.report.sections.record import (
     share_with_interval,
 )
 from doe.study_file import Study
-from doe.workflow.confirmation import Confirmed, Gain, Limit, every_limit, limits_of, statement
+from doe.workflow.confirmation import (
+    LOSS,
+    NOISE,
+    REAL,
+    Confirmed,
+    Gain,
+    Limit,
+    every_limit,
+    limits_of,
+    point_words,
+    statement,
+)
 from doe.workflow.front import known_tolerances
 from doe.workflow.runs import region_of
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Section, Table, Tile, Tiles
+from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, quantity, shown, with_error
 
@@ -40,47 +54,101 @@ CLEARANCES = {
     "cage.pocket_clearance_mm": "width of the pocket less the roller diameter",
     "cage.pocket_radial_clearance_mm": "radial at the lips of the pocket",
 }
+# Share of the cases over the unknown inputs from which a verdict counts as good news.
+NEARLY_ALL = 0.9
+SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
 LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
-    """The verdict over the unknown inputs and the limits, then what an engineer acts on."""
-    return Section("answer", "The answer", [*verdict(summary), *advice(summary)])
+    """What an engineer acts on, in the order of a first screen."""
+    return Section("answer", "The answer", first_screen(summary))
 
 
-def verdict(summary: Record) -> list[Block]:
-    """The first that is to be read: whether the pick is better over the unknown inputs and keeps its limits."""
-    sentences = [*(part(summary, "robust", "sentences") or []), part(summary, "limits_sentence") or ""]
-    return [Paragraph(sentence, "statement") for sentence in sentences]
+def first_screen(summary: Record) -> list[Block]:
+    """The chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
+    return [*_clearances(summary), *_judged(summary), *_gained(summary), *_parts_to_make(summary), *_reasons(summary)]
 
 
-def advice(summary: Record) -> list[Block]:
-    """Clearances, gains with their verdicts, limits, the reason for this point, the trend beyond the region, and the parts."""
-    search = part(summary, "adaptive", "sentences") or [""]
-    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
-    why = f"Why this point: {reason}." if reason else ""
+def _judged(summary: Record) -> list[Block]:
+    """Limits with their verdicts, and the odds of keeping them over the unknown inputs or the command that computes these."""
+    text = part(summary, "limits_sentence") or ""
+    verdicts = {limit.get("verdict") for limit in (part(summary, "limits") or {}).values()}
+    odds = [limit["odds"][0] for limit in (part(summary, "limits") or {}).values() if limit.get("odds")]
+    good = verdicts <= {"kept"} and summary.get("status", "ok") == "ok" and min(odds, default=1.0) >= NEARLY_ALL
+    return [_limits_judged(summary), Paragraph(text, "statement" if good else "warning")]
+
+
+def _gained(summary: Record) -> list[Block]:
+    """The gains with their verdicts, and the odds of them over the unknown inputs or the command that computes these."""
+    text = gains_statement(summary)
+    sentences = part(summary, "robust", "sentences") or []
+    odds = part(summary, "robust", "all") or [0.0]
+    # Only the first two sentences are verdicts: the odds of the gains, and what decides.
+    first: Role = "statement" if odds[0] >= NEARLY_ALL else "warning"
+    second: Role = "warning" if part(summary, "robust", "undecided") else ""
+    further: list[Role] = [""] * len(sentences)
+    command = f"doe study {part(summary, 'asked', 'study_file') or 'STUDY'} --robust"
     return [
-        Paragraph(search[0], "statement"),
-        Bullets(search[1:]),
-        *_clearances(summary),
         _gains(summary),
-        Paragraph(gains_statement(summary), "statement"),
-        Paragraph(part(summary, "whirl_sentence") or "", "statement"),
+        Paragraph(text, _role_of_gains(summary, text)),
+        *(Paragraph(sentence, role) for sentence, role in zip(sentences, [first, second, *further], strict=False)),
         _robust_points(summary),
-        _limits_judged(summary),
-        Paragraph(why),
-        Paragraph(part(summary, "edge", "sentence") or ""),
-        *_parts_to_make(summary),
+        Paragraph(
+            "" if sentences or not text else f"{command} states the odds of these gains over the unknown inputs."
+        ),
+        Paragraph(part(summary, "whirl_sentence") or "", "warning"),
     ]
 
 
+def _role_of_gains(summary: Record, text: str) -> Role:
+    """Good news only where every gain is real; a loss, or no gain at all, is bad news."""
+    verdicts = {gain.get("verdict") for gain in (part(summary, "gains") or {}).values()} or {"better"}
+    if "worse" in verdicts or LOSS in text or "better" not in verdicts or (NOISE in text and REAL not in text):
+        return "warning"
+    return "" if "within error" in verdicts or NOISE in text else "statement"
+
+
+def _reasons(summary: Record) -> list[Block]:
+    """Why this point and no other one, what limits it, and where it lies."""
+    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
+    search = part(summary, "adaptive", "sentences") or [""]
+    return [
+        Paragraph(f"Why this point: {reason}." if reason else ""),
+        Paragraph(search[0]),
+        *(Paragraph(sentence) for sentence in part(summary, "rivals_sentences") or []),
+        Paragraph(part(summary, "adaptive", "held") or ""),
+        Paragraph(_edge(summary)),
+    ]
+
+
+def _edge(summary: Record) -> str:
+    """Where the pick lies in the region; the change beyond a bound is in the section of the confirmation."""
+    bounds = [
+        f"the {bound['side']} bound of {name}, {shown(bound['bound'])} {quantity(name)[1]}".rstrip()
+        for name, bound in (part(summary, "edge", "factors") or {}).items()
+    ]
+    whole = part(summary, "edge", "sentence") or ""
+    return f"The pick is at {' and '.join(bounds)}: a wider design may find more." if bounds else whole
+
+
 def _parts_to_make(summary: Record) -> list[Block]:
-    """Every dimension chain; its full detail is in a section of its own."""
+    """Parts of every dimension chain, and whether these meet their limits; all else is in a section of its own."""
     chains = part(summary, "chains") or {}
-    whole = [block for name, chain in chains.items() for block in chain_blocks(name, chain)]
-    return [block for block in whole if block.detail < Detail.ALL]
+    rows = [
+        (label(name), label(chain_name), dimension(size), size.get("grade") or "", moved(size))
+        for chain_name, chain in chains.items()
+        for name, size in allocation(chain).items()
+    ]
+    header = ("part", "chain", "dimension [mm]", "grade", "nominal moved [mm]")
+    misses = [
+        f"Chain {label(name)} misses its limits: {chain['status']}." for name, chain in chains.items() if refused(chain)
+    ]
+    shares = (f"{label(name)}: {words}" for name, chain in chains.items() if (words := yield_words(chain)))
+    table = Table("Parts to make", header, rows, "; ".join(shares), text_columns=(1, 3))
+    return [table, *(Paragraph(text, "warning") for text in misses)]
 
 
 def _clearances(summary: Record) -> list[Block]:
@@ -94,8 +162,8 @@ def _clearances(summary: Record) -> list[Block]:
     sentence = part(summary, "tolerances_sentence")
     return [
         Tiles("Chosen clearances", "pick", tiles),
+        Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
-        Paragraph(part(summary, "clearance_class") or "", "small"),
         Paragraph(f"Tolerances: {sentence}" if sentence else ""),
     ]
 
@@ -127,10 +195,10 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     before = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors") or {}
     tolerance = tolerance_of(summary, factor)
     further = {
+        "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
         "baseline": factor.text(before.get(factor.name)),
         "in operation": factor.text(running.get("pick")),
         "baseline in operation": factor.text(running.get("baseline")),
-        "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
     }
     return Tile(
         factor.words, factor.text(pick[factor.name]), factor.unit, [entry for entry in further.items() if entry[1]]
@@ -155,19 +223,20 @@ def gains_statement(summary: Record) -> str:
 
 def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
-    columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
+    before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
+    # The error of the baseline is in that of the change.
     rows = [
-        (label(name), *(_value(column.get(name)) for column in columns), change(gain), sign_of(gain))
+        (label(name), _value(before.get(name)).partition(" ± ")[0], _value(after.get(name)), _signed(gain))
         for name, gain in gains.items()
     ]
-    header = ("response", "baseline", "pick", "change", "verdict")
-    return Table("Changes confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
+    header = ("response", "baseline", "pick", "change")
+    return Table("Changes confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
 
 
 def limits(summary: Record) -> Table:
     """Limits judged by simulation at every confirmed point."""
     rows = [
-        (name.replace("_", " "), _bound(limit), with_error(limit.get("value"), limit.get("error")), *_judged(limit))
+        (point_words(name), _bound(limit), with_error(limit.get("value"), limit.get("error")), *_verdict(limit))
         for name, point in (part(summary, "confirmation") or {}).items()
         for limit in _limits_of(point)
     ]
@@ -185,16 +254,16 @@ def _limits_judged(summary: Record) -> Table:
         rows.append(
             (
                 _bound(limit),
-                with_error(base.get("value"), base.get("error")),
-                _judged(base)[0],
                 with_error(limit.get("value"), limit.get("error")),
-                *_judged(limit),
+                *_verdict(limit),
                 of_hundred(odds) if odds else "",
+                with_error(base.get("value"), base.get("error")),
+                _verdict(base)[0],
             )
         )
-    shares = "kept in 100 cases of the unknown inputs"
-    header = ("limit", "baseline", "verdict", "pick", "verdict", "probability", shares)
-    return Table("Limits judged by simulation", header, rows, LIMITS_NOTE, text_columns=(2, 4))
+    shares = "kept in 100 cases of unknown inputs"
+    header = ("limit", "pick", "verdict", "probability", shares, "baseline", "")
+    return Table("Limits judged by simulation", header, rows, text_columns=(2, 6))
 
 
 def _limits_of(point: Record) -> list[Record]:
@@ -207,7 +276,7 @@ def _bound(limit: Record) -> str:
     return f"{label(str(limit['response']))} {SENSES.get(str(limit.get('sense')), '')} {shown(limit.get('bound'))}"
 
 
-def _judged(limit: Record) -> tuple[str, str]:
+def _verdict(limit: Record) -> tuple[str, str]:
     """The verdict with its sign, and the probability of keeping the limit."""
     probability = limit.get("probability")
     return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
@@ -293,7 +362,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     header = ["point", *(label(factor.name) for factor in inputs), *map(label, names)]
     rows = [
         [
-            name.replace("_", " "),
+            point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in inputs),
             *(_value(part(point, "responses", response)) for response in names),
         ]
@@ -314,11 +383,10 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
             for response, gain in predictions.items()
         ]
         columns = ("response", "on the surfaces", "simulated", "verdict")
-        caption = f"Gains predicted by the surfaces and simulated, {name.replace('_', ' ')}"
+        caption = f"Gains predicted by the surfaces and simulated, {point_words(name)}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
-    blocks.append(changes(summary))
-    blocks.append(limits(summary))
-    reasons = [(name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")]
+    blocks += [changes(summary), limits(summary), Paragraph(part(summary, "edge", "sentence") or "")]
+    reasons = [(point_words(name), point["reason"]) for name, point in points.items() if point.get("reason")]
     blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
     return Section("confirmation", "Confirmation", blocks)
 
@@ -328,7 +396,7 @@ def changes(summary: Record) -> Table:
     names = [response["name"] for response in responses(summary)]
     rows = [
         [
-            name.replace("_", " "),
+            point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in factors(summary)),
             *(_signed(point["gains"].get(response)) for response in names),
         ]
@@ -336,9 +404,8 @@ def changes(summary: Record) -> Table:
         if point.get("gains")
     ]
     caption = "Changes from the baseline at every confirmed point"
-    note = "▲ better, ▼ worse, ● within its 95 % error."
     header = ("point", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names))
-    return Table(caption, header, rows, note, detail=Detail.USUAL)
+    return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
 
 
 def _signed(gain: Record | None) -> str:

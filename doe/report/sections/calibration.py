@@ -190,7 +190,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         if explanation["evidence"] is not None
     ]
     return [
-        Paragraph(f"{record['verdict']}{': ' if reasons else ''}{reasons}", "statement"),
+        Paragraph(f"{record['verdict']}{': ' if reasons else ''}{reasons}", "warning" if reasons else "statement"),
         Table(caption, header, inputs, text_columns=(1, 2, 5)),
         Bullets([*map(_combination, record["combinations"]), *outputs]),
         Paragraph(OFFSET if inputs else ""),

@@ -30,7 +30,7 @@ KINDS = (("variance_percent", "variance"), ("worst_case_percent", "worst case"))
 NORMAL = 1.96  # half-width of a 95 % interval over its standard error
 
 
-def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def chains(summary: Record, motion: Mapping[str, Any]) -> Section:
     """Of each chain a stacked bar of contributions, the yields by distribution and all other figures."""
     blocks: list[Block] = []
     for name, chain in (part(summary, "chains") or {}).items():
@@ -38,7 +38,7 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         if shares := chain.get("contributions"):
             caption = "Contribution of each part to the scatter of the closing link."
             blocks.append(Figures([contributions(name, shares).svg], caption))
-        blocks += _distributions(chain)
+        blocks += chain_blocks(name, chain)
         rest = {key: value for key, value in chain.items() if key not in SHOWN_KEYS}
         blocks.append(record_table(f"Further figures of the chain {label(name)}", rest, folded=True))
     return Section("chains", "Dimension chains", blocks)
@@ -110,13 +110,20 @@ def _closing(chain: Record) -> list[str]:
     return sentences
 
 
-def _yield(chain: Record) -> str:
-    """', yield 0.9975 ± 0.0010 (120 ppm below, 80 ppm above), Cp 1.20, Cpk 1.10' of the parts as stated."""
+def yield_words(chain: Record) -> str:
+    """'yield 0.9975 ± 0.0010' of the parts as stated; empty where it is unknown."""
     share = part(chain, "yield", "as_given")
     if share is None:
         return ""
     error = part(chain, "yield_standard_errors", "as_given") or part(chain, "yield", "standard_error")
-    words = f", yield {with_error(share, None if error is None else NORMAL * error)}"
+    return f"yield {with_error(share, None if error is None else NORMAL * error)}"
+
+
+def _yield(chain: Record) -> str:
+    """', yield 0.9975 ± 0.0010 (120 ppm below, 80 ppm above), Cp 1.20, Cpk 1.10' of the parts as stated."""
+    if not (words := yield_words(chain)):
+        return ""
+    words = f", {words}"
     if rejected := part(chain, "rejected", "as_given"):
         words += f" ({rejected['low_ppm']:.0f} ppm below, {rejected['high_ppm']:.0f} ppm above)"
     if (capability := chain.get("distribution") or {}).get("cp") is not None:

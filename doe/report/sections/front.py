@@ -16,6 +16,7 @@ from doe.report.sections.record import SENSES, Record, change, factors, nearest,
 from doe.report.sections.search import in_few_runs
 from doe.response_surface import Surface
 from doe.study_file import Study
+from doe.workflow.confirmation import point_words
 from doe.workflow.front import SurfaceDoubt, open_errors
 from doe.workflow.pick import place_of
 from doe.workflow.surfaces import PredictedGain, goals_of, half_widths, predict_all, predicted_gains, statement
@@ -24,6 +25,7 @@ from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Sectio
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
 
+WITHOUT = point_words("without_tolerances")
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
 
@@ -35,7 +37,7 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         return None
     names = [response["name"] for response in responses(summary)]
     marks = picks(summary)
-    where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
+    where = f"of the {WITHOUT}" if WITHOUT in marks else "of the pick"
     blocks = _pictures(summary, names, {name: point for name, point in marks.items() if complete(point, summary)})
     blocks += [_picks(summary, names, marks), _gains(f"Changes on the surfaces {where}", record.get("predicted_gains"))]
     blocks += [Paragraph(record.get("statement") or ""), *_doubt(record)]
@@ -81,7 +83,7 @@ def complete(point: Record, summary: Record) -> bool:
 def picks(summary: Record) -> dict[str, Record]:
     """Baseline and picks of the front by name; "pick" is the one of the study.
 
-    That is the pick of the front, or the one with tolerances; then the other is named "without tolerances".
+    That is the pick of the front, or the one with tolerances; then the other is the pick without tolerances.
     """
     plain = part(summary, "front", "pick")
     points = {"knee": part(summary, "front", "knee")} | (part(summary, "front", "picks") or {})
@@ -89,7 +91,7 @@ def picks(summary: Record) -> dict[str, Record]:
     overtaking = nearest(summary, part(summary, "pick"), ({"": plain} if plain else {}) | points)
     if overtaking and plain:
         others = {name: point for name, point in points.items() if name != overtaking}
-        points = others | {"without tolerances": plain, "pick": points[overtaking]}
+        points = others | {WITHOUT: plain, "pick": points[overtaking]}
     elif plain:
         points["pick"] = plain
     # The surfaces at the pick itself, which is rounded to the resolution of the drawing.
@@ -163,7 +165,7 @@ def _doubt(record: Record) -> list[Block]:
     sentences = [f"Selection bias to expect in these gains: {biases}." if biases else ""]
     if dominance := record.get("pick_dominates_baseline"):
         odds = with_error(dominance.get("probability"), 1.96 * (dominance.get("standard_error") or 0.0))
-        pick = "The pick without tolerances" if record.get("tolerance_aware") else "The pick"
+        pick = f"The {WITHOUT}" if record.get("tolerance_aware") else "The pick"
         draws = f"{dominance['draws']} surfaces" if dominance.get("draws") else "surfaces"
         sentences.append(
             f"{pick} dominates the baseline with probability {odds} on {draws} drawn from their errors (error of the draws alone)."
@@ -243,9 +245,9 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
     pick, survival = aware.get("pick") or {}, aware.get("survival") or {}
     points = {
         "baseline": aware.get("baseline_robust"),
-        "plain pick": aware.get("plain_pick_robust"),
-        "pick with tolerances": pick.get("robust"),
-        "the same, nominal": pick.get("responses"),
+        WITHOUT: aware.get("plain_pick_robust"),
+        "pick": pick.get("robust"),
+        "pick, nominal": pick.get("responses"),
     }
     rows = [(point, *(shown(values.get(name), 5) for name in names)) for point, values in points.items() if values]
     sentences = [f"Front with tolerances: {counted(len(aware.get('front') or []), 'point')}."]
@@ -255,9 +257,9 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
             for factor in factors(summary)
         )
         reason = f"; {pick['reason']}" if pick.get("reason") else ""
-        sentences.append(f"Pick with tolerances: {place}{reason}.")
+        sentences.append(f"Pick: {place}{reason}.")
     if aware.get("nominal_loss_percent") is not None:
-        less = f"Compared with the plain front, it has {aware['nominal_loss_percent']:.2f} % less hypervolume at nominal values"
+        less = f"Compared with the front without tolerances, it has {aware['nominal_loss_percent']:.2f} % less hypervolume at nominal values"
         percent = aware.get("robust_gain_percent")
         more = "" if percent is None else f" and {percent:.2f} % more at the ends of the tolerances"
         sentences.append(f"{less}{more}.")
@@ -266,12 +268,12 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
             share_with_interval(survival[name], survival.get(f"{name}_interval")) for name in ("plain_pick", "pick")
         ]
         sentences.append(
-            f"Parts that still dominate the baseline: {shares[0]} at the plain pick, {shares[1]} at the pick with tolerances."
+            f"Parts that still dominate the baseline: {shares[0]} at the {WITHOUT}, {shares[1]} at the pick."
         )
     sentences.append(survival.get("open_errors") or "")
     if aware.get("plain_pick_inside") is False:
         sentences.append(
-            "The tolerances of the plain pick reach out of the design region: its figures are extrapolated."
+            f"The tolerances of the {WITHOUT} reach out of the design region: its figures are extrapolated."
         )
     caption = f"At the ends of the tolerances, {widths}: {kind}" if widths else f"At the ends of the tolerances: {kind}"
     return [Table(caption, ["point", *map(label, names)], rows), *map(Paragraph, sentences)]
@@ -288,7 +290,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
     place = place_of(study, front.points[front.pick])
-    pick = "The pick" if front.tolerance_aware is None else "The pick without tolerances"
+    pick = "The pick" if front.tolerance_aware is None else f"The {WITHOUT}"
     picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
     record: dict[str, Any] = {
         "front": points,

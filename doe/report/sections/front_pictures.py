@@ -28,7 +28,7 @@ MARKS = {
     "knee": ("D", 8.0, "orange"),
     "desirability": ("^", 9.0, "green"),
     "weights": ("v", 9.0, "purple"),
-    "without tolerances": ("P", 10.0, "vermilion"),
+    "pick without tolerances": ("P", 10.0, "vermilion"),
 }
 
 

@@ -21,7 +21,7 @@ from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, levels_at, ne
 from doe.workflow.runs import region_of
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array, Rows
-from rbdyn.base.blocks import Block, Figures, Heading, Table
+from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Table
 from rbdyn.base.records import finite
 from rbdyn.base.words import counted, improvement, label, quantity, shown, with_error
 
@@ -52,6 +52,7 @@ def in_few_runs(summary: Record) -> list[Block]:
     """The search in pictures, and its batches."""
     history, reached = part(summary, "adaptive", "history") or [], part(summary, "adaptive", "compared", "search") or []
     blocks: list[Block] = [Heading("The search in few runs")] if history else []
+    blocks.append(Bullets((part(summary, "adaptive", "sentences") or [])[1:]))
     for stills, caption in zip(search_stills(summary), (SCALE, SPENT), strict=True):
         if stills:
             blocks.append(Figures([still.svg for still in stills], caption))

@@ -1,0 +1,177 @@
+"""The first screen of a study: its order, its tone, and why no better point is the pick."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from pareto_cases import TOLERANCES, edited_study, table_surfaces
+from synthetic_study import RESPONSES, summary
+
+from doe.report.files import answer_text, blocks
+from doe.report.page import html_report
+from doe.report.sections.answer import first_screen
+from doe.report.sections.record import drop_undefined
+from doe.workflow.confirmation import LOSS, NOISE, REAL, Choice, Confirmed
+from doe.workflow.front import find_front
+from doe.workflow.pick import choices
+from doe.workflow.rivals import Forecast, rivals_sentences
+from doe.workflow.surfaces import goals_of, predict_all
+from rbdyn.base import terminal
+from rbdyn.base.blocks import Detail, Paragraph
+
+ORDER = ("Chosen clearances", "Limits judged", "Changes confirmed", "Parts to make", "Why this point", "note: ")
+
+
+def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
+    """The made-up record with a limit on the power loss, judged so."""
+    record = summary()
+    limit = {"sense": "<=", "bound": 260.0, "value": 231.0, "error": 1.0, "verdict": verdict, "probability": 0.99}
+    for name in ("baseline", "pick"):
+        record["confirmation"][name]["limits"] = {RESPONSES[2]: limit}
+    words = {"kept": "Limit kept", "broken": "LIMIT BROKEN", "undecided": "LIMIT UNDECIDED"}[verdict]
+    command = "The probability over the unknown inputs is computed by: doe study study.toml --robust."
+    record["limits_sentence"] = f"{words} at the pick. {'' if odds else command}".strip()
+    record["limits"] = {RESPONSES[2]: {**limit, "odds": odds}}
+    return record | {"status": "ok" if verdict == "kept" else verdict}
+
+
+def roles(record: dict) -> dict[str, str]:
+    """Roles of the sentences of the first screen by their text."""
+    return {block.text: block.role for block in first_screen(drop_undefined(record)) if isinstance(block, Paragraph)}
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
+    """What an engineer acts on comes first, in this order, and the comparison with a table is left to the report."""
+    record = limited() | {"notes": [f"{number}: {'word ' * 30}" for number in range(9)]}
+    text = terminal.text(blocks(record), width=width)
+    places = [text.index(words) for words in ORDER]
+    assert places == sorted(places)
+    assert "4 more notes in the report" in text and "published table" not in text
+    assert width < 80 or len(text.splitlines()) <= 50
+    assert "Levels" in terminal.text(blocks(record), Detail.ALL) and "Compared with the published" in html_report(
+        record
+    )
+    file = answer_text(record)
+    assert [file.index(words) for words in ORDER] == sorted(file.index(words) for words in ORDER)
+
+
+def test_a_limit_has_its_odds_or_the_command_for_them():
+    """With odds a column of the table has them; without, the command is named; the gains likewise."""
+    unknown, known = answer_text(limited()), answer_text(limited(odds=[0.57, 0.51, 0.63]))
+    assert unknown.count("--robust") == 2 and "unknown inputs   " not in unknown
+    assert "57 (51 to 63)" in known and "kept in 100 cases" in known
+
+
+@pytest.mark.parametrize(
+    ("record", "role"),
+    [
+        (limited(), "statement"),
+        (limited("broken"), "warning"),
+        (limited("undecided"), "warning"),
+        (limited(odds=[0.57, 0.51, 0.63]), "warning"),
+        (limited(odds=[0.97, 0.93, 0.99]), "statement"),
+    ],
+)
+def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(record, role):
+    assert roles(record)[record["limits_sentence"]] == role
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "words", "role"),
+    [
+        ("better better better", REAL, "statement"),
+        ("better better worse", LOSS, "warning"),
+        ("better better within", f"{REAL}; {NOISE}", ""),
+        ("better better better", f"{REAL}; {NOISE}", ""),
+        ("within within within", NOISE, "warning"),
+    ],
+)
+def test_a_loss_or_no_gain_is_no_good_news(verdicts, words, role):
+    record = summary()
+    for gain, verdict in zip(RESPONSES, verdicts.split(), strict=True):
+        record["gains"][gain] = record["gains"][gain] | {"verdict": verdict.replace("within", "within error")}
+    record["statement"] = f"Simulated changes: {words}."
+    assert roles(record)[record["statement"]] == role
+
+
+def test_a_chain_that_misses_warns():
+    record = summary()
+    record["chains"]["pocket"]["status"] = "refused: misses the upper limit by 0.01 mm"
+    warnings = [text for text, role in roles(record).items() if role == "warning"]
+    assert any("pocket misses its limits" in text and "0.01 mm" in text for text in warnings)
+    assert not any("misses" in text for text in roles(summary()))
+
+
+@pytest.fixture(scope="module")
+def predicted(tmp_path_factory):
+    """A study of the published table, its surfaces, its front with tolerances and the points to be simulated."""
+    study = edited_study(
+        tmp_path_factory.mktemp("rivals"), *TOLERANCES, ("[front]\n", '[front]\ntolerance_aware = "quantile"\n')
+    )
+    surfaces = table_surfaces(study)
+    front = find_front(study, surfaces)
+    return study, surfaces, front, {"baseline": Choice(study.baseline, ""), **choices(study, front, None)}
+
+
+def simulated(study, surfaces, points, shares, error=1e-6):
+    """Points as the surfaces predict them, each times its share, with a relative error."""
+    confirmed = {}
+    for name, choice in points.items():
+        values = predict_all(surfaces, study.coded(choice.point)[None])[0] * shares.get(name, 1.0)
+        confirmed[name] = Confirmed(choice.point, values, error * np.abs(values), 0.0 * values)
+    return confirmed
+
+
+def test_without_a_better_point_there_is_nothing_to_explain(predicted):
+    study, surfaces, front, points = predicted
+    forecast = Forecast(study, surfaces, front, None, None)
+    assert (
+        rivals_sentences(
+            forecast,
+            simulated(study, surfaces, points, {"weights": 2.0, "without_tolerances": 2.0, "desirability": 2.0}),
+        )
+        == []
+    )
+
+
+def test_a_better_point_was_predicted_worse_at_the_ends_of_its_tolerances(predicted):
+    """Exact: the robust costs of both points by the surfaces, in which the explained one is worse in what is named."""
+    study, surfaces, front, points = predicted
+    name = next(name for name in points if name not in ("baseline", "pick"))
+    confirmed = simulated(study, surfaces, points, {name: 0.1})
+    forecast = Forecast(study, surfaces, front, None, None)
+    (sentence,) = rivals_sentences(forecast, confirmed)
+    assert sentence.startswith(
+        f"Point {'pick without tolerances' if name == 'without_tolerances' else name} is better than"
+    )
+    here, pick = (forecast.at(points[which].point) for which in (name, "pick"))
+    worse = here.costs > pick.costs
+    assert worse.any() and "at the ends of its tolerances the surfaces predict" in sentence
+    responses = [study.responses[index] for index in goals_of(study).objectives]
+    percent = 100.0 * np.abs((pick.costs - here.costs) / confirmed["pick"].values[goals_of(study).objectives])
+    for response, change, loss in zip(responses, percent, worse, strict=True):
+        assert (
+            f"{response.rpartition('_')[0].replace('_', ' ')} {change:.2f} % more" in sentence
+        ) == loss or "ratio" in response
+    assert "within the error" not in sentence
+    (doubtful,) = rivals_sentences(forecast, simulated(study, surfaces, points, {name: 0.1}, 2.0))
+    assert "only within the error" in doubtful
+
+
+def test_a_better_point_that_speaks_for_itself_is_recommended(predicted):
+    """Where nothing is known against a point, the sentence says so rather than to invent a reason."""
+    study, surfaces, _, points = predicted
+    name = next(name for name in points if name not in ("baseline", "pick"))
+    swapped = points | {"pick": points[name], name: points["pick"]}
+    forecast = SimpleNamespace(
+        study=study, searched=None, with_tolerances=True, source="the surfaces predict",
+        at=lambda point: SimpleNamespace(costs=np.zeros(3), keeps=True),
+    )  # fmt: skip
+    (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
+    assert sentence.endswith("nothing that the study knows speaks against it: consider it.")
+    forecast.at, forecast.searched = (lambda point: None), SimpleNamespace(name="adaptive")
+    (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
+    assert "no point of the adaptive front, from which the pick is chosen" in sentence
