@@ -10,7 +10,7 @@ import typer
 
 from doe.commands.options import Data, Effort, Out, Quiet, Retry, Save, Scheduler, StudyPath, fitted, keeping_runs, save
 from rbdyn.base.blocks import Block, Detail, Note, Paragraph
-from rbdyn.base.command import BAD_INPUT, Json, Workers, flag, guarded, hand_over, valued
+from rbdyn.base.command import FAILED, Json, Workers, flag, guarded, hand_over, valued
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.terminal import show
 
@@ -225,7 +225,7 @@ def chain(
     quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
 ) -> None:
-    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits is refused."""
+    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits ends with exit code 1."""
     with guarded(as_json):
         from doe.dimension_chain import is_several, read_chains, solve
         from doe.report.sections.chain import chain_blocks, chains_record
@@ -250,4 +250,4 @@ def chain(
         for name, status in refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)
         if refused:
-            raise typer.Exit(BAD_INPUT)
+            raise typer.Exit(FAILED)
