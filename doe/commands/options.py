@@ -137,16 +137,20 @@ class Effort(NamedTuple):
     quiet: bool
 
 
-def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]":
-    """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
+def fitted(study: "Study", data: Path | None, effort: Effort) -> "tuple[list[Surface], tuple[str, ...]]":
+    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
+
+    Raises InputError, RunError, KeyboardInterrupt.
+    """
     from doe.workflow.runs import read_runs, run_design
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
-        return fit_surfaces(study, read_runs(study, data))
+        runs = read_runs(study, data)
+        return fit_surfaces(study, runs), runs.notes
     out, workers, scheduler, retry, quiet = effort
     with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
-        return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
+        return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry)), ()
 
 
 @contextmanager

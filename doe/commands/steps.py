@@ -30,7 +30,7 @@ def design(
     with guarded(as_json):
         from doe.report.sections.design import design_blocks, design_record, print_csv
         from doe.study_file import Study
-        from doe.workflow.runs import design_of, evaluation
+        from doe.workflow.runs import augment_notes, design_of, evaluation
         from doe.workflow.whole import check_study
 
         loaded = Study.load(path)
@@ -38,10 +38,18 @@ def design(
         if loaded.file.scene and loaded.path_of(loaded.scene.file).exists():
             check_study(loaded)
         points = design_of(loaded)
-        record = design_record(loaded, points, evaluation(loaded, points))
+        notes = augment_notes(loaded)
+        record = design_record(loaded, points, evaluation(loaded, points)) | ({"notes": list(notes)} if notes else {})
         save(out, path, "design.json", record)
         detail = Detail.of(quiet, verbose)
-        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(design_blocks(record), detail))
+
+        def answer() -> None:
+            if as_csv:
+                print_csv(record)
+            else:
+                show(_noted(record, design_blocks(record)), detail)
+
+        hand_over(lambda: record, as_json, answer)
 
 
 def fit(
@@ -78,9 +86,9 @@ def fit(
         from doe.report.sections.fit import fit_record, fit_tables
         from doe.workflow.surfaces import unrivalled, with_rivals
 
-        surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
+        surfaces, reading = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)
-        remarks = [*notes, *unrivalled(surfaces)]
+        remarks = [*reading, *notes, *unrivalled(surfaces)]
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         save(out, loaded.path, "fit.json", record)
         if out is not None:
@@ -93,6 +101,11 @@ def fit(
         )
 
 
+def _noted(record: dict[str, Any], blocks: list[Block]) -> list[Block]:
+    """The blocks behind the notes of their record."""
+    return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
+
+
 def _fit_answer(record: dict[str, Any], study: "Study", data: Path | None, path: Path | None) -> list[Block]:
     """The factors and responses of a table without a study, notes, and the fits."""
     from doe.report.sections.fit import fit_blocks
@@ -102,13 +115,12 @@ def _fit_answer(record: dict[str, Any], study: "Study", data: Path | None, path:
         f"{data}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends of "
         "a factor's range"
     )
-    remarks = [Note(remark, Detail.LEAST) for remark in record.get("notes", ())]
     fits = [
         block
         for name, fitted in drop_undefined(record["responses"]).items()
         for block in fit_blocks(name, fitted, study.factors)
     ]
-    return [Paragraph(columns if path is None else ""), *remarks, *readable(fits, {})]
+    return [Paragraph(columns if path is None else ""), *_noted(record, readable(fits, {}))]
 
 
 def _study_or_table(
@@ -166,9 +178,9 @@ def front(
         check_goals(loaded)
         values = None if point is None else _point(loaded, point)
         effort = Effort(out, workers, scheduler, retry, quiet or as_json)
-        surfaces = fitted(loaded, data, effort)
+        surfaces, reading = fitted(loaded, data, effort)
         pareto = with_survival(loaded, surfaces, find_front(loaded, surfaces))
-        record = front_record(loaded, surfaces, pareto)
+        record = front_record(loaded, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:
             import numpy as np
 
@@ -184,7 +196,7 @@ def _front_answer(summary: dict[str, Any]) -> list[Block]:
     from doe.report.sections.record import drop_undefined, readable
 
     clean = drop_undefined(summary)
-    return readable(front_blocks(clean), clean)
+    return _noted(summary["front"], readable(front_blocks(clean), clean))
 
 
 def _point(study: "Study", text: str) -> list[float]:
