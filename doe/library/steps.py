@@ -16,13 +16,18 @@ if TYPE_CHECKING:
     from doe.study_file import Study
 
 
+def _noted(record: Mapping[str, Any], blocks: Sequence[Block]) -> list[Block]:
+    """The blocks behind the notes of their record."""
+    return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
+
+
 class DesignAnswer(Answer):
     """The runs of a design and its quality. Tables: "runs" (actual values in the units of the factors), "coded", "terms"."""
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.design import design_blocks
 
-        return design_blocks(self.as_dict())
+        return _noted(self.record, design_blocks(self.as_dict()))
 
     def rows(self) -> Mapping[str, Rows]:
         runs, evaluation = self.record["runs"], self.record["evaluation"]
@@ -52,7 +57,7 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
     """
     from doe.report.sections.design import design_record
     from doe.study_file import Study
-    from doe.workflow.runs import design_of, evaluation
+    from doe.workflow.runs import augment_notes, design_of, evaluation
     from doe.workflow.whole import check_study
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
@@ -61,7 +66,8 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
     if study.file.scene and study.path_of(study.scene.file).exists():
         check_study(study)
     points = design_of(study)
-    record = design_record(study, points, evaluation(study, points))
+    notes = augment_notes(study)
+    record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
     return DesignAnswer(record, folder, saved(folder, path, "design.json", record))
 
 
@@ -79,13 +85,12 @@ class FitAnswer(Answer):
         from doe.report.sections.fit import fit_blocks
         from doe.report.sections.record import drop_undefined, readable
 
-        remarks = [Note(remark, Detail.LEAST) for remark in self.record.get("notes", ())]
         fits = [
             block
             for name, fitted in drop_undefined(self.record["responses"]).items()
             for block in fit_blocks(name, fitted, self.factors)
         ]
-        return [Paragraph(self.columns), *remarks, *readable(fits, {})]
+        return [Paragraph(self.columns), *_noted(self.record, readable(fits, {}))]
 
     def rows(self) -> Mapping[str, Rows]:
         return fit_rows(self.record["responses"])
@@ -154,8 +159,9 @@ def fit(
     study_path = None if path is None else path_given(path, "path")
     study, notes = _study_or_table(study_path, table, factors, responses, model)
     with registered(study.path, folder):
-        surfaces = with_rivals(_surfaces(study, table, folder, Effort(workers, scheduler, retry, progress)))
-        remarks = [*notes, *unrivalled(surfaces)]
+        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        surfaces = with_rivals(surfaces)
+        remarks = [*reading, *notes, *unrivalled(surfaces)]
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         files = saved(folder, study.path, "fit.json", record)
         if folder is not None:
@@ -195,16 +201,23 @@ def _study_or_table(
     return study_of_table(data, factors, responses, model or "quadratic")
 
 
-def _surfaces(study: "Study", data: Path | None, out: Path | None, effort: Effort) -> "list[Surface]":
-    """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
+def _surfaces(
+    study: "Study", data: Path | None, out: Path | None, effort: Effort
+) -> "tuple[list[Surface], tuple[str, ...]]":
+    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
+
+    Raises InputError, RunError, KeyboardInterrupt.
+    """
     from doe.workflow.runs import read_runs, run_design
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
-        return fit_surfaces(study, read_runs(study, data))
+        runs = read_runs(study, data)
+        return fit_surfaces(study, runs), runs.notes
     with effort.folder(out, study.path) as folder:
         progress = effort.progress("design runs")
-        return fit_surfaces(study, run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry))
+        runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
+        return fit_surfaces(study, runs), ()
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -221,7 +234,7 @@ class FrontAnswer(Answer):
         from doe.report.sections.record import drop_undefined, readable
 
         clean = drop_undefined({"asked": self.asked, "front": self.as_dict()})
-        return readable(front_blocks(clean), clean)
+        return _noted(self.record, readable(front_blocks(clean), clean))
 
     def rows(self) -> Mapping[str, Rows]:
         picks = {"baseline": self.record["baseline"], **self.record["picks"]}
@@ -280,9 +293,9 @@ def front(
         study = Study.load(path)
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
-        surfaces = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
-        record = front_record(study, surfaces, pareto)
+        record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
         files = saved(folder, path, "front.json", record)

@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
+from doe.study_file.decimal_marks import is_like_number
 from doe.study_file.sections import (
     Adaptive,
     Category,
@@ -28,7 +29,7 @@ from doe.study_file.sections import (
     StudyChain,
     Tolerances,
 )
-from doe.study_file.table import COUNT, LABELS, Column, Sheet, is_number, listed, quoted, read_sheet, table_of
+from doe.study_file.table import COUNT, DATE, LABELS, Column, Sheet, listed, quoted, read_sheet, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
@@ -328,8 +329,7 @@ class Study:
         return self.path.parent / name
 
 
-# Beginnings of a date or a time of day, and of a text that is nearly a number.
-DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}|\d{1,2}:\d\d")
+# Beginning of a text that is nearly a number.
 NEARLY_NUMBER = re.compile(r"\W{0,3}\d")
 # Most responses that are fitted without being named: each takes about a second.
 MOST_UNNAMED = 100
@@ -398,6 +398,6 @@ def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> 
 def _words(column: Column) -> str | None:
     """Name and first text of a column that is clearly not one of numbers; None for any other."""
     texts = [text for text in column.texts if text]
-    if any(is_number(text) or (NEARLY_NUMBER.match(text) and not DATE.match(text)) for text in texts):
+    if any(is_like_number(text) or (NEARLY_NUMBER.match(text) and not DATE.match(text)) for text in texts):
         return None
     return f"{column.name} ({quoted(texts[0]) if texts else 'empty'})"

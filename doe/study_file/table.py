@@ -1,15 +1,13 @@
-"""Tables of runs, and the CSV files that hold them.
+"""Tables of runs, and the files that hold them.
 
-A table has a column for each factor and response, and optional ones of errors, replicates and blocks. Cells of a CSV file are
-read by the names of their columns, and all numbers by one reader with bounds.
+A table has a column for each factor and response, and optional ones of errors, replicates and blocks. Cells are read by the
+names of their columns, and all numbers by one reader with bounds.
 """
 
-import csv
-import io
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -18,16 +16,21 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from doe.study_file.decimal_marks import Marks
+from doe.study_file.table_file import TableFile, read_table_file
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
-from rbdyn.base.words import counted
 
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 # Characters of a number: every double has a shorter form, and Python converts no integer of thousands of digits.
 LONGEST_NUMBER = 400
 # Cells of an unknown number.
 UNKNOWN = ("", "nan")
+# Beginnings of a date or a time of day, and of a day and a month as Excel shows them in English or German.
+DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}|\d{1,2}:\d\d")
+MONTH = "(?:jan|feb|m[aä]r|apr|ma[iy]|ju[nl]|aug|sep|o[ck]t|nov|de[cz])[a-zä]*"
+DAY_AND_MONTH = re.compile(rf"\d{{1,2}}[-. ]{{1,2}}{MONTH}\b|{MONTH}[-. ]{{1,2}}\d", re.IGNORECASE)
 # Most names that a message lists.
 MOST_NAMES = 20
 
@@ -67,39 +70,65 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a CSV file: its ``name``, and the stripped ``texts`` of its cells."""
+    """A column of a table: its ``name``, the stripped ``texts`` of its cells, and the ``marks`` of the table's numbers.
+
+    ``cells``: names of the cells in a workbook.
+    """
 
     path: Path
     name: str
     texts: Sequence[str]
+    marks: Marks
+    cells: Sequence[str] = ()
+
+    @cached_property
+    def plain(self) -> list[str]:
+        """The texts with decimal points in numbers; empty for a number that may have two meanings."""
+        return ["" if doubt else text for text, doubt in map(self.marks.plain, self.texts)]
+
+    def doubt(self, row: int) -> str:
+        """The reason why the number in ``row`` may have two meanings; empty for any other text."""
+        return self.marks.plain(self.texts[row])[1]
 
     def fault(self, row: int, words: str, value: bool = True) -> str:
         """A sentence on the cell in ``row`` (from 0), with its text if ``value``; the sentence counts rows from 1."""
         text = self.texts[row]
         plain = bool(NUMBER.fullmatch(text)) and len(text) < LONGEST_NAME
         cell = f" = {text if plain else quoted(text)}" if value else ""
-        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in row {row + 1}{cell}: {words}"
+        place = f"row {row + 1} ({self.cells[row]})" if self.cells else f"row {row + 1}"
+        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in {place}{cell}: {words}"
 
     def numbers(self, limits: Limits, unknown: Collection[str] = ()) -> tuple[Array, list[str]]:
         """Numbers (n,) of the cells, and a sentence for each cell without a number within the ``limits``.
 
         Cells whose text in lower case is in ``unknown`` are NaN, without a fault.
         """
-        values = np.array([float(text) if is_number(text) else math.nan for text in self.texts])
+        values = np.array([float(text) if is_number(text) else math.nan for text in self.plain])
         faults = []
         for row in limits.broken(values):
             if self.texts[row].lower() not in unknown:
-                faults.append(self.fault(row, _slip(self.texts[row]) or limits.fault(values[row])))
+                slip = self.doubt(row) or _slip(self.texts[row])
+                faults.append(self.fault(row, slip or limits.fault(values[row])))
         return values, faults
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A CSV file: names in its ``header``, and ``rows`` of fields as they are written."""
+    """A table as it is read: names in its ``header``, and the ``file`` with its rows of fields."""
 
     path: Path
     header: list[str]
-    rows: list[list[str]]
+    file: TableFile
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Rows of fields as they are written."""
+        return self.file.rows
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A note on how the table was read, where that is not UTF-8 with commas and decimal points."""
+        return (f"{self.path}: {self.file.manner}",) if self.file.manner else ()
 
     @cached_property
     def places(self) -> dict[str, int]:
@@ -112,7 +141,9 @@ class Sheet:
     def column(self, name: str) -> Column:
         """The column of this name."""
         place = self.places[name]
-        return Column(self.path, name, [plain_cell(row[place].strip()) for row in self.rows])
+        texts = [plain_cell(row[place].strip()) for row in self.rows]
+        cells = [self.file.cell(row, place) for row in range(len(texts))] if self.file.numbers else ()
+        return Column(self.path, name, texts, self.file.marks, cells)
 
     @property
     def nameless(self) -> list[int]:
@@ -126,37 +157,21 @@ class Sheet:
 
 
 def read_sheet(path: Path) -> Sheet:
-    """Header and rows of a CSV file, without its blank lines.
+    """Header and rows of a table of text or of a workbook, without blank rows and empty columns at the end.
 
-    Raises InputError if it is no CSV, has no rows, has a name twice, or a row has more or fewer fields than the header.
+    Raises InputError where it cannot be read in one way alone, has no rows, has a name twice, or a row has more or fewer fields
+    than the header.
     """
-    lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
-    fields, start = [], 1
-    try:
-        for row in lines:
-            # A quoted empty field is a cell; a blank line is none.
-            if len(row) > 1 or (row and (row[0] == "" or row[0].strip())):
-                fields.append(row)
-            start = lines.line_num + 1
-    except csv.Error as error:
-        fix = "close the quotes that open there" if "unexpected end" in str(error) else "fix that line"
-        raise InputError([f"{path}: line {start}: is not CSV ({error}); {fix}"]) from None
-    if not fields:
-        raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
-    header, rows = [plain_cell(name.strip()) for name in fields[0]], fields[1:]
-    if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
-        raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
+    file = read_table_file(path)
+    header = [plain_cell(name.strip()) for name in file.header]
+    if len(header) == 1 and "|" in header[0]:
+        raise InputError([f"{path}: has '|' between its fields; write commas there and points in numbers"])
     repeated = {name: count for name, count in Counter(header).items() if count > 1 and name}
     faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in repeated.items()]
-    if not rows:
+    if not file.rows:
         faults.append(f"{path}: has a header and no rows; add a row for each run")
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(header):
-            only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
-            fix = "remove the commas at its end" if only_commas else "give it a field for each column, in their order"
-            faults.append(f"{path}: row {number} has {counted(len(row), 'field')} and the header {len(header)}; {fix}")
     refuse(faults)
-    return Sheet(path, header, rows)
+    return Sheet(path, header, file)
 
 
 def is_number(text: str) -> bool:
@@ -186,6 +201,10 @@ def _slip(text: str) -> str | None:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter number"
     if text.lower() in UNKNOWN:
         return "is not a finite number; fill it in or remove the row"
+    if DATE.match(text) or DAY_AND_MONTH.match(text):
+        return "is a date, which Excel makes of numbers such as 1.2; format the cell as text and write the number again"
+    if text.startswith("#"):
+        return "is the fault of a formula; correct it in the spreadsheet"
     return "is not a finite number; write a point for the decimal comma" if "," in text else None
 
 
@@ -201,7 +220,8 @@ MOST_RUNS = 5000
 class Table:
     """Factor values (n, k), responses (n, m) and their 95 % half widths (n, m; NaN if unknown).
 
-    ``replicates`` (n,) of the errors (0: unknown) and ``block`` (n,) of each run (0 without blocks).
+    A response without a value is NaN. ``replicates`` (n,) or (n, m) of the errors (0: unknown) and ``block`` (n,) of each run
+    (0 without blocks). ``notes`` say how the table was read, and which responses have no value in which rows.
     """
 
     actual: Array
@@ -209,12 +229,13 @@ class Table:
     errors: Array
     replicates: Whole
     block: Whole
+    notes: tuple[str, ...] = ()
 
 
 def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
-    """Read a CSV table in UTF-8 with a column for each factor and response, commas between fields, points in numbers.
+    """Read a table with a column for each factor and response, from a file of text or a workbook.
 
-    A column "<response>_error" holds 95 % half widths (empty or "nan" if unknown), "replicates" and "block" whole numbers;
+    A response may have no value in some rows (empty or "nan"), but not in all. A column "<response>_error" holds 95 % half widths (empty or "nan" if unknown), "replicates" and "block" whole numbers;
     all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a column "run"
     are replicates: their mean is one run, with the half width of their scatter.
 
@@ -225,7 +246,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
 
 
 def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: Path) -> Table:
-    """The table in a CSV file that is already read. See ``read_table``."""
+    """The table in a file that is already read. See ``read_table``."""
     path, errors = sheet.path, [f"{name}_error" for name in responses]
     limits = dict.fromkeys([*factors, *responses], RUN) | dict.fromkeys(errors, ERROR)
     limits |= {COUNT: COUNTED, **dict.fromkeys(LABELS, NUMBERED)}
@@ -235,11 +256,17 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         for name in [*factors, *responses]
         if name not in sheet
     ]
+    # A wrong sheet or separator may be the reason.
+    faults += sheet.notes if faults else ()
     columns, optional = {}, set(errors)
     for name in (name for name in limits if name in sheet):
-        columns[name], bad = sheet.column(name).numbers(limits[name], UNKNOWN if name in optional else ())
+        column = sheet.column(name)
+        gaps = name in optional or (name in responses and any(text.lower() not in UNKNOWN for text in column.texts))
+        columns[name], bad = column.numbers(limits[name], UNKNOWN if gaps else ())
         faults += bad
     refuse(faults)
+    notes = (*sheet.notes, *gap_notes(path, {name: columns[name] for name in responses}))
+    replicates = None
     if "run" in columns and len(set(columns["run"].tolist())) < len(sheet.rows):
         refuse(
             (
@@ -249,7 +276,7 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
             for name in (*errors, COUNT)
             if name in columns
         )
-        columns = _means_of_replicates(path, columns, factors, responses)
+        columns, replicates = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
     if size > MOST_RUNS:
         raise InputError(
@@ -259,18 +286,33 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         actual=np.column_stack([columns[name] for name in factors]),
         values=np.column_stack([np.empty((size, 0)), *(columns[name] for name in responses)]),
         errors=np.column_stack([np.empty((size, 0)), *(columns.get(name, np.full(size, np.nan)) for name in errors)]),
-        replicates=np.asarray(columns.get(COUNT, np.zeros(size)), np.int64),
+        replicates=np.asarray(columns.get(COUNT, np.zeros(size)) if replicates is None else replicates, np.int64),
         block=np.asarray(columns.get("block", np.zeros(size)), np.int64),
+        notes=notes,
     )
+
+
+def gap_notes(path: Path, columns: Mapping[str, Array]) -> list[str]:
+    """A note on each response or output without a value in some rows: the others of these rows serve all the same."""
+    notes = []
+    for name, values in columns.items():
+        rows = [str(row + 1) for row in np.flatnonzero(np.isnan(values)).tolist()]
+        if rows:
+            those = "that row, which serves" if len(rows) == 1 else "those rows, which serve"
+            notes.append(
+                f"{path}: {one_line(name, LONGEST_NAME)} has no value in {'row' if len(rows) == 1 else 'rows'} {listed(rows)}; "
+                f"it does without {those} the others"
+            )
+    return notes
 
 
 def _means_of_replicates(
     path: Path, columns: dict[str, Array], factors: list[str], responses: list[str]
-) -> dict[str, Array]:
-    """A row for each run, in the order of the first rows: mean, half width and number of its replicates."""
+) -> tuple[dict[str, Array], Whole]:
+    """A row for each run, in the order of the first rows: means and half widths of its replicates; their numbers."""
     from scipy import special
 
-    _, first, group, count = np.unique(columns["run"], return_index=True, return_inverse=True, return_counts=True)
+    _, first, group = np.unique(columns["run"], return_index=True, return_inverse=True)
     refuse(
         f"{path}: {name} of run {columns['run'][row]:g} is {columns[name][row]:g} in one replicate and "
         f"{columns[name][first[group[row]]]:g} in another; replicates have the same factors: fix them, or number the "
@@ -279,12 +321,19 @@ def _means_of_replicates(
         for row in np.flatnonzero(columns[name] != columns[name][first[group]])
     )
     order = np.argsort(first)
-    joined = {name: column[first[order]] for name, column in columns.items()} | {COUNT: count[order].astype(float)}
-    # The quantile is Student's; the half width of a run without replicates is unknown.
-    reach = special.stdtrit(np.maximum(count - 1, 1), 0.975) / np.sqrt(count)
-    for name in responses:
-        mean = np.bincount(group, columns[name]) / count
-        squares = np.bincount(group, (columns[name] - mean[group]) ** 2)
+    joined = {name: column[first[order]] for name, column in columns.items()}
+    numbers = np.zeros((len(first), len(responses)), np.int64)
+    for place, name in enumerate(responses):
+        values = columns[name]
+        valid = ~np.isnan(values)
+        count = np.bincount(group, valid)
+        size = np.where(count > 0, count, np.nan)
+        mean = np.bincount(group, np.where(valid, values, 0.0)) / size
+        squares = np.bincount(group, np.where(valid, (values - mean[group]) ** 2, 0.0))
         spread = np.sqrt(np.where(count > 1, squares, np.nan) / np.maximum(count - 1, 1))
+        # The quantile is Student's; the half width of a run without replicates is unknown.
+        reach = special.stdtrit(np.maximum(count - 1, 1), 0.975) / np.sqrt(size)
         joined[name], joined[f"{name}_error"] = mean[order], (spread * reach)[order]
-    return joined
+        numbers[:, place] = count[order]
+    alike = (numbers == numbers[:, :1]).all() and len(responses)
+    return joined, numbers[:, 0] if alike else numbers

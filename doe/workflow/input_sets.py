@@ -60,9 +60,9 @@ def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], 
     faults = []
     for row, text in enumerate(column.texts):
         if text not in values:
-            values[text] = next(_accepted(text, adapter, choices), None)
+            values[text] = next(_accepted(text, column.plain[row], adapter, choices), None)
         if values[text] is None:
-            faults.append(column.fault(row, _fault(column.name, text)))
+            faults.append(column.fault(row, column.doubt(row) or _fault(column.name, text)))
     return [values[text] for text in column.texts], faults
 
 
@@ -80,18 +80,18 @@ def unknown_keys(keys: Iterable[str]) -> list[str]:
     return sentences
 
 
-def _readings(text: str) -> list[Any]:
-    """Values that a text may denote, the narrowest type first."""
+def _readings(text: str, plain: str) -> list[Any]:
+    """Values that a text may denote, the narrowest type first; ``plain``: the text with a decimal point, if it is a number."""
     readings: list[Any] = [text.lower() == "true"] if text.lower() in ("true", "false") else []
-    if is_numeral(text) and math.isfinite(float(text)):
-        is_whole = WHOLE.fullmatch(text) and int(text).bit_length() <= LARGEST_BITS
-        readings += [int(text), float(text)] if is_whole else [float(text)]
+    if is_numeral(plain) and math.isfinite(float(plain)):
+        is_whole = WHOLE.fullmatch(plain) and int(plain).bit_length() <= LARGEST_BITS
+        readings += [int(plain), float(plain)] if is_whole else [float(plain)]
     return [*readings, text]
 
 
-def _accepted(text: str, adapter: TypeAdapter[Any], choices: Sequence[Any]) -> Iterator[Any]:
+def _accepted(text: str, plain: str, adapter: TypeAdapter[Any], choices: Sequence[Any]) -> Iterator[Any]:
     """Values of the key that a text may denote, the likeliest first."""
-    readings = _readings(text)
+    readings = _readings(text, plain)
     matches = [choice for choice in choices if any(_alike(choice, reading) for reading in readings)]
     if len(matches) == 1:
         yield matches[0]

@@ -17,7 +17,7 @@ from doe.running.store import Failure, Store, alike, sentence
 from doe.study_file import Study
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
-from doe.study_file.table import Table, read_table
+from doe.study_file.table import Table, read_sheet, read_table
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.words import are, counted
@@ -246,7 +246,7 @@ STORE = "study.sqlite"
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: distinct warnings of the simulations; none for a table. ``replicates``, (n,) or (n, m), count the independent
+    ``notes``: distinct warnings of the simulations, or how a table was read; its responses without a value are NaN. ``replicates``, (n,) or (n, m), count the independent
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
     ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs.
     """
@@ -351,7 +351,13 @@ def _distinct_notes(notes: Iterable[str], runs: int) -> list[str]:
 
 
 def read_runs(study: Study, path: Path) -> Runs:
-    """Runs of a CSV table instead of simulated ones. Raises InputError."""
+    """Runs of a table instead of simulated ones; a response without a value is NaN. Raises InputError."""
     table = read_table(path, study.factors, study.responses, study.path)
     coded = study.coded(table.actual)
-    return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)
+    return Runs(coded, table.actual, table.values, table.errors, table.notes, table.replicates, table.block)
+
+
+def augment_notes(study: Study) -> tuple[str, ...]:
+    """How the table of design.augment was read, where that is unusual. Raises InputError."""
+    name = study.file.design.augment
+    return () if name is None else read_sheet(study.path_of(name)).notes

@@ -19,6 +19,7 @@ from doe.running.runner import ANSWER, ANSWER_S, Agenda, Stage, agendas_of, fore
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file import Study
 from doe.study_file.sections import Front
+from doe.study_file.workbook import split_path
 from doe.workflow.runs import STORE, ordered_runs
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_toml
@@ -124,7 +125,7 @@ def _samples(study: Study) -> list[str]:
 def _content(path: Path) -> bytes:
     """Bytes of a file; empty for one that cannot be read, which the study refuses later."""
     try:
-        return path.read_bytes()
+        return split_path(path)[0].read_bytes()
     except (OSError, ValueError):
         return b""
 

@@ -20,7 +20,7 @@ from doe.pareto.front import contrast_error, draw_coefficients
 from doe.pareto.goals import BLANK, Goals
 from doe.pareto.manufacture import Quadratic, identity
 from doe.response_surface import Surface, fit, model_matrix
-from doe.response_surface.adequacy import correlation, draw_fields
+from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file import Study
 from doe.study_file.study import Fitted
@@ -45,21 +45,45 @@ MOST_RIVALLED = 1500
 
 @one_thread
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
-    """A surface for each response. Raises InputError if the runs are too few."""
+    """A surface for each response, on the runs that have a value of it. Raises InputError if they are too few."""
     surfaces, faults = [], []
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
-    units: dict[str, Any] = {"centre": study.centre, "step": study.step, "block": runs.block}
-    units["without"] = study.inactive
+    units: dict[str, Any] = {"centre": study.centre, "step": study.step, "without": study.inactive}
     columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
     for response, values, error, samples in columns:
         settings = response.model_dump(include={"name", *Fitted.model_fields}) | units
+        rows = np.flatnonzero(~np.isnan(values))
+        settings["block"] = None if runs.block is None else runs.block[rows]
         try:
-            surfaces.append(fit(runs.coded, values, standard_errors=error, replicates=samples, **settings))
+            surface = fit(
+                runs.coded[rows], values[rows], standard_errors=error[rows], replicates=samples[rows], **settings
+            )
+            surfaces.append(surface if len(rows) == len(values) else _numbered(surface, rows))
         except MethodError as error_of_fit:
             faults.append(f"{study.path}: {error_of_fit}")
     refuse(faults)
     return surfaces
+
+
+def _numbered(surface: Surface, rows: Whole) -> Surface:
+    """The surface with its runs numbered by their ``rows`` of the table, which has more."""
+    old = surface.diagnostics
+    numbers = dict(enumerate((rows + 1).tolist(), 1))
+    outlier = old["outlier"]["run"]
+    diagnostics: Diagnostics = {
+        **old,
+        "runs": [{**run, "run": numbers[run["run"]]} for run in old["runs"]],
+        "outlier": old["outlier"] | {"run": numbers[outlier] if isinstance(outlier, int) else None},
+        "high_leverage": [numbers[run] for run in old["high_leverage"]],
+        "influential": [numbers[run] for run in old["influential"]],
+    }
+    return replace(surface, diagnostics=diagnostics)
+
+
+def _places(surfaces: Sequence[Surface]) -> list[list[int]]:
+    """Places of each surface's runs among all runs, from 0."""
+    return [[run["run"] - 1 for run in surface.diagnostics["runs"]] for surface in surfaces]
 
 
 @one_thread
@@ -162,7 +186,7 @@ def reference_runs(study: Study) -> Runs | None:
                 [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
             )
         order.append(rows.pop(int(np.argmin(distance))))
-    return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])
+    return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order], table.notes)
 
 
 def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
@@ -172,7 +196,8 @@ def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[Publi
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
     rows = []
     for index, (name, pair) in enumerate(zip(study.responses, surfaces, strict=True)):
-        our_values, their_values = ours.values[:, index], theirs.values[:, index]
+        both = np.isfinite(ours.values[:, index]) & np.isfinite(theirs.values[:, index])
+        our_values, their_values = ours.values[both, index], theirs.values[both, index]
         rows.append(
             PublishedComparison(
                 response=name,
@@ -276,8 +301,9 @@ def drawn_responses(
     ]
     links = [link_of(surface) for surface in surfaces]
     correlation_root = _root(residual_correlation(surfaces))
+    places_of_runs = _places(surfaces)
     runs, most_freedom = (
-        len(surfaces[0].data.values),
+        1 + max(map(max, places_of_runs)),
         max(max(surface.residual_dof, surface.interval_dof) for surface in surfaces),
     )
     for first in range(0, draws, CHUNK):
@@ -289,16 +315,23 @@ def drawn_responses(
             random.standard_normal((count, size, len(surfaces))) @ correlation_root.T
             for size in (runs, root.shape[1], max(len(places) - len(coded), 1))
         )
-        columns = [
-            link(posterior.draws(squares[..., j], errors[..., j], fields[..., j], noise[..., j])[:, : len(coded)])
-            for j, (posterior, link) in enumerate(zip(posteriors, links, strict=True))
-        ]
+        columns = []
+        for j, (posterior, link, rows) in enumerate(zip(posteriors, links, places_of_runs, strict=True)):
+            own_errors = errors[..., j] if len(rows) == runs else errors[:, rows, j]
+            values = posterior.draws(squares[..., j], own_errors, fields[..., j], noise[..., j])
+            columns.append(link(values[:, : len(coded)]))
         yield np.stack(columns, axis=-1)
 
 
 def residual_correlation(surfaces: Sequence[Surface]) -> Array:
-    """Correlation (m, m) of the residuals of all responses over the runs; 0 with residuals that are all 0."""
-    residuals = np.array([[run["residual"] for run in surface.diagnostics["runs"]] for surface in surfaces], float)
+    """Correlation (m, m) of the residuals of all responses over the runs; 0 with residuals that are all 0.
+
+    Runs that one of two responses lacks count as uncorrelated.
+    """
+    places = _places(surfaces)
+    residuals = np.zeros((len(surfaces), 1 + max(map(max, places))))
+    for row, surface, columns in zip(residuals, surfaces, places, strict=True):
+        row[columns] = [run["residual"] for run in surface.diagnostics["runs"]]
     size = np.sqrt((residuals**2).sum(axis=1))
     unit = np.divide(residuals, size[:, None], out=np.zeros_like(residuals), where=size[:, None] > 0.0)
     matrix = unit @ unit.T

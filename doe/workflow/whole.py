@@ -50,7 +50,17 @@ from doe.workflow.pick import (
 )
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
-from doe.workflow.runs import STORE, Runs, check_augment, check_runs, design_of, ordered_runs, region_of, run_design
+from doe.workflow.runs import (
+    STORE,
+    Runs,
+    augment_notes,
+    check_augment,
+    check_runs,
+    design_of,
+    ordered_runs,
+    region_of,
+    run_design,
+)
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from rbdyn.base.arrays import Array
@@ -353,6 +363,7 @@ def run_study(
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
+    notes += [*augment_notes(study), *(reference.notes if reference else ())]
     step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,

@@ -170,25 +170,34 @@ def path_of(argument: Any) -> Path:
     raise InputError([f"path = {one_line(repr(argument), LONGEST_NAME)}: must be the path of a file; check the call"])
 
 
-def read_text(path: Path) -> str:
-    """Text of a UTF-8 file, with or without a byte order mark. Raises InputError where it cannot be read."""
+def read_bytes(path: Path) -> bytes:
+    """Bytes of a file. Raises InputError where it cannot be read or is too large."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
-        text = data.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError([f"{path}: no such file; check the path"]) from None
-    except UnicodeDecodeError as error:
-        line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        raise InputError(
-            [f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8); save the file as UTF-8"]
-        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({reason}); check the path"]) from None
     if len(data) > LARGEST_FILE:
         raise InputError([f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the right file"])
-    return text
+    return data
+
+
+def read_text(path: Path) -> str:
+    """Text of a UTF-8 file, with or without a byte order mark. Raises InputError where it cannot be read."""
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise not_utf_8(path, data, error) from None
+
+
+def not_utf_8(path: Path, data: bytes, error: UnicodeDecodeError) -> InputError:
+    """The fault of a file that is no UTF-8, with the first such byte."""
+    line, byte = data.count(b"\n", 0, error.start) + 1, error.object[error.start]
+    return InputError([f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8); save the file as UTF-8"])
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:

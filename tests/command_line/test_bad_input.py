@@ -47,15 +47,20 @@ def table(folder: Path, text: str | bytes):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a,b,y\n1,2,3,\n4,5,6,\n", "row 1 has 4 fields and the header 3; remove the commas at its end"),
         ("a,b,y\n1,2,3,9\n4,5,6,9\n", "row 1 has 4 fields and the header 3; give it a field for each column"),
         ("a,b,y\n1,2,3\n4,5\n", "row 2 has 2 fields and the header 3; give it a field for each column"),
         ("a,b,y\n1,2,3\n4,5,6,7\n", "row 2 has 4 fields and the header 3"),
         ("a,b,y,c,c\n1,2,3,4,5\n", "column 'c' comes 2 times; keep one"),
         ("a,b\n1,2\n", "column 'y' is missing; add it"),
-        ("a;b;y\n1,5;2,5;3,5\n", "has ';' between its fields; write commas there and points in numbers"),
-        ("a\tb\ty\n1\t2\t3\n", "has '\\t' between its fields"),
-        ('a,b,y\n1,2,"3,5"\n', "y in row 1 = '3,5': is not a finite number; write a point for the decimal comma"),
+        ("a|b|y\n1|2|3\n", "has '|' between its fields; write commas there and points in numbers"),
+        ('a,b,y\n1,2.5,"3,5"\n', "y in row 1 = '3,5': has a decimal comma and other numbers a decimal point; write one of them"),
+        ('a,b,y\n1,2,"3,500"\n', "y in row 1 = '3,500': may mean 3500 or 3.500; write 3500 or 3.500"),
+        ("a;b;y\n1;2;3.500\n", "y in row 1 = 3.500: may mean 3500 or 3.500; write 3500 or 3.5000"),
+        ("a;b;y\n1;0,5;3.500\n", "y in row 1 = 3.500: may mean 3500 or 3,500; write 3500 or 3,500"),
+        ("a,b,y\n1,2,2026-02-01\n", "y in row 1 = '2026-02-01': is a date, which Excel makes of numbers such as 1.2"),
+        ("a,b,y\n1,2,01. Feb\n", "y in row 1 = '01. Feb': is a date, which Excel makes of numbers such as 1.2"),
+        ("a,b,y\n1,2,#DIV/0!\n", "y in row 1 = '#DIV/0!': is the fault of a formula; correct it in the spreadsheet"),
+        ("a,b,y\nmm,mm,N\n1,2,3\n", "row 1 has words where the others have numbers, such as 'mm'; remove that row of units"),
         ("a,b,y\n1,2,nan\n", "y in row 1 = 'nan': is not a finite number"),
         ("a,b,y\n1,2,-inf\n", "y in row 1 = '-inf': is not a finite number"),
         ("a,b,y\n1,2,\n", "y in row 1 = '': is not a finite number; fill it in or remove the row"),
@@ -79,7 +84,8 @@ def table(folder: Path, text: str | bytes):
         ("", "is empty; write a header"),
         ("a,b,y\n", "has a header and no rows; add a row for each run"),
         ("a,b,y\n1,2,\0003\n", "y in row 1 = '\\\\x003': is not a finite number"),
-        (b"a,b,y\n1,2,3\xe9\n", "line 2: byte 0xe9 is no UTF-8); save the file as UTF-8"),
+        (b"a,b,y\n1,2,3\x81\n", "line 2: byte 0x81 is no UTF-8); save the file as UTF-8"),
+        (b"a,b,y\n1,2,3\x02\xe9\n", "line 2: byte 0xe9 is no UTF-8); save the file as UTF-8"),
         (bytes(range(256)), "cannot be read (line 2: byte 0x80"),
         ('a,b,y\n1,2,3\n1,"2,3\n4,5,6\n', "line 3: is not CSV (unexpected end of data); close the quotes that open there"),
     ],
@@ -97,9 +103,17 @@ def test_a_table_is_refused_in_one_sentence_of_file_row_column_and_mend(tmp_path
         '\ufeff"a",b,y\r\n1,2,3\r\n',
         " a, b ,y,\n\n1, 2 ,3,\n",
         "y,k,b,a\n3,x,2,1\n",
+        "a,b,y,,\n1,2,3,,\n,,,,\n",
+        "a;b;y;\r\n1,0;2;3,00;\r\n;;;\r\n",
+        "sep=;\r\na;b;y\r\n1;2;3\r\n",
+        "a\tb\ty\n1\t2\t3\n",
+        "a;b, in mm;y;b\n1,0;5,5;3;2\n",
+        'a,b,y\n1,"2,0",3\n',
+        "a;b;y;Kraft in N\n1;2,0;3;1.234,5\n".encode("utf-16"),
+        "a;b;y;Kräfte\n1;2,0;3;7\n".encode("cp1252"),
     ],
 )
-def test_a_table_is_read_by_its_names_however_it_is_written(tmp_path, text):
+def test_a_table_is_read_by_its_names_however_it_is_written(tmp_path, text: str | bytes):
     found = table(tmp_path, text)
     assert (found.actual.tolist(), found.values.tolist()) == ([[1.0, 2.0]], [[3.0]])
     assert math.isnan(found.errors[0, 0]) and (found.replicates[0], found.block[0]) == (0, 0)

@@ -238,8 +238,31 @@ def test_unit_a_cell_that_is_no_number_leaves_no_column_out(tmp_path, named, cel
     shown = fit_table(
         tmp_path, OWN.astype({"b": object}).assign(b=[*OWN["b"][:6], cell, *OWN["b"][7:]]), named, "--model=linear"
     )
+    if named == "--factor=a" and cell in ("", "nan"):
+        assert shown.exit_code == 0 and "mine.csv: b has no value in row 7; it does without that row" in shown.stdout
+        return
     assert shown.exit_code == 2 and len(shown.stderr.splitlines()) == 1
     assert shown.stderr.startswith(f"{tmp_path / 'mine.csv'}: b in row 7 = ")
+
+
+def test_a_missing_response_is_fitted_to_the_other_rows_and_the_row_serves_the_others(tmp_path):
+    """Each response has the fit of a table of its own rows, and its runs keep the numbers of the whole table."""
+    whole = OWN.assign(y=OWN["y"] + np.tile([0.3, -0.2, 0.1], 4), z=OWN["z"] + np.cos(np.arange(12.0)))
+    gaps = whole.assign(y=[*whole["y"][:4], np.nan, *whole["y"][5:]], z=[np.nan, np.nan, *whole["z"][2:]])
+    options = ("--factor=a", "--factor=b", "--model=linear", "--json")
+    shown = json.loads(fit_table(tmp_path, gaps, *options).stdout)
+    for name, left_out in (("y", [4]), ("z", [0, 1])):
+        alone = whole.drop(index=left_out)[["a", "b", name]]
+        own = json.loads(fit_table(tmp_path, alone, *options).stdout)["responses"][name]
+        assert shown["responses"][name]["coefficients"] == own["coefficients"]
+        assert shown["responses"][name]["anova"] == own["anova"]
+        runs = [run["run"] for run in shown["responses"][name]["diagnostics"]["runs"]]
+        assert runs == [row + 1 for row in range(12) if row not in left_out]
+    path = tmp_path / "mine.csv"
+    assert shown["notes"] == [
+        f"{path}: y has no value in row 5; it does without that row, which serves the others",
+        f"{path}: z has no value in rows 1, 2; it does without those rows, which serve the others",
+    ]
 
 
 def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeypatch):
