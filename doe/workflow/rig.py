@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, gap_notes, listed, read_sheet
 from doe.workflow.input_sets import key_values, unknown_keys
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl

@@ -27,7 +27,7 @@ def browser(tmp_path_factory):
 def test_opens_offline_with_the_answer_and_no_complaint(browser):
     page = opened(browser)
     answer = page.find_element("id", "answer")
-    for words in ("radial clearance", "0.0225", "The gain is real", "9.2400 0/-0.0050", "11.16"):
+    for words in ("radial clearance", "0.0225", "The gain is real", "9.240 0/-0.005", "11.16"):
         assert words in answer.text
     # Found without scrolling.
     assert page.find_element("css selector", ".tiles").rect["y"] < 200

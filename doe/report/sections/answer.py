@@ -12,7 +12,6 @@ from doe.report.sections.record import (
     SENSES,
     Factor,
     Record,
-    allocation,
     change,
     dimension,
     factors,
@@ -24,6 +23,7 @@ from doe.report.sections.record import (
     responses,
     rounded_down,
     share_with_interval,
+    sizes,
 )
 from doe.study_file import Study
 from doe.workflow.confirmation import (
@@ -140,7 +140,7 @@ def _parts_to_make(summary: Record) -> list[Block]:
     rows = [
         (label(name), label(chain_name), dimension(size), size.get("grade") or "", moved(size))
         for chain_name, chain in chains.items()
-        for name, size in allocation(chain).items()
+        for name, size in sizes(chain).items()
     ]
     header = ("part", "chain", "dimension [mm]", "grade", "nominal moved [mm]")
     misses = [
