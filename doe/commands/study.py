@@ -58,8 +58,10 @@ def study(
             _leave_by(record, as_json)
             return
         from doe.report.files import blocks, write
-        from doe.workflow.whole import run_study
+        from doe.workflow.whole import run_study, unmet_chains
 
+        for sentence in unmet_chains(loaded):
+            print(f"note: {sentence}", file=sys.stderr, flush=True)
         options = {"adaptive": adaptive, "robust": robust}
         with noted_agenda(folder, "doe study", workers, quiet, options, digest) as agenda:
             with stages(quiet or as_json, workers) as progress:
