@@ -15,14 +15,22 @@ Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (198
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, inf, sqrt
 
 import numpy as np
 
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
-from doe.dimension_chain.drawing import at_nominal, least_tolerance, narrower, places, rounded_part
+from doe.dimension_chain.drawing import (
+    at_nominal,
+    class_within,
+    least_tolerance,
+    narrower,
+    places,
+    rounded_part,
+    seat_part,
+)
 from doe.dimension_chain.links import (
     DIGITS,
     SLACK,
@@ -140,9 +148,19 @@ class Allocation:
         parts = [rounded_part(part, self.resolution) for part in self._parts(tolerances, grades or {})]
         parts = self._adjusted_parts(parts)
         moved = next(part for part in parts if part.name == self.adjusted.name)
-        return [
-            [place if part.name == moved.name else part for part in parts] for place in places(moved, self.resolution)
-        ]
+        candidates = places(moved, self.resolution)
+        return [[self._seat(place if part.name == moved.name else part) for part in parts] for place in candidates]
+
+    def _seat(self, part: Part) -> Part:
+        """An allocated seat, which counts by its fit only, with its stated nominal; other parts as they are."""
+        seat = part.origin == "allocated" and part.coefficient == 0 and part.name in self.seats
+        return seat_part(part) if seat else part
+
+    @cached_property
+    def seats(self) -> dict[str, bool]:
+        """Links of press fits by name, and whether each is the inner one."""
+        fits = [link.press_fit for link in self.chain.link if link.press_fit]
+        return {fit.bore: False for fit in fits} | {fit.shaft: True for fit in fits}
 
     def narrowest(self) -> list[Part]:
         """The parts with the narrowest tolerances that drawing and processes carry; those that fit, if any do."""
@@ -186,7 +204,16 @@ class Allocation:
         grades: dict[str, str] = {}
         if self.chain.allocate.grades:
             tolerances, grades = self._graded(tolerances)
-        return self._narrowed(tolerances, grades) or narrowest
+        return self._classed(self._narrowed(tolerances, grades) or narrowest)
+
+    def _classed(self, parts: list[Part]) -> list[Part]:
+        """The parts, allocated seats with the class of ISO 286 within their limits."""
+        return [
+            replace(part, iso_class=class_within(part, self.seats[part.name]) or None)
+            if part.origin == "allocated" and part.name in self.seats
+            else part
+            for part in parts
+        ]
 
     def _narrowed(self, tolerances: dict[str, float], grades: dict[str, str]) -> list[Part] | None:
         """Rounded parts that keep the limits, the widest tolerances narrowed until they do; None where all are narrowest."""

@@ -7,9 +7,13 @@ from dataclasses import replace
 from math import ceil, floor
 
 from doe.dimension_chain.links import DIGITS, SLACK, Link, Part
-from rbdyn.properties.tolerances import grade_tolerances
+from rbdyn.base.faults import MethodError
+from rbdyn.properties.tolerances import fit_limits, grade_tolerances
 
 LEAST = 1e-6  # mm: tolerance that counts as one where nothing is rounded
+SHAFT_LETTERS = ("f", "g", "h", "js", "j", "k", "m", "n", "p", "r", "s")
+HOLE_LETTERS = ("F", "G", "H", "JS", "J", "K", "M", "N", "P", "R", "S")
+SEAT_GRADES = range(4, 10)
 NEAR = 1e-6  # share of a step within which a size is on it
 
 
@@ -62,6 +66,29 @@ def at_nominal(part: Part, nominal: float) -> Part:
     return replace(part, nominal_mm=nominal, moved_mm=round(part.moved_mm + nominal - part.nominal_mm, DIGITS))
 
 
+def seat_part(part: Part) -> Part:
+    """A seat of a bought ring with its stated nominal: the move of the nominal is in the deviations, as of any fit."""
+    shift = part.moved_mm
+    low, high, mean = (round(value + shift, DIGITS) for value in (part.lower_mm, part.upper_mm, part.mean_mm))
+    seat = at_nominal(part, round(part.nominal_mm - shift, DIGITS))
+    return replace(seat, lower_mm=low, upper_mm=high, mean_mm=mean)
+
+
+def class_within(part: Part, shaft: bool) -> str:
+    """Widest tolerance class of ISO 286 within the limits of a seat, such as 'k5'; empty if there is none."""
+    widest, name = 0.0, ""
+    for letter in SHAFT_LETTERS if shaft else HOLE_LETTERS:
+        for grade in SEAT_GRADES:
+            try:
+                lower, upper = fit_limits(part.nominal_mm, f"{letter}{grade}")
+            except MethodError:
+                continue
+            inside = part.lower_mm - SLACK <= lower and upper <= part.upper_mm + SLACK
+            if inside and upper - lower > widest + SLACK:
+                widest, name = upper - lower, f"{letter}{grade}"
+    return name
+
+
 def places(part: Part, resolution: float) -> list[Part]:
     """The part with its nominal on the steps next to it, the nearer first; as it is where nothing is rounded."""
     if not resolution:
@@ -83,7 +110,7 @@ def grade_words(part: Part) -> str:
         return part.grade or ""
     try:
         ladder = grade_tolerances(part.nominal_mm)
-    except ValueError:
+    except MethodError:
         return ""
     wider = [grade for grade, width in ladder.items() if part.tolerance_mm <= width + SLACK]
     if not wider:

@@ -247,6 +247,7 @@ class Part:
     """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal.
 
     ``origin``: stated deviations, allocated ones, or the growth of another part by temperature. ``fit``: code that states them.
+    ``iso_class``: class of ISO 286 within the limits of an allocated seat.
     """
 
     name: str
@@ -261,6 +262,7 @@ class Part:
     moved_mm: float = 0.0
     origin: Origin = "stated"
     fit: str | None = None
+    iso_class: str | None = None
 
     @property
     def tolerance_mm(self) -> float:

@@ -36,8 +36,8 @@ ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
 
 def _size(part: Part) -> dict[str, Any]:
-    """JSON of a part: its figures, the code that states them, where they come from, its grade in words, and its drawing size."""
-    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin")}
+    """JSON of a part: its figures, the code that states them, where they come from, a class of ISO 286 within a seat, its grade in words, and its drawing size."""
+    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin", "iso_class")}
     return figures | {"grade_words": grade_words(part), "text": part.text}
 
 

@@ -126,6 +126,7 @@ def study(
     - ``robust``: judge the pick over the unknown inputs of the scene; also done if any are declared
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+      and with what no run can change
 
     A broken limit is in ``answer["status"]`` and ``answer["limits_sentence"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
@@ -143,8 +144,11 @@ def study(
         if not retry and (record := finished_record(folder, digest)):
             return StudyAnswer(record, folder, tuple(record["files"]), finished_before=True)
         from doe.report.files import write
-        from doe.workflow.whole import run_study
+        from doe.workflow.whole import run_study, unmet_chains
 
+        if notice is not None:
+            for sentence in unmet_chains(loaded):
+                notice(sentence)
         options = {"adaptive": adaptive, "robust": robust}
         with effort.agenda(folder, "doe study", options, digest) as agenda:
             bars = agenda.announced(effort.progress)

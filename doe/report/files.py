@@ -63,7 +63,11 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         else archive_table(study, outcome.adaptive),
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": [
-            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin")}}
+            {
+                "chain": name,
+                "part": part.name,
+                **{key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin", "iso_class")},
+            }
             for name, chain in outcome.chains.items()
             for part in chain.parts
             if part.origin != "temperature"

@@ -16,6 +16,8 @@ from doe import clearance
 from doe.clearance import Simulations, declares_unknowns
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
+from doe.dimension_chain.allocation import Allocation
+from doe.dimension_chain.refusal import allocated_reason
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
@@ -146,10 +148,28 @@ def check_chains(study: Study) -> None:
 
     If the study computes the half width later, the widest in the region stands for it.
     """
-    computed_later = study.file.tolerances is not None
-    half_widths = region_of(study) * study.step if computed_later else np.full(study.step.size, np.nan)
-    numbers = range(len(study.file.chain))
+    half_widths, numbers = _widest_half_widths(study), range(len(study.file.chain))
     check_all(partial(_chain, study, number, study.centre, half_widths) for number in numbers)
+
+
+def unmet_chains(study: Study) -> list[str]:
+    """Sentences on chains that no tolerances of their free parts can meet, wherever the pick is."""
+    half_widths, sentences = _widest_half_widths(study), []
+    for number, chain in enumerate(study.file.chain):
+        try:
+            search = Allocation(_chain(study, number, study.centre, half_widths))
+            if not search.chain.is_stated and not search.fits(search.narrowest()):
+                sentences.append(f"chain {chain.name} will miss its limits: {allocated_reason(search)}")
+        except (InputError, MethodError):
+            continue  # a fault of the study, which its checks report with all others
+    return sentences
+
+
+def _widest_half_widths(study: Study) -> Array:
+    """Half widths (k,) of the region where the study computes tolerances later, else unknown."""
+    if study.file.tolerances is None:
+        return np.full(study.step.size, np.nan)
+    return np.asarray(region_of(study) * study.step)
 
 
 def solve_chains(

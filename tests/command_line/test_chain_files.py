@@ -1,19 +1,23 @@
 """Files of chains: the three clearances of the example bearing, several chains in one file, chains of a study."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import pytest
 from chains import by_name
 from doe_command import doe
+from instant_runs import instantly, unillustrated
+from short_studies import short_study
 
-from doe.dimension_chain import read_chains, solve
+from doe.dimension_chain import chain_from, fit_limits, read_chains, solve
 from doe.report.sections.chain import chain_blocks
 from doe.study_file.sections import StudyChain, chain_table
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
+from rbdyn.properties.catalogue import radial_clearance
 from rbdyn.properties.materials import Material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -133,3 +137,83 @@ def test_a_study_takes_its_own_width_or_the_tolerance_found():
     table = chain_table(beside, EXAMPLES, 0.15)
     assert [each["name"] for each in table["link"]] == ["guide_land", "cage_outside"]
     assert table["closing_link"] == pytest.approx({"lower_mm": 0.13, "upper_mm": 0.17})
+
+
+BOUGHT = EXAMPLES / "bought_nu210_chain.toml"
+
+
+def test_command_line_a_bought_bearing_leaves_its_seats_free():
+    """Command line: class and ring tolerances stay as they are written, the seats get sizes, and a class of ISO 286 within."""
+    shown = doe("chain", str(BOUGHT), "--json")
+    assert shown.returncode == 0, shown.stderr
+    parts = json.loads(shown.stdout)["parts"]
+    assert {name for name, part in parts.items() if part["origin"] == "stated"} == {
+        "clearance_CN",
+        "ring_bore",
+        "ring_outside",
+    }
+    limits = (1e3 * parts["clearance_CN"]["lower_mm"], 1e3 * parts["clearance_CN"]["upper_mm"])
+    assert limits == radial_clearance(50.0, "CN", "cylindrical_roller")
+    assert parts["ring_bore"]["text"] == "50 Normal bore (0/-0.012)"
+    # The nominal of a seat is that of its ring; its fit is in the deviations.
+    seat, housing = parts["shaft_seat"], parts["housing_bore"]
+    assert (seat["nominal_mm"], seat["moved_mm"]) == (50.0, 0.0) and seat["upper_mm"] > seat["lower_mm"] > 0.0
+    low, high = fit_limits(50.0, seat["iso_class"])
+    assert seat["lower_mm"] <= low < high <= seat["upper_mm"] and housing["iso_class"] == "H6"
+    # Written back as classes, the same chain is met.
+    text = BOUGHT.read_text(encoding="utf-8")
+    for name, size, part in (("shaft_seat", "50.0", seat), ("housing_bore", "90.0", housing)):
+        head = f'name = "{name}"\ncoefficient = 0.0\nnominal_mm = {size}'
+        assert head in text
+        text = text.replace(head, f'{head}\nfit = "{part["iso_class"]}"\n#')
+    stated = solve(chain_from(tomllib.loads(text), "x"), samples=1000)
+    assert [part.fit for part in stated.parts] == [None, "Normal bore", "Normal outside", seat["iso_class"], "H6"]
+    assert stated.status == "ok"
+
+
+@pytest.mark.parametrize("options", [(), ("--quiet",), ("--json",)])
+def test_command_line_a_chain_that_misses_ends_with_one_and_shows_all(options, tmp_path):
+    """Command line: exit code 1, the contributions, by how much, and what would meet it; JSON holds the whole object."""
+    path = tmp_path / "tight.toml"
+    path.write_text(BOUGHT.read_text(encoding="utf-8").replace("= 0.045", "= 0.030"), encoding="utf-8")
+    shown = doe("chain", str(path), *options)
+    assert shown.returncode == 1 and f"{path}: refused: allocate.target_yield = 0.9973" in shown.stderr
+    if options == ("--json",):
+        record = json.loads(shown.stdout)
+        assert record["missed"]["yield_short"] > 0.01 and record["remedy"]["mode_yield"] is None
+        assert record["contributions_mm"]["clearance_CN"]["worst_case_mm"] == pytest.approx(0.03)
+        return
+    for words in (
+        "Contributions to the scatter",
+        "clearance CN",
+        "The chain misses its yield: ",
+        "Write selective = {",
+    ):
+        assert words in shown.stdout, words
+
+
+def test_command_line_a_wrong_chain_ends_with_two(tmp_path):
+    """Command line: bad input is no miss; a resolution out of its range names key, value and range."""
+    path = tmp_path / "wrong.toml"
+    path.write_text(BOUGHT.read_text(encoding="utf-8").replace("grades = true", "resolution_mm = -1"), encoding="utf-8")
+    shown = doe("chain", str(path))
+    assert shown.returncode == 2 and "allocate.resolution_mm" in shown.stderr and shown.stdout == ""
+
+
+def test_command_line_a_study_whose_chain_misses_ends_with_one(tmp_path, monkeypatch):
+    """Command line: a note before the runs, the contributions in the answer, exit code 1, and stated parts in the table of sizes."""
+    instantly(monkeypatch.setattr)
+    unillustrated(monkeypatch.setattr)
+    roller = 'name = "roller_diameter"\ncoefficient = -1.0\nnominal_mm = 9.0\n'
+    path = short_study(tmp_path, replace=(roller, f"{roller}upper_mm = 0.0063\nlower_mm = -0.0061\n"))
+    shown = doe("study", str(path), "--out", str(tmp_path / "out"))
+    assert shown.returncode == 1, shown.stderr
+    why = "the fixed links consume 0.0124 mm of the closing link's 0.0100 mm"
+    assert f"note: chain pocket will miss its limits: {why}" in shown.stderr
+    assert f"chain pocket: refused: {why}" in shown.stderr
+    for words in ("Contributions to the scatter of the closing link, chain pocket", "The chain misses its limits: "):
+        assert words in shown.stdout, words
+    table = (tmp_path / "out" / "part_dimensions.csv").read_text(encoding="utf-8")
+    assert "pocket,roller_diameter,9.0,0.0063,-0.0061,,0.0,,stated" in table
+    again = doe("study", str(path), "--out", str(tmp_path / "out"), "--json")
+    assert again.returncode == 1 and list(json.loads(again.stdout)["missed_chains"]) == ["pocket"]

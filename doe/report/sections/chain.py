@@ -90,11 +90,12 @@ def _sizes_table(title: str, rows: Mapping[str, Record]) -> Table:
             row.get("grade_words") or row.get("grade") or "",
             moved(row),
             row.get("origin") or "",
+            row.get("iso_class") or "",
         )
         for name, row in rows.items()
     ]
-    header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations")
-    return Table(title, header, cells, text_columns=(2, 4)).without_empty_columns()
+    header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations", "ISO 286 class within")
+    return Table(title, header, cells, text_columns=(2, 4, 5)).without_empty_columns()
 
 
 def refused(chain: Record) -> bool:
@@ -105,7 +106,8 @@ def refused(chain: Record) -> bool:
 def _refusal(chain: Record) -> list[Block]:
     """By how much a chain misses its limits, why, what would meet them, and the nearest sizes that do."""
     stated, nearest = sizes(chain, "parts"), sizes(chain)
-    differs = any(dimension(row) != dimension(stated[name]) for name, row in nearest.items() if name in stated)
+    figures = ("nominal_mm", "upper_mm", "lower_mm")
+    differs = any(row[key] != stated[name][key] for name, row in nearest.items() if name in stated for key in figures)
     return [
         Paragraph(_miss(chain), "statement"),
         Paragraph(_sentence(str(chain["status"]))),
@@ -117,6 +119,8 @@ def _refusal(chain: Record) -> list[Block]:
 def _miss(chain: Record) -> str:
     """'The chain misses its limits: 0.3300 mm below the lower limit.'"""
     missed = chain.get("missed") or {}
+    if missed.get("yield_short"):
+        return f"The chain misses its yield: {missed['yield_short']:.4g} of the assemblies too many are outside its limits."
     figures = [
         f"{missed[key]:.4f} mm {words}"
         for key, words in (
@@ -126,8 +130,6 @@ def _miss(chain: Record) -> str:
         )
         if missed.get(key)
     ]
-    if missed.get("yield_short"):
-        figures.insert(0, f"{missed['yield_short']:.4g} of the assemblies too many are outside")
     return f"The chain misses its limits: {', '.join(figures)}." if figures else ""
 
 
