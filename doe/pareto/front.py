@@ -10,6 +10,7 @@ Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -236,7 +237,7 @@ def _values(objectives: Objectives, points: Array) -> Array:
     return values
 
 
-DRAWS = 200  # of the noise in a hypervolume
+DRAWS = 200  # of the noise in a hypervolume, and in a pick
 
 
 class Samples(NamedTuple):
@@ -293,6 +294,26 @@ class SimulatedFront:
     def half_widths(self) -> Array:
         """95 % half-widths (f, m) of the values."""
         return self.standard_errors * self.quantile(0.975)
+
+
+def pick_shares(
+    pick: Callable[[Array, Array], int], costs: Array, errors: Array, freedom: Array, seed: int = 1
+) -> Array:
+    """Share (n,) of draws of the errors in which each of n simulated points is the pick.
+
+    ``pick(costs, shift)``: row of the pick for drawn costs (n, q), with the baseline shifted by ``shift`` (q,). ``errors`` and
+    ``freedom`` (n, q): standard errors of the costs and their degrees of freedom. The baseline has the median errors of the
+    points, whose runs are as long. Draws lie about costs that scatter already, so the share of the pick is too large: on
+    synthetic fronts it was 0.57, 0.52 and 0.42 at errors of 2, 5 and 10 % of the range, where the pick was the true one in
+    0.47, 0.42 and 0.27.
+    """
+    random = np.random.default_rng(seed)
+    typical = np.median(errors, axis=0)
+    counts = np.zeros(len(costs))
+    for _ in range(DRAWS):
+        noise = random.standard_t(freedom) * errors
+        counts[pick(costs + noise, random.standard_normal(typical.size) * typical)] += 1.0
+    return counts / DRAWS
 
 
 def noisy_hypervolume(

@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from doe import clearance
 from doe.dimension_chain.solution import ALLOCATED
 from doe.report.page import html_report, markdown_report, notes, reference
@@ -180,12 +182,18 @@ def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]
 
 
 def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
-    """Why the pick is this point of the searched front, and the share of its parts that still dominate the baseline."""
-    aware = pick.aware
+    """Why the pick is this point of the searched front, and the share of its parts that still dominate the baseline.
+
+    ``share``: of draws of the simulation's errors in which it is the pick; ``next``: the most frequent other row, if any.
+    """
+    aware, others = pick.aware, np.where(np.arange(len(pick.shares)) == pick.row, 0.0, pick.shares)
+    rival = int(others.argmax())
     return {
         "row": pick.row,
         "reason": pick.reason,
         "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
+        "share": float(pick.shares[pick.row]),
+        "next": {"row": rival, "share": float(others[rival])} if others[rival] > 0.0 else None,
     }
 
 

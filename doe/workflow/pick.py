@@ -14,6 +14,7 @@ from scipy import special
 from doe import clearance
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
+from doe.pareto.front import pick_shares
 from doe.pareto.tolerance import (
     Neighbourhood,
     SimulatedAware,
@@ -60,14 +61,21 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json
 from rbdyn.base.words import improvement, quantity, shown
 
+# Student's t of more degrees of freedom is normal to all digits that count.
+LARGE_FREEDOM = 1e9
+
 
 @dataclass(frozen=True, eq=False)
 class SearchedPick:
-    """A row of the searched front and why it was picked; ``aware`` is None where the study asks for no tolerances."""
+    """A row of the searched front and why it was picked; ``aware`` is None where the study asks for no tolerances.
+
+    ``shares`` (f,): share of draws of the errors in which each row of the front is the pick.
+    """
 
     row: int
     reason: str
     aware: SimulatedAware | None
+    shares: Array
 
 
 def searched_pick(
@@ -103,9 +111,25 @@ def searched_pick(
     rounded = [rounded_within(study, point) for point in front.points]
     is_new = np.array([not any(np.array_equal(point, confirmed.point) for confirmed in simulated) for point in rounded])
     rows = np.flatnonzero(is_new) if is_new.any() else np.arange(len(front.points))
-    row, reason = pick_among(costs[rows], violations[rows], goals, baselines, study.file.front.pick)
+    rule = study.file.front.pick
+    row, reason = pick_among(costs[rows], violations[rows], goals, baselines, rule)
+
+    def pick(drawn: Array, shift: Array) -> int:
+        moved = [baseline + shift for baseline in baselines]
+        return int(rows[pick_among(drawn[rows], violations[rows], goals, moved, rule)[0]])
+
+    freedom = np.full_like(front.values, np.inf) if front.freedom is None else front.freedom
+    freedom = np.minimum(freedom[:, goals.objectives], LARGE_FREEDOM)
+    shares = pick_shares(pick, costs, front.cost_errors, freedom, study.file.front.seed)
     words = f"{reason.replace('front points', f'points of the {searched.name} front')}{suffix}"
-    return SearchedPick(int(rows[row]), words, aware)
+    return SearchedPick(int(rows[row]), f"{words}{_share_words(shares, int(rows[row]))}", aware, shares)
+
+
+def _share_words(shares: Array, row: int) -> str:
+    """How often this point is the pick under the errors of its simulation, and the most frequent other one."""
+    others = np.delete(shares, row)
+    rival = f", another in {100.0 * others.max():.0f}" if others.size and others.max() > 0.0 else ""
+    return f"; it is the pick in {100.0 * shares[row]:.0f} of 100 draws of the simulation's errors{rival}"
 
 
 def neighbourhood(
@@ -160,7 +184,7 @@ def draws_about(
 
 def _levels(confirmed: Confirmed, count: int, random: np.random.Generator) -> Array:
     """Draws (d, m) of the responses of a simulated point within its errors."""
-    freedom = np.minimum(confirmed.joint_freedom, 1e9)
+    freedom = np.minimum(confirmed.joint_freedom, LARGE_FREEDOM)
     student = random.standard_t(freedom, (count, freedom.size))
     return np.asarray(confirmed.values + confirmed.standard_error * student)
 
