@@ -70,7 +70,9 @@ def _table_file(
         raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
     marks = marks_of((field.strip() for row in body for field in row), default)
     _refuse_units(path, body)
-    signs = [*([separator] if separator else []), *marks.words]
+    # Commas between fields are usual with decimal points; other files say which mark their numbers have.
+    points = ["decimal points"] if default is None and marks.decimal == POINT else []
+    signs = [*([separator] if separator else []), *points, *marks.words]
     words = [*([f"with {' and '.join(signs)}"] if signs else []), *([origin] if origin else [])]
     return TableFile(header, body, marks, f"read {' '.join(words)}" if words else "", numbers[1:])
 

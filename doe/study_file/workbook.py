@@ -136,10 +136,6 @@ def _filled(row: list[Any]) -> Iterator[bool]:
 
 def _refuse_uncalculated(path: Path, name: str, rows: list[list[Any]]) -> None:
     """Raises InputError for formulas whose values were not saved: their cells look empty."""
-    with zipfile.ZipFile(path) as archive:
-        parts = [part for part in archive.namelist() if part.startswith("xl/worksheets/") and part.endswith(".xml")]
-        if not any(b"<f" in archive.read(part) for part in parts):
-            return
     formulas = _cells(path, _opened(path, as_values=False), name)
     refuse(
         f"{path}: cell {letters(place)}{number} of sheet {name!r}: has a formula without a saved value; open the file in "

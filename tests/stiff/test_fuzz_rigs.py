@@ -47,10 +47,25 @@ def written(rows: Sequence[Sequence[str]]) -> bytes:
 
 
 def cells(data: bytes) -> tuple[list[str], list[list[str]]]:
-    """Header and rows as a CSV reader of one's own has them; lines of blanks are none."""
-    rows = [row for row in csv.reader(io.StringIO(data.decode("utf-8-sig"), newline="")) if row not in ([], [" "])]
-    rows = [[field.strip() for field in row] for row in rows if len(row) > 1 or row == [""] or row[0].strip()]
+    """Header and rows as a CSV reader of one's own has them; lines of blanks and empty columns at the end are none."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252")
+    head = next(line for line in text.splitlines() if line.strip(" ,;\t"))
+    # The commas below a single name are decimal ones.
+    separator = max(";,\t", key=head.count)
+    rows = [[field.strip() for field in row] for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator)]
+    rows = [row for row in rows if row == [""] or any(row)]
+    rows = rows if any(len(row) > 1 for row in rows) else [row for row in rows[:1] if any(row)] + rows[1:]
+    width = max(len("\0".join(row).rstrip("\0").split("\0")) for row in rows)
+    rows = [[*row, *[""] * width][:width] for row in rows]
     return rows[0], rows[1:]
+
+
+def number(text: str) -> float:
+    """The number of a cell; no comma here separates thousands."""
+    return float(text.replace(",", "."))
 
 
 def changed(draw: random.Random, rows: list[list[str]]) -> bytes:
@@ -120,11 +135,11 @@ def check_rig(data: bytes, rig: Rig) -> None:
             if "." in name:
                 check_value(name, text, row.keys[name])
             elif name in OUTPUTS:
-                assert (name in row.values and row.values[name] == float(text)) or blank
+                assert (name in row.values and row.values[name] == number(text)) or blank
             elif name.removesuffix("_sd") in OUTPUTS:
-                assert (row.sds.get(name.removesuffix("_sd")) == float(text)) or blank
+                assert (row.sds.get(name.removesuffix("_sd")) == number(text)) or blank
             elif name == "turns":
-                assert row.turns == float(text) or (blank and row.turns is None)
+                assert row.turns == number(text) or (blank and row.turns is None)
             elif name == "hold":
                 assert row.hold == (text.lower() in ("1", "yes", "true"))
             elif name in PULSE_COLUMNS:
@@ -144,7 +159,7 @@ def check_value(name: str, text: str, value: Any) -> None:
     elif isinstance(value, str):
         assert text == value
     else:
-        assert float(text) == value
+        assert number(text) == value
         assert name != "bearing.rollers" or isinstance(value, int) or not value.is_integer()
 
 
@@ -253,11 +268,13 @@ def test_tables_without_a_study_lose_no_column(tmp_path, fuzz_cases):
             )
             if name == "a" or name in responses:
                 values = runs.actual[:, 0] if name == "a" else runs.values[:, responses.index(name)]
-                assert values.tolist() == [float(text) for text in texts]
+                for value, text in zip(values.tolist(), texts, strict=True):
+                    gap = name in responses and text.lower() in ("", "nan")
+                    assert np.isnan(value) if gap else value == number(text)
             elif name.removesuffix("_error") in responses:
                 errors = runs.errors[:, responses.index(name.removesuffix("_error"))].tolist()
                 assert all(
-                    text.lower() in ("", "nan") or float(text) == error
+                    text.lower() in ("", "nan") or number(text) == error
                     for text, error in zip(texts, errors, strict=True)
                 )
             else:
@@ -294,12 +311,12 @@ def test_signals_are_read_as_written_or_refused(tmp_path, fuzz_cases, kind):
         canonical = tmp_path / "canonical.csv"
         names = ("t_s", "cage_speed_rpm", "x_um", "x_m", "y_um", "y_m")
         used = [place for place, name in enumerate(header) if name in names]
-        again = [[header[place] for place in used], *([repr(float(row[place])) for place in used] for row in rows)]
+        again = [[header[place] for place in used], *([repr(number(row[place])) for place in used] for row in rows)]
         canonical.write_bytes(written(again))
         assert read(canonical)[:2] == mean[:2] and 0.0 < mean.sd < np.inf
         if kind == "cage_speed":
             times, values = (
-                np.array([float(row[header.index(name)]) for row in rows]) for name in ("t_s", "cage_speed_rpm")
+                np.array([number(row[header.index(name)]) for row in rows]) for name in ("t_s", "cage_speed_rpm")
             )
             steps = np.diff(times)
             assert mean.value == pytest.approx(float((values[:-1] * steps).sum() / steps.sum()), rel=1e-9)
