@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import json
+import math
 import os
 import re
 from html.parser import HTMLParser
@@ -14,7 +15,10 @@ import pytest
 from manual_parts import ROOT, declared, parts, whole_page
 
 import rbdyn
+from rbdyn.cli.manual.drawings import roller_bearing, scene_of
 from rbdyn.cli.manual.page import markdown, rendered
+from rbdyn.plots.sketches import clearances
+from rbdyn.scene import Scene
 from rbdyn.scene.keys import keys, lines
 
 # A command with its options, as prose and code write it.
@@ -73,6 +77,34 @@ def test_page_is_whole_and_needs_nothing_else(manual):
     assert {link for link in manual.links if not link.startswith("#")} == set()
     assert {link[1:] for link in manual.links} <= set(manual.keys)
     assert "{{" not in manual.text
+
+
+def test_drawings_are_of_the_scene_and_describe_themselves(manual):
+    """Report: four inline drawings with words for those who do not see them; sizes in the captions are those of the scene."""
+    scene, page = roller_bearing(), whole_page()
+    pictures = re.findall(
+        r'<figure><svg role="img" aria-label="([^"]{60,})"[^>]*>.*?</svg><figcaption>', page, re.DOTALL
+    )
+    assert len(pictures) == page.count("<svg class") + page.count("<svg role") == 4
+    for words in (
+        f"radial clearance, {scene.bearing.radial_clearance_mm:g} mm on the diameter",
+        f"pocket clearance, {scene.cage.pocket_clearance_mm:g} mm, half of it at each wall",
+        f"closing link: radial clearance {scene.bearing.radial_clearance_mm:g}",
+        "times as wide. Rollers and cage are drawn smaller.",
+        "a contact angle α of 40°",
+    ):
+        assert words in manual.text, words
+
+
+@pytest.mark.parametrize("options", [{"--guidance": "inner"}, {"--clearance": "C2"}, {"--guidance": "roller"}])
+def test_clearances_are_drawn_of_other_bearings(options):
+    """Report: a gap of each clearance that the bearing has, between the bodies that it separates; none without a land."""
+    svg, caption = clearances(Scene.from_dict(scene_of("NU1010", options), "scene"))
+    gaps = re.findall(r'class="measure" points="([-\d.]+),([-\d.]+) ([-\d.]+),([-\d.]+)"', svg)
+    lengths = [math.dist((float(a), float(b)), (float(c), float(d))) for a, b, c, d in gaps]
+    landless = options.get("--guidance") == "roller"
+    assert len(lengths) == (4 if landless else 5) and min(lengths) > 5.0
+    assert ("guide clearance" in caption) == (not landless)
 
 
 def test_every_key_is_told(manual, floors):
