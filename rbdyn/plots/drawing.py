@@ -165,18 +165,13 @@ def ideal(scene: "Scene", turned: float = 0.0) -> Drawing:
     """One frame of the bearing at rest, every body at its ideal place: the first roller at the angle ``turned`` [rad]."""
     z = scene.bearing.rollers
     still, loads = np.zeros(1), np.zeros((1, z))
-    motion = {name: loads if name.endswith("_load") and name != "land_load" else still for name in AS_SAMPLED}
-    bodies = dict.fromkeys(("outer_angle", "cage_x", "cage_y", "ring_x", "ring_y"), still)
-    return Drawing(
-        rollers=z,
-        **_sizes(scene),
-        race_scale=1.0,
-        cage_scale=1.0,
-        turns=0.0,
-        start=0.0,
-        **{**motion, **bodies, "cage_angle": still + turned},
+    motion: dict[str, Any] = {
+        **{name: loads if name.endswith("_load") else still for name in AS_SAMPLED},
+        **dict.fromkeys(("outer_angle", "cage_x", "cage_y", "ring_x", "ring_y", "land_load"), still),
         **dict.fromkeys(("ahead", "out", "spin"), loads),
-    )
+        "cage_angle": still + turned,
+    }
+    return Drawing(rollers=z, **_sizes(scene), race_scale=1.0, cage_scale=1.0, turns=0.0, start=0.0, **motion)
 
 
 def _sizes(scene: "Scene") -> dict[str, Any]:
