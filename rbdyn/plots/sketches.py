@@ -160,8 +160,8 @@ def roller_axes(scene: "Scene") -> Sketch:
         u, v = polar(d.pitch, roller * step)
         canvas.words((u, v + 4.5), str(roller), "small")
     caption = (
-        f"{_name(scene)} seen as drawings and films show it. x points along the load on the inner ring, y is 90 degrees "
-        "ahead of it, and angles such as ψ, here that of roller 2, count from x towards y, the sense of positive speeds. "
+        f"{_name(scene)}, seen as drawings and films show it. x points along the load on the inner ring, y is 90 degrees "
+        "ahead of it. Angles such as ψ, here that of roller 2, count from x towards y, the sense of positive speeds. "
         "Clearances are widened and rollers drawn smaller."
     )
     return Sketch(canvas.svg(), caption)
