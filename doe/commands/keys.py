@@ -10,15 +10,23 @@ if TYPE_CHECKING:
 
 
 def keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
-    """Explain every key of a study or of a dimension chain: its meaning, its unit, range and default."""
+    """Explain every key of a study, a dimension chain and a calibration, and the columns of measured tables."""
     with guarded(as_json):
-        run(kinds(), word, as_schema, as_json)
+        run(files() if as_schema else kinds(), word, as_schema, as_json)
 
 
-def kinds() -> "dict[str, type[BaseModel]]":
-    """The kinds of files that ``doe`` reads."""
+def files() -> "dict[str, type[BaseModel]]":
+    """The kinds of TOML files that ``doe`` reads next to scenes."""
     from doe.dimension_chain.links import Chain
     from doe.dimension_chain.reading import Chains
     from doe.study_file import StudyFile
 
     return {"study": StudyFile, "chain": Chain, "file of chains": Chains}
+
+
+def kinds() -> "dict[str, type[BaseModel]]":
+    """These, the tables of a scene that ``doe`` reads, and the tables of measurements, whose keys are columns."""
+    from doe.workflow.rig_columns import RigTable, SceneTables, SignalFile
+
+    measured = {"measurements on a rig, column": RigTable, "signal file, column": SignalFile}
+    return {**files(), "unknown inputs and calibration of a scene": SceneTables, **measured}

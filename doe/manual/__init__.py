@@ -1,4 +1,4 @@
-"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand next to it, its command, its keys."""
+"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand next to it, its command, its keys, its drawing."""
 
 from pathlib import Path
 
@@ -6,9 +6,10 @@ from typer.main import get_command
 
 from doe.cli import app
 from doe.commands.keys import kinds
+from doe.manual.drawings import drawings
 from rbdyn.scene.keys import Part
 
 
 def part() -> Part:
     """The part that the entry point names."""
-    return Part("doe", Path(__file__).parent, get_command(app), kinds())
+    return Part("doe", Path(__file__).parent, get_command(app), kinds(), drawings)

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.dynamics.motion import largest
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion import History
+    from rbdyn.scene import Scene
 
 
 # Radius of a roller in the drawing over the true one; half-width of the cage and of a ring over that.
@@ -123,6 +123,8 @@ def tidy(value: float) -> float:
 
 def drawing(history: "History", turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
     """Frames at equal intervals from ``turns`` shaft turns about the largest pocket force."""
+    from rbdyn.dynamics.motion import largest
+
     scene, z = history.scene, history.scene.bearing.rollers
     interval = float(history.time[1] - history.time[0])
     per_turn = scene.turn_s / interval
@@ -131,7 +133,7 @@ def drawing(history: "History", turns: float, frames_per_turn: int, most_frames:
     peak = round(largest(history, history.pocket_load).time / interval)
     first = min(max(peak - window // 2, 0), len(history.time) - window)
     frames = slice(first, first + window, stride)
-    sizes = _sizes(history)
+    sizes = _sizes(scene)
     pitch = sizes["pitch"]
     place = np.arange(z) * (2.0 * np.pi / z)
     x = history.roller_x[frames] - history.outer_x[frames, None]
@@ -159,8 +161,20 @@ def drawing(history: "History", turns: float, frames_per_turn: int, most_frames:
     )
 
 
-def _sizes(history: "History") -> dict[str, Any]:
-    scene = history.scene
+def ideal(scene: "Scene", turned: float = 0.0) -> Drawing:
+    """One frame of the bearing at rest, every body at its ideal place: the first roller at the angle ``turned`` [rad]."""
+    z = scene.bearing.rollers
+    still, loads = np.zeros(1), np.zeros((1, z))
+    motion: dict[str, Any] = {
+        **{name: loads if name.endswith("_load") else still for name in AS_SAMPLED},
+        **dict.fromkeys(("outer_angle", "cage_x", "cage_y", "ring_x", "ring_y", "land_load"), still),
+        **dict.fromkeys(("ahead", "out", "spin"), loads),
+        "cage_angle": still + turned,
+    }
+    return Drawing(rollers=z, **_sizes(scene), race_scale=1.0, cage_scale=1.0, turns=0.0, start=0.0, **motion)
+
+
+def _sizes(scene: "Scene") -> dict[str, Any]:
     pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
     outer, inner = (1e3 * radius for radius in scene.geometry.raceways)
     roller = ROLLER_SHARE * true_roller
@@ -334,10 +348,10 @@ def _digits(loads: Array) -> list[float]:
 def _svg(d: Drawing) -> str:
     """The first frame as an inline picture: shown without scripts and on paper."""
     side = d.extent
-    body = "".join(_element(shape) for shape in shapes(d, 0, d.magnification))
+    body = "".join(element(shape) for shape in shapes(d, 0, d.magnification))
     for reference in d.references:
         u, v, words = reference.u, reference.v + 0.018 * side, html.escape(reference.words)
-        body += f'{_element(reference.arrow)}<text x="{u:.2f}" y="{v:.2f}">{words}</text>'
+        body += f'{element(reference.arrow)}<text x="{u:.2f}" y="{v:.2f}">{words}</text>'
     words = html.escape(f"First frame; clearances magnified {d.magnification:g} times, rollers drawn smaller.")
     return (
         f'<svg viewBox="{-side:.2f} {-side:.2f} {2 * side:.2f} {2 * side:.2f}" style="--unit:{side / 33:.4f}px" role="img" aria-label="{words}">'
@@ -346,7 +360,8 @@ def _svg(d: Drawing) -> str:
     )
 
 
-def _element(shape: Shape) -> str:
+def element(shape: Shape) -> str:
+    """A shape in SVG, its role as class."""
     role = shape.role
     (u, v), last = shape.points[0], shape.points[-1]
     if shape.kind == "circle":

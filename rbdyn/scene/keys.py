@@ -10,7 +10,7 @@ import inspect
 import re
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -31,16 +31,17 @@ Word = Annotated[
 ]
 AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, with which an editor completes TOML.")]
 # Unit of numbers and lengths in shaft turns, by the end of a key.
-TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
+TURNS = {"pulses_per_turn": "per cage turn", "_per_turn": "per shaft turn", "turns": "shaft turns"}
 
 
 class Part(NamedTuple):
-    """Contribution of a package to the manual: its chapters, its command and the kinds of its input files."""
+    """Contribution of a package to the manual: its chapters, its command, the kinds of its input files, its drawings."""
 
     package: str
     prose: Path  # folder of chapters, NN_name.md
     commands: Any  # group of commands, as typer makes it
     kinds: Mapping[str, type[BaseModel]]
+    drawings: Callable[[Any], Mapping[str, Any]]  # sketches by name, of the scene that the manual draws
 
 
 class Key(NamedTuple):

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -10,9 +11,11 @@ from typer.testing import CliRunner
 
 import rbdyn
 from doe.cli import app as doe_app
-from doe.commands.keys import kinds as study_kinds
+from doe.commands.keys import files as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
+from doe.workflow import rig, signals
+from doe.workflow.rig_columns import Kind, RigTable, SignalFile
 from rbdyn.base.words import label, quantity
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.plots.ball import label as axis_label
@@ -203,3 +206,16 @@ def test_lists_of_lists_are_told_in_plain_words():
     values = {key.key: key.values for key in keys(SCENES)}
     assert values["bearing.profile_table_mm_um"] == "a list of lists of numbers"
     assert values["errors.ball_sphericity[].balls"] == "a list of whole numbers from 1"
+
+
+def test_keys_of_calibration_and_signals():
+    """Command line: ``doe keys`` finds the settings of a calibration and every column that the rig's table may have."""
+    assert "\ncalibrate.waves: whole number from 1 to 8, default 4\n" in printed(doe_app, "calibrate")
+    assert '\nsignal_kind: "cage_pulses" | "cage_speed"' in printed(doe_app, "signal")
+    settings = {rig.TURNS, rig.HOLD, rig.FILE, rig.KIND, rig.PULSES, rig.CUTOFF, rig.STILL, rig.MASS, *rig.SETTINGS}
+    outputs = {name + end for name in rig.OUTPUTS for end in ("", rig.SD)}
+    assert set(RigTable.model_fields) == settings | outputs
+    assert set(get_args(Kind)) == set(signals.KINDS)
+    names = {unit for columns in signals.KINDS.values() for column in columns for unit in column.split(" or ")}
+    assert set(SignalFile.model_fields) == names
+    assert "calibrate" not in json.loads(printed(doe_app, "--schema"))["$defs"]["StudyFile"]["properties"]

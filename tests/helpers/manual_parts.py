@@ -12,6 +12,7 @@ from typer.main import get_command
 from rbdyn.cli import manual
 from rbdyn.cli.app import app
 from rbdyn.cli.manual import kinds
+from rbdyn.cli.manual.drawings import drawings
 from rbdyn.cli.manual.page import page
 from rbdyn.scene.keys import Part
 
@@ -26,7 +27,7 @@ def declared() -> dict[str, str]:
 
 def parts() -> list[Part]:
     """Parts in the order of the page."""
-    own = Part("rbdyn", Path(manual.__file__).with_name("prose"), get_command(app), kinds())
+    own = Part("rbdyn", Path(manual.__file__).with_name("prose"), get_command(app), kinds(), drawings)
     return [own, *(EntryPoint(name, value, manual.GROUP).load()() for name, value in declared().items())]
 
 

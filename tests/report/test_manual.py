@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import json
+import math
 import os
 import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from doe_command import doe
 from manual_parts import ROOT, declared, parts, whole_page
+from short_studies import EXAMPLES, SHORT, short_study
 
 import rbdyn
+from rbdyn.cli.manual.drawings import roller_bearing, scene_of
 from rbdyn.cli.manual.page import markdown, rendered
+from rbdyn.plots.sketches import clearances
+from rbdyn.scene import Scene
 from rbdyn.scene.keys import keys, lines
 
 # A command with its options, as prose and code write it.
@@ -73,6 +80,34 @@ def test_page_is_whole_and_needs_nothing_else(manual):
     assert {link for link in manual.links if not link.startswith("#")} == set()
     assert {link[1:] for link in manual.links} <= set(manual.keys)
     assert "{{" not in manual.text
+
+
+def test_drawings_are_of_the_scene_and_describe_themselves(manual):
+    """Report: four inline drawings with words for those who do not see them; sizes in the captions are those of the scene."""
+    scene, page = roller_bearing(), whole_page()
+    pictures = re.findall(
+        r'<figure><svg role="img" aria-label="([^"]{60,})"[^>]*>.*?</svg><figcaption>', page, re.DOTALL
+    )
+    assert len(pictures) == page.count("<svg class") + page.count("<svg role") == 4
+    for words in (
+        f"radial clearance, {scene.bearing.radial_clearance_mm:g} mm on the diameter",
+        f"pocket clearance, {scene.cage.pocket_clearance_mm:g} mm, half of it at each wall",
+        f"closing link: radial clearance {scene.bearing.radial_clearance_mm:g}",
+        "times as wide. Rollers and cage are drawn smaller.",
+        "a contact angle α of 40°",
+    ):
+        assert words in manual.text, words
+
+
+@pytest.mark.parametrize("options", [{"--guidance": "inner"}, {"--clearance": "C2"}, {"--guidance": "roller"}])
+def test_clearances_are_drawn_of_other_bearings(options):
+    """Report: a gap of each clearance that the bearing has, between the bodies that it separates; none without a land."""
+    svg, caption = clearances(Scene.from_dict(scene_of("NU1010", options), "scene"))
+    gaps = re.findall(r'class="measure" points="([-\d.]+),([-\d.]+) ([-\d.]+),([-\d.]+)"', svg)
+    lengths = [math.dist((float(a), float(b)), (float(c), float(d))) for a, b, c, d in gaps]
+    landless = options.get("--guidance") == "roller"
+    assert len(lengths) == (4 if landless else 5) and min(lengths) > 5.0
+    assert ("guide clearance" in caption) == (not landless)
 
 
 def test_every_key_is_told(manual, floors):
@@ -152,6 +187,77 @@ def test_prose_names_commands_and_options_that_exist(floors):
                 assert option in options, f"{path.name}: {program} {name} {option}"
             calls += 1
     assert calls > 30
+
+
+def test_glossary_names_modules_that_exist_in_order(floors):
+    """Report: terms in alphabetical order, each with a module that exists or the chapter where it is drawn."""
+    text = (floors[0].prose / "35_glossary.md").read_text(encoding="utf-8")
+    entries = text.split("\n### ")[1:]
+    terms = [entry.partition("\n")[0] for entry in entries]
+    assert len(terms) > 30 and terms == sorted(terms, key=str.lower)
+    for entry in entries:
+        modules = re.findall(r"`((?:rbdyn|doe)\.[a-z_.]+)`", entry)
+        assert modules or "Drawn in" in entry, entry
+        for module in modules:
+            assert importlib.util.find_spec(module), module
+
+
+def test_every_question_has_a_command_and_a_figure(floors):
+    """Report: each row of the page of questions names a command; the other test checks that it exists with its options."""
+    text = (floors[0].prose / "15_questions.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in text.splitlines() if line.startswith("| ") and "| question |" not in line]
+    assert len(rows) > 30
+    for question, command, figure in rows:
+        assert question.strip().endswith("?") and CALL.search(command) and figure.strip(), question
+
+
+def described(floors, name: str) -> list[str]:
+    """Columns of a table as the manual names them, with words in braces."""
+    texts = [path.read_text(encoding="utf-8") for part in floors for path in part.prose.glob("*_tables.md")]
+    (section,) = [part for text in texts for part in text.split("\n### ")[1:] if name in part.partition("\n")[0]]
+    rows = [line.split("|")[1] for line in section.split("\n## ")[0].splitlines() if line.startswith("| `")]
+    return [column for row in rows for column in re.findall("`([^`]+)`", row)]
+
+
+def undescribed(floors, path: Path, **names: list[str]) -> list[str]:
+    """Columns of a file that the manual does not describe; ``names``: what the words in braces stand for."""
+    choices = {"j": r"\d+", "key": r"[a-z_]+\.[\w.\[\]]+", **{word: "|".join(names[word]) for word in names}}
+    patterns = [
+        re.sub(r"\{(\w+)\}", lambda found: f"(?:{choices[found[1]]})", column.replace(".", r"\."))
+        for column in described(floors, path.name)
+        if set(re.findall(r"\{(\w+)\}", column)) <= set(choices)
+    ]
+    columns = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
+    assert len(columns) > 1
+    return [column for column in columns if not any(re.fullmatch(pattern, column) for pattern in patterns)]
+
+
+@pytest.mark.slow
+def test_every_column_that_commands_write_is_described(tmp_path, command, floors):
+    """Report: tables of a short simulation, a map, an equilibrium, a sweep and a short study have no column without a meaning."""
+    brief = [f"--set=numerics.{each}" for each in SHORT.split(",")]
+    rollers, balls = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "angular_contact_ball.toml"
+    figures = ["cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio"]
+    for name, *call in (
+        ("simulate", rollers, *brief),
+        ("map", rollers, "--speed", "20000:24000:2", "--load", "1300:1500:2", *brief),
+        ("ball", balls),
+        ("ball", balls, "--sweep", "operation.inner_speed_rpm=1000:2000:2"),
+        ("ball", balls, "--preload", "100:200:2"),
+    ):
+        folder = tmp_path / "_".join((name, *(str(word).strip("-") for word in call[1:2])))
+        assert command(name, *call, "--out", folder).returncode == 0
+        tables = [path for path in folder.glob("*.csv") if path.name not in ("runout.csv", "race_limits.csv")]
+        assert tables
+        for path in tables:
+            assert undescribed(floors, path, figure=figures) == [], path.name
+    study = short_study(tmp_path)
+    doe("study", str(study), "--out", str(tmp_path / "study"))
+    tables = sorted((tmp_path / "study").glob("*.csv"))
+    assert {"confirmation.csv", "part_dimensions.csv", "beside_reference.csv"} <= {path.name for path in tables}
+    factors = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
+    for path in tables:
+        assert undescribed(floors, path, factor=factors, response=figures[1:]) == [], path.name
 
 
 @pytest.mark.slow

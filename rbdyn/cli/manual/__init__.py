@@ -2,6 +2,7 @@
 
 - ``prose``: the chapters in Markdown, in the order of their file names
 - ``page``: chapters, keys, commands, equations and library as HTML, from docstrings and from the commands themselves
+- ``drawings``: sketches of clearances, axes and signs, which a chapter names as a picture
 
 Packages that build on ``rbdyn`` add their part by an entry point; their prose is in them.
 """
@@ -28,12 +29,13 @@ def manual(
     with guarded(as_json):
         from importlib.metadata import entry_points
 
+        from rbdyn.cli.manual.drawings import drawings
         from rbdyn.cli.manual.page import page
         from rbdyn.result import whole_file
         from rbdyn.scene.keys import Part
 
         out.mkdir(parents=True, exist_ok=True)  # before the page, which takes seconds
-        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())
+        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings)
         text = page([own, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
         path = out / "manual.html"
         with whole_file(path) as new:

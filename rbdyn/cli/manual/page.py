@@ -15,6 +15,8 @@ from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
 
 from rbdyn.base.words import filled_page
+from rbdyn.cli.manual.drawings import roller_bearing
+from rbdyn.plots.sketches import Sketch
 from rbdyn.scene.keys import Key, Part, keys, lines
 
 Named = ast.ClassDef | ast.FunctionDef
@@ -169,8 +171,10 @@ class Heading(NamedTuple):
 def page(parts: Sequence[Part]) -> str:
     """The manual of these parts as one HTML page, the same bytes each time."""
     contents, sections = [], []
+    scene = roller_bearing()
+    sketches = {name: sketch for part in parts for name, sketch in part.drawings(scene).items()}
     for name, text in chapters(parts):
-        headings, html = rendered(text, name)
+        headings, html = rendered(text, name, sketches)
         contents.append(_entry(headings))
         sections.append(f'<section aria-labelledby="{name}">\n{html}</section>')
     here = Path(__file__)
@@ -199,10 +203,15 @@ def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
         yield name, "\n\n".join((path.read_text(encoding="utf-8"), *more))
 
 
-def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
-    """Headings and HTML of a chapter; every heading has a key of its own, its first that of the chapter."""
+def rendered(text: str, chapter: str, sketches: Mapping[str, Sketch] | None = None) -> tuple[list[Heading], str]:
+    """Headings and HTML of a chapter; every heading has a key of its own, its first that of the chapter.
+
+    ``![what it shows](NAME)`` is the sketch of this name.
+    """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table").disable("lheading")
     parser.add_render_rule("code_inline", _code)
+    known = sketches or {}
+    parser.add_render_rule("image", lambda _, tokens, place, *__: _figure(known, tokens[place]))
     tokens = parser.parse(text)
     headings: list[Heading] = []
     keys: dict[str, int] = {}
@@ -218,6 +227,7 @@ def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
             opening.tag = closing.tag = f"h{level + 1}"
             headings.append(Heading(level, key, parser.renderInline(inline.content)))
     html = parser.renderer.render(tokens, parser.options, {})
+    html = html.replace("<p><figure>", "<figure>").replace("</figure></p>", "</figure>")
     # A table may be wider than a narrow screen.
     return headings, html.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
 
@@ -225,6 +235,13 @@ def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
 def _code(renderer: RendererProtocol, tokens: Sequence[Token], place: int, *_: Any) -> str:
     """Code within a line; no line breaks inside an option."""
     return "<code>{}</code>".format(OPTION.sub(r"<span>\1</span>", escape(tokens[place].content)))
+
+
+def _figure(sketches: Mapping[str, Sketch], token: Token) -> str:
+    """A sketch with its caption; the words in brackets are for those who cannot see it."""
+    sketch = sketches[str(token.attrs["src"])]
+    svg = sketch.svg.replace("<svg ", f'<svg role="img" aria-label="{escape(token.content)}" ', 1)
+    return f"<figure>{svg}<figcaption>{escape(sketch.caption)}</figcaption></figure>"
 
 
 def _entry(headings: Sequence[Heading]) -> str:
