@@ -108,6 +108,8 @@ class SimulationResult(Brief, SavedRecord):
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
       play, None where nothing guides the cage
+    - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
+      None unless numerics.pulse_threshold_N is stated
     """
 
     FORMAT = "rbdyn.simulation/4"
@@ -137,6 +139,9 @@ class SimulationResult(Brief, SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
     cage_orbit_radius_share: Quantity | None = None
+    pulse_rate_hz: Quantity | None = None
+    pulse_height_N: Quantity | None = None  # noqa: N815
+    pulse_impulse_N_s: Quantity | None = None  # noqa: N815
 
     @property
     def jitters(self) -> bool:

@@ -26,7 +26,14 @@ from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import TIGHT, orbit_radius_share, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import (
+    TIGHT,
+    orbit_radius_share,
+    pulse_figures,
+    pulse_notes,
+    whirl_notes,
+    work_done,
+)
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
@@ -106,6 +113,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
+    pulses = pulse_figures(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",
@@ -150,6 +158,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *friction_notes(maker),
             *_notes(scene, power_gap),
             *whirl_notes(scene, orbit),
+            *pulse_notes(scene, pulses),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault, tighter),
@@ -158,6 +167,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
+        **pulses,
     )
 
 
