@@ -313,7 +313,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert answer.files == tuple(files_of(made)) and repr(answer).startswith("<CalibrationAnswer: calibrated, ")
     inputs = answer.table().set_index("input")
     assert (inputs["low"] < inputs["median"]).all() and inputs["contraction"].between(-1.0, 1.0).all()
-    assert answer.table("cells").shape == (16, 12) and set(answer.table("outputs")["output"]) == set(record["outputs"])
+    assert answer.table("cells").shape == (16, 13) and set(answer.table("outputs")["output"]) == set(record["outputs"])
     base = Scene.load(EXAMPLES / "cylindrical_roller.toml")
     assert base.changed({key: float(value) for key, value in rows[0].items()}).cage.mass_g == float(
         rows[0]["cage.mass_g"]
