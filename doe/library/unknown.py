@@ -1,5 +1,6 @@
 """Unknown inputs of a scene: ``uncertainty`` and ``calibrate``, and their answers."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -200,9 +201,9 @@ def calibrate(
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
-    from doe.report.sections.calibration import files_of, record_of, stored, write
+    from doe.report.sections.calibration import cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
-    from doe.workflow.calibration import calibration_stages, find_calibration, question_of, read_question
+    from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
@@ -220,10 +221,12 @@ def calibrate(
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
+            predicted = None if scheduler else agenda.state_first(pace(question))
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
+                turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
             agenda.enter(ANSWER)
-            record = record_of(result, identity)
+            record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
             write(result, record, folder)
             agenda.finish(files_of(record))
     return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)

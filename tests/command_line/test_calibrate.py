@@ -360,6 +360,12 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     record = json.loads(first.stdout)
     assert {"verdict", "learned", "combinations", "discrepancy", "outputs", "held_out", "posterior"} <= set(record)
     assert set(record["learned"]) <= {"cage.mass_g"} and record["verdict"] != "calibrated"
+    cost, predicted = record["cost"], record["cost"]["predicted"]
+    assert predicted["runs"][0] <= cost["runs"] <= predicted["runs"][1]
+    assert predicted["turns"][0] <= cost["turns"] <= predicted["turns"][1]
+    assert 0.0 < predicted["seconds"][0] < predicted["seconds"][1] and cost["seconds"] > 0.0
+    assert first.stderr.startswith(f"note: {predicted['runs'][0]:.0f} to {predicted['runs'][1]:.0f} runs of ")
+    assert "shaft turns in all took" in text(blocks(record)) and "; predicted were " in text(blocks(record))
     store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
     assert json.loads(_run(command).stdout) == record
     assert (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns == store
