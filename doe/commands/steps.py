@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Data, Out, Quiet, Retry, Save, Scheduler, StudyPath, bars, keeping_runs
 from rbdyn.base.blocks import Detail
-from rbdyn.base.command import BAD_INPUT, Json, Workers, flag, guarded, hand_over, valued
+from rbdyn.base.command import FAILED, Json, Workers, flag, guarded, hand_over, valued
 from rbdyn.base.terminal import show
 
 
@@ -106,7 +106,7 @@ def chain(
     quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
 ) -> None:
-    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits is refused."""
+    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits ends with exit code 1."""
     with guarded(as_json):
         from doe.library.steps import chain
 
@@ -116,4 +116,4 @@ def chain(
         for name, status in answer.refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)
         if answer.refused:
-            raise typer.Exit(BAD_INPUT)
+            raise typer.Exit(FAILED)

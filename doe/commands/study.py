@@ -75,11 +75,15 @@ def _print(answer: "StudyAnswer", detail: Detail) -> None:
 
 
 def _leave_by(record: dict[str, Any], as_json: bool) -> None:
-    """Print the record if asked for, and fail if the pick did not keep its limits."""
+    """Print the record if asked for, and fail if the pick did not keep its limits, or a chain misses its own."""
     if as_json:
         print_json(record)
+    missed = record.get("missed_chains") or {}
     if record["status"] != "ok":
         print(record["limits_sentence"], file=sys.stderr)
+    for name, why in missed.items():
+        print(f"chain {name}: {why}", file=sys.stderr)
+    if missed or record["status"] != "ok":
         raise typer.Exit(FAILED)
 
 

@@ -247,6 +247,21 @@ class StudyResult:
         return limits_of(self.study, self.pick)
 
     @property
+    def missed_chains(self) -> dict[str, str]:
+        """Why, by name: chains that miss their limits, and chains of a known width that no parts close."""
+        missed = {name: chain.status for name, chain in self.chains.items() if chain.refused}
+        for chain in self.study.file.chain:
+            place = self.study.factors.index(chain.factor)
+            widest = 0.0 if self.tolerances is None else self.tolerances.half_widths[place]
+            if (
+                chain.name not in self.chains
+                and place not in self.study.inactive
+                and (chain.half_width_mm or widest > 0.0)
+            ):
+                missed[chain.name] = "no parts close it, as the notes say"
+        return missed
+
+    @property
     def verdict(self) -> Verdict:
         """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
         return verdict_of(self.limits)

@@ -109,7 +109,7 @@ def test_answer_comes_first(page):
         "0.1850",
         "± 0.0040 mm",
         "The gain is real",
-        "9.2400 0/-0.0050",
+        "9.240 0/-0.005",
         "11.16 ± 0.65 % less",
         "▲ better",
         "yield 0.9999760 ± 0.0000098",
@@ -289,7 +289,7 @@ def test_markdown_says_the_same_and_links_the_pictures():
     for words in (
         "# Clearances of a made-up bearing",
         "**The gain is real",
-        "9.2400 0/-0.0050",
+        "9.240 0/-0.005",
         "a\\|b&lt;c",
         "11.16 ± 0.65 % less",
     ):
