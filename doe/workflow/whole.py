@@ -68,7 +68,6 @@ from doe.workflow.surfaces import PublishedComparison, compare_with_published, f
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.records import Record
-from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
@@ -256,27 +255,6 @@ class StudyResult:
     failures: tuple[Failure, ...]
     notes: tuple[str, ...]
     cost: Mapping[str, float]
-
-    def __repr__(self) -> str:
-        changes = [
-            f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
-            for gain in self.gains["pick"]
-        ]
-        return f"<StudyResult: {', '.join([*changes, *([self.limits_sentence] if self.limits_sentence else [])])}>"
-
-    def _repr_html_(self) -> str:
-        """The table of a notebook: factors and simulated responses of baseline and pick, and the gains of the pick."""
-        places = zip(self.study.factors, self.baseline.point.tolist(), self.pick.point.tolist(), strict=True)
-        rows = [(label(name), shown(base), shown(picked), "") for name, base, picked in places]
-        columns = [
-            column for point in (self.baseline, self.pick) for column in (point.values.tolist(), point.error.tolist())
-        ]
-        gained = {gain.response: improvement(gain.percent, gain.error, gain.goal) for gain in self.gains["pick"]}
-        for name, value, error, pick_value, pick_error in zip(self.study.responses, *columns, strict=True):
-            rows.append(
-                (label(name), with_error(value, error), with_error(pick_value, pick_error), gained.get(name, ""))
-            )
-        return html_table("study: values ± 95 %, simulated", ("", "baseline", "pick", "change"), rows)
 
     @property
     def baseline(self) -> Confirmed:

@@ -53,7 +53,9 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
 
     ran: list[int] = []
 
-    def simulate(scene: Scene, workers: int | None, progress: Any, stop: Any, **more: Any) -> SimulationResult:
+    def simulate(
+        scene: Scene, workers: Any = None, progress: Any = None, stop: Any = None, **more: Any
+    ) -> SimulationResult:
         ran.append(scene.numerics.seed)
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
