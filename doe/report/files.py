@@ -37,6 +37,7 @@ from doe.workflow.runs import RUNS_TABLE, evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail
+from rbdyn.base.identity import identity_of
 from rbdyn.base.records import finite, save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.result import versions, write_json
@@ -118,14 +119,17 @@ def blocks(record: dict[str, Any]) -> list[Block]:
 def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
+    settings = settings_record(study)
+    files = [study.path, study.path_of(study.scene.file)]
     record: dict[str, Any] = {
         "format": FORMAT,
+        "identity": identity_of("doe study", settings["scene"], files).as_dict(),
         "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
         "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
-        "asked": settings_record(study),
+        "asked": settings,
         "design": study_design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),

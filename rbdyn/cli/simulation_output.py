@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.forecast import span
+from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label
 from rbdyn.result import SimulationResult
@@ -18,12 +19,13 @@ TRACE_TURNS = 10.0
 
 
 def blocks(result: SimulationResult) -> list[Block]:
-    """Figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
+    """Bearing, operating point and date, figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
     from rbdyn.compiled.kernel import compiler_notes
 
     figures = _figures(result)
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
+        identity_line(identity_of("rbdyn simulate", result.scene, ())),
         _table(figures),
         Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),

@@ -21,7 +21,7 @@ from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
 
-ORDER = ("Chosen clearances", "Limits judged", "Changes confirmed", "Parts to make", "Why this point", "note: ")
+ORDER = ("made-up bearing", "Chosen clearances", "Limits judged", "Changes confirmed", "Parts to make", "Why this point", "note: ")
 
 
 def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
@@ -34,7 +34,9 @@ def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
     command = "The probability over the unknown inputs is computed by: doe study study.toml --robust."
     record["limits_sentence"] = f"{words} at the pick. {'' if odds else command}".strip()
     record["limits"] = {RESPONSES[2]: {**limit, "odds": odds}}
-    return record | {"status": "ok" if verdict == "kept" else verdict}
+    identity = {"command": "doe study", "bearing": "made-up bearing", "drawing": "", "point": "24000 rpm", "date": "2026-01-31",
+                "version": "0.1.0", "files": {}}  # fmt: skip
+    return record | {"status": "ok" if verdict == "kept" else verdict, "identity": identity}
 
 
 def roles(record: dict) -> dict[str, str]:
@@ -48,6 +50,7 @@ def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
     record = limited() | {"notes": [f"{number}: {'word ' * 30}" for number in range(9)]}
     text = terminal.text(blocks(record), width=width)
     places = [text.index(words) for words in ORDER]
+    assert text.startswith("made-up bearing; 24000 rpm; 2026-01-31")
     assert places == sorted(places)
     assert "4 more notes in the report" in text and "published table" not in text
     assert width < 80 or len(text.splitlines()) <= 50

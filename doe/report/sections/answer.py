@@ -44,6 +44,7 @@ from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
+from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, quantity, shown, with_error
 
@@ -68,8 +69,16 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def first_screen(summary: Record) -> list[Block]:
-    """The chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
-    return [*_clearances(summary), *_judged(summary), *_gained(summary), *_parts_to_make(summary), *_reasons(summary)]
+    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
+    identity = part(summary, "identity")
+    return [
+        *([identity_line(Identity.from_dict(identity))] if identity else ()),
+        *_clearances(summary),
+        *_judged(summary),
+        *_gained(summary),
+        *_parts_to_make(summary),
+        *_reasons(summary),
+    ]
 
 
 def _judged(summary: Record) -> list[Block]:
