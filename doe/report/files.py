@@ -24,6 +24,7 @@ from doe.report.sections.search import (
     adaptive_record,
     archive_table,
     compared_record,
+    in_few_runs,
     limiting_sentence,
     search_sentences,
 )
@@ -109,7 +110,13 @@ def answer_text(record: dict[str, Any]) -> str:
 def blocks(record: dict[str, Any]) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
     clean = drop_undefined(record)
-    details = [changes(clean), *chains(clean, {}).blocks, *reference(clean, {}).blocks, *diagnostics(clean, {}).blocks]
+    details = [
+        *in_few_runs(clean),
+        changes(clean),
+        *chains(clean, {}).blocks,
+        *reference(clean, {}).blocks,
+        *diagnostics(clean, {}).blocks,
+    ]
     return readable(
         [*first_screen(clean), *notes(clean, {}).blocks, *(replace(block, detail=Detail.ALL) for block in details)],
         clean,

@@ -21,7 +21,15 @@ from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
 
-ORDER = ("made-up bearing", "Chosen clearances", "Limits judged", "Changes confirmed", "Parts to make", "Why this point", "note: ")
+ORDER = (
+    "made-up bearing",
+    "Chosen clearances",
+    "Limits judged",
+    "Changes confirmed",
+    "Parts to make",
+    "Why this point",
+    "note: ",
+)
 
 
 def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
