@@ -4,6 +4,6 @@
 - ``confirmation``: simulated points, intervals, limits; ``front``: tolerances, the front on surfaces, back-off from limits
 - ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region, the widest tolerances
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: judgement of the pick
-- ``rig``: measurements; ``calibration``: inputs from measurements
+- ``rig``: measurements; ``signals``: figures of raw ones; ``calibration``: inputs from measurements
 - ``status``: stages and status of a command; ``whole``: the study
 """

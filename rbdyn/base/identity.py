@@ -4,14 +4,16 @@
 the first screen, ``identity_table`` its table for a page.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.records import Record
 from rbdyn.base.storage import digest_of
+from rbdyn.base.words import quantity
 from rbdyn.result import version_of
 
 # Digits of a SHA-256 that are shown.
@@ -50,15 +52,23 @@ class Identity(Record):
     @property
     def title(self) -> str:
         """Title of a page: the bearing, or else the first input file, and the command."""
-        return ": ".join(filter(None, (self.bearing or next(iter(self.files), ""), self.command)))
+        subject = self.bearing or next(iter(self.files), "")
+        return ": ".join(filter(None, (subject[:1].upper() + subject[1:] if self.bearing else subject, self.command)))
 
 
-def identity_of(command: str, scene: Mapping[str, Any], files: Iterable[Path], day: str = "") -> Identity:
+def identity_of(
+    command: str,
+    scene: Mapping[str, Any],
+    files: Iterable[Path],
+    day: str = "",
+    swept: Mapping[str, Sequence[float]] = MappingProxyType({}),
+) -> Identity:
     """Identity of a result that is computed now.
 
     scene : tables of a resolved scene in the form of JSON; empty for a result without a bearing.
     files : input files; one that cannot be read is left out.
     day : date of the run; empty for today.
+    swept : values of the dotted keys of the scene over which the results run.
     """
     bearing = scene.get("bearing") or {}
     drawing = drawing_words(bearing) if bearing else ""
@@ -66,7 +76,7 @@ def identity_of(command: str, scene: Mapping[str, Any], files: Iterable[Path], d
         command=command,
         bearing=bearing.get("designation") or drawing,
         drawing=drawing,
-        point=point_words(scene) if scene.get("operation") else "",
+        point=point_words(scene, swept) if scene.get("operation") else "",
         date=day or date.today().isoformat(),
         version=version_of("rbdyn"),
         files=_hashes(files),
@@ -111,20 +121,24 @@ def _balls(row: Mapping[str, Any]) -> str:
     return words if angle is None else f"{words}, contact angle {angle:g}°"
 
 
-def point_words(scene: Mapping[str, Any]) -> str:
-    """'12000 rpm, 2000 N radial, MIL-L-7808 at 100 °C', of the tables of a scene; a schedule is named, not listed."""
-    operation = scene["operation"]
+def point_words(scene: Mapping[str, Any], swept: Mapping[str, Sequence[float]] = MappingProxyType({})) -> str:
+    """'12000 rpm, 2000 N radial, MIL-L-7808 at 100 °C', of the tables of a scene; ``swept`` keys with their range.
+
+    A schedule is named, not listed.
+    """
+    operation = {key: value for key, value in scene["operation"].items() if f"operation.{key}" not in swept}
     scheduled = operation.get("schedule") or {}
-    outer = operation.get("outer_speed_rpm") or 0.0
+    inner, outer = (operation.get(f"{ring}_speed_rpm") for ring in ("inner", "outer"))
     return ", ".join(
         filter(
             None,
             (
-                f"{_number(operation.get('inner_speed_rpm') or 0.0)} rpm",
+                f"{_number(inner)} rpm" if inner is not None else "",
                 f"outer ring {_number(outer)} rpm" if outer else "",
                 _loads(operation),
                 "speed or load over time by a schedule" if scheduled else "",
                 _oil(scene.get("lubricant") or {}),
+                *(_range(key, values) for key, values in swept.items()),
             ),
         )
     )
@@ -145,7 +159,14 @@ def _loads(operation: Mapping[str, Any]) -> str:
     for key, unit in (("preload_N", "N"), ("preload_um", "µm")):
         if operation.get(key):
             words.append(f"preload {_number(operation[key])} {unit}")
-    return ", ".join(words) or "no load"
+    return ", ".join(words)
+
+
+def _range(key: str, values: Sequence[float]) -> str:
+    """'radial load 60 to 1300 N', of a dotted key."""
+    name, unit = quantity(key.rpartition(".")[2])
+    ends = " to ".join(dict.fromkeys((_number(min(values)), _number(max(values)))))
+    return f"{name} {ends} {unit}".rstrip()
 
 
 def _oil(lubricant: Mapping[str, Any]) -> str:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, notes
-from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def blocks(result: BallResult) -> list[Block]:
-    """Bearing, operating point and date, places, contacts, life and stiffness of each row, forces of the rings, balls, notes; nothing without an equilibrium."""
+    """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; nothing without an equilibrium."""
     if not result.is_equilibrium:
         return []
     titles = {name: f"{name} row" if name else "" for name in result.row_reports}
@@ -40,7 +39,6 @@ def blocks(result: BallResult) -> list[Block]:
     from rbdyn.compiled.kernel import compiler_notes
 
     return [
-        identity_line(identity_of("rbdyn ball", result.scene, ())),
         *rows,
         *map(Paragraph, sentences),
         *tables,
