@@ -26,6 +26,7 @@ from doe.report.sections.search import (
     adaptive_record,
     archive_table,
     compared_record,
+    in_few_runs,
     limiting_sentence,
     search_sentences,
 )
@@ -39,6 +40,7 @@ from doe.workflow.runs import RUNS_TABLE, evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail
+from rbdyn.base.identity import identity_of
 from rbdyn.base.records import finite, save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.result import versions, write_json
@@ -115,7 +117,13 @@ def answer_text(record: dict[str, Any]) -> str:
 def blocks(record: dict[str, Any]) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
     clean = drop_undefined(record)
-    details = [changes(clean), *chains(clean, {}).blocks, *reference(clean, {}).blocks, *diagnostics(clean, {}).blocks]
+    details = [
+        *in_few_runs(clean),
+        changes(clean),
+        *chains(clean, {}).blocks,
+        *reference(clean, {}).blocks,
+        *diagnostics(clean, {}).blocks,
+    ]
     return readable(
         [*first_screen(clean), *notes(clean, {}).blocks, *(replace(block, detail=Detail.ALL) for block in details)],
         clean,
@@ -125,14 +133,17 @@ def blocks(record: dict[str, Any]) -> list[Block]:
 def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
+    settings = settings_record(study)
+    files = [study.path, study.path_of(study.scene.file)]
     record: dict[str, Any] = {
         "format": FORMAT,
+        "identity": identity_of("doe study", settings["scene"], files).as_dict(),
         "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
         "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
-        "asked": settings_record(study),
+        "asked": settings,
         "design": study_design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),

@@ -271,7 +271,7 @@ def advice(study: Study, surfaces: list[Surface]) -> list[str]:
         return []
     design = len(design_of(study).coded)
     return [
-        f"lack of fit is significant for {', '.join(lacking)}, so the front on the surfaces is biased; --adaptive searches it "
+        f"the front on the surfaces is biased: lack of fit is significant for {', '.join(lacking)}; --adaptive searches the front "
         f"with emulators of the simulator, in {max(study.file.adaptive.budget - design, 0)} runs beyond the {design} of the design"
     ]
 

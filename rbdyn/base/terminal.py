@@ -127,9 +127,9 @@ def _table(table: Table, page: Page) -> str:
         console.print(grid)
     caption = page.title(table.caption) if table.caption else ""
     note = page.lines(table.note) if table.note else ""
-    # rich fills every line to the width of the table and begins with an empty one.
+    # rich fills every line to the width of the table and sets empty ones around it.
     lines = [line.rstrip() for line in paper.getvalue().splitlines()]
-    body = "".join(f"{line}\n" for line in lines[1 if caption else 0 :])
+    body = "".join(f"{line}\n" for line in lines[1 if caption else 0 : len(lines) - 1 if note else None])
     return f"{caption}{body}{note}"
 
 

@@ -9,7 +9,7 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
-from rbdyn.base.identity import identity_of
+from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
@@ -92,7 +92,9 @@ def simulate(
         write = partial(simulation_output.write, loaded, result)
         files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
         detail = Detail.of(quiet, verbose)
-        command.hand_over(result.as_dict, as_json, lambda: show_blocks(blocks(), detail), folder, files)
+        command.hand_over(
+            result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), folder, files
+        )
 
 
 @app.command(cls=command.refusing(FORMER))
@@ -183,7 +185,9 @@ def slip_map(
         write = partial(_write_map, mapped)
         blocks = partial(map_blocks, mapped)
         files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
-        command.hand_over(mapped.as_dict, as_json, lambda: show_blocks(blocks()), folder, files)
+        command.hand_over(
+            mapped.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()]), folder, files
+        )
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:

@@ -22,7 +22,7 @@ from rbdyn.base.command import (
     verbose_flag,
 )
 from rbdyn.base.faults import InputError
-from rbdyn.base.identity import identity_of
+from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
 from rbdyn.base.terminal import show
 
@@ -89,7 +89,13 @@ def ball(
         identity = identity_of("rbdyn ball", result.scene, [scene])
         answer, save = partial(blocks, result), partial(write, result)
         files = write_with_report(folder, identity, answer, partial(save, folder, path)) if folder else []
-        hand_over(result.as_dict, as_json, lambda: show(answer(), Detail.of(quiet, verbose)), folder, files)
+        hand_over(
+            result.as_dict,
+            as_json,
+            lambda: show([identity_line(identity), *answer()], Detail.of(quiet, verbose)),
+            folder,
+            files,
+        )
     if not result.is_equilibrium:
         if not as_json:
             print(f"no equilibrium: {result.status}", file=sys.stderr)

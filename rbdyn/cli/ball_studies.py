@@ -12,7 +12,7 @@ import numpy as np
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.command import FAILED, checkpoint_message, hand_over, output_folder, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
-from rbdyn.base.identity import identity_of
+from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show
@@ -61,7 +61,9 @@ def run_sweep(
     identity = identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys)
     answer, save = partial(sweep_blocks, result), partial(write_sweep, result)
     files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
-    hand_over(result.as_dict, as_json, lambda: show(answer(), Detail.of(quiet)), folder, files)
+    hand_over(
+        result.as_dict, as_json, lambda: show([identity_line(identity), *answer()], Detail.of(quiet)), folder, files
+    )
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
     return FAILED if result.failures else 0
@@ -240,7 +242,9 @@ def run(
     identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
     answer, save = partial(blocks, record, table), partial(write_study, name, record, table)
     files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
-    hand_over(lambda: record, as_json, lambda: show(answer(), Detail.of(quiet)), folder, files)
+    hand_over(
+        lambda: record, as_json, lambda: show([identity_line(identity), *answer()], Detail.of(quiet)), folder, files
+    )
     return 0
 
 

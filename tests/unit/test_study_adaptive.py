@@ -116,9 +116,10 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     assert len(rows) == found["foretold_points"]
     assert {"radial_clearance_mm", "power_loss_W", "power_loss_W_error"} <= set(rows[0])
     assert "adaptive_search.png" in record["files"] and (tmp_path / "adaptive_search.png").stat().st_size > 10_000
-    assert "in few runs" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "in few runs" in page and "The search ended because" in page
     text = (tmp_path / "answer.txt").read_text(encoding="utf-8")
-    assert text.startswith("The pick has radial clearance ") and "The search ended because" in text
+    assert "\nThe pick has radial clearance " in text and "\nWhat limits the pick: " in text
 
 
 def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 The sections are blocks of the record of a study; the ``..._record`` functions write that record from results.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
@@ -44,6 +45,7 @@ from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
+from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, quantity, shown, with_error
 
@@ -56,6 +58,7 @@ CLEARANCES = {
 }
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
+SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
 SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
@@ -68,17 +71,35 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def first_screen(summary: Record) -> list[Block]:
-    """The chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
-    return [*_clearances(summary), *_judged(summary), *_gained(summary), *_parts_to_make(summary), *_reasons(summary)]
+    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
+    identity = part(summary, "identity")
+    return [
+        *([identity_line(Identity.from_dict(identity))] if identity else ()),
+        *_clearances(summary),
+        *_judged(summary),
+        *_gained(summary),
+        *_parts_to_make(summary),
+        *_reasons(summary),
+    ]
 
 
 def _judged(summary: Record) -> list[Block]:
-    """Limits with their verdicts, and the odds of keeping them over the unknown inputs or the command that computes these."""
-    text = part(summary, "limits_sentence") or ""
-    verdicts = {limit.get("verdict") for limit in (part(summary, "limits") or {}).values()}
-    odds = [limit["odds"][0] for limit in (part(summary, "limits") or {}).values() if limit.get("odds")]
-    good = verdicts <= {"kept"} and summary.get("status", "ok") == "ok" and min(odds, default=1.0) >= NEARLY_ALL
-    return [_limits_judged(summary), Paragraph(text, "statement" if good else "warning")]
+    """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
+    limits = list((part(summary, "limits") or {}).values())
+    odds = [limit["odds"][0] for limit in limits if limit.get("odds")]
+    kept = summary.get("status", "ok") == "ok" and all(limit.get("verdict") == "kept" for limit in limits)
+    sentence = part(summary, "limits_sentence") or ""
+    if not kept or min(odds, default=1.0) < NEARLY_ALL:
+        return [_limits_judged(summary), Paragraph(sentence, "warning")]
+    everywhere = " and over the unknown inputs" if odds else ""
+    verdict = Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement")
+    return [_limits_judged(summary), *([verdict, _command_for_odds(summary)] if sentence else ())]
+
+
+def _command_for_odds(summary: Record) -> Paragraph:
+    """The command that states the odds, where these are unknown."""
+    command = f"doe study {part(summary, 'asked', 'study_file') or 'STUDY'} --robust"
+    return Paragraph("" if part(summary, "robust") else f"{command} states the odds over the unknown inputs.")
 
 
 def _gained(summary: Record) -> list[Block]:
@@ -90,15 +111,12 @@ def _gained(summary: Record) -> list[Block]:
     first: Role = "statement" if odds[0] >= NEARLY_ALL else "warning"
     second: Role = "warning" if part(summary, "robust", "undecided") else ""
     further: list[Role] = [""] * len(sentences)
-    command = f"doe study {part(summary, 'asked', 'study_file') or 'STUDY'} --robust"
     return [
         _gains(summary),
         Paragraph(text, _role_of_gains(summary, text)),
         *(Paragraph(sentence, role) for sentence, role in zip(sentences, [first, second, *further], strict=False)),
         _robust_points(summary),
-        Paragraph(
-            "" if sentences or not text else f"{command} states the odds of these gains over the unknown inputs."
-        ),
+        *([] if part(summary, "limits_sentence") or not text else [_command_for_odds(summary)]),
         Paragraph(part(summary, "whirl_sentence") or "", "warning"),
     ]
 
@@ -131,7 +149,9 @@ def _edge(summary: Record) -> str:
         for name, bound in (part(summary, "edge", "factors") or {}).items()
     ]
     whole = part(summary, "edge", "sentence") or ""
-    return f"The pick is at {' and '.join(bounds)}: a wider design may find more." if bounds else whole
+    if bounds:
+        return f"The pick is at {' and '.join(bounds)}: a wider design may find more."
+    return f"{whole.partition('; ')[0].rstrip('.')}." if whole else ""
 
 
 def _parts_to_make(summary: Record) -> list[Block]:
@@ -142,7 +162,7 @@ def _parts_to_make(summary: Record) -> list[Block]:
         for chain_name, chain in chains.items()
         for name, size in sizes(chain).items()
     ]
-    header = ("part", "chain", "dimension [mm]", "grade", "nominal moved [mm]")
+    header = ("part", "chain", "dimension [mm]", "grade", "moved [mm]")
     misses = [
         f"Chain {label(name)} misses its limits: {chain['status']}." for name, chain in chains.items() if refused(chain)
     ]
@@ -164,7 +184,7 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
-        Paragraph(f"Tolerances: {sentence}" if sentence else ""),
+        Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
 
 
@@ -257,13 +277,12 @@ def _limits_judged(summary: Record) -> Table:
                 with_error(limit.get("value"), limit.get("error")),
                 *_verdict(limit),
                 of_hundred(odds) if odds else "",
-                with_error(base.get("value"), base.get("error")),
-                _verdict(base)[0],
+                f"{_verdict(base)[0][:1]} {with_error(base.get('value'), base.get('error'))}".strip(),
             )
         )
     shares = "kept in 100 cases of unknown inputs"
-    header = ("limit", "pick", "verdict", "probability", shares, "baseline", "")
-    return Table("Limits judged by simulation", header, rows, text_columns=(2, 6))
+    header = ("limit", "pick", "verdict", "probability", shares, "baseline")
+    return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 
 
 def _limits_of(point: Record) -> list[Record]:
