@@ -29,11 +29,10 @@ from doe.report.sections.record import (
     readable,
     record_table,
     responses,
-    rounded_down,
 )
 from rbdyn.base import html, markdown
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Section, Table, Widget
-from rbdyn.base.words import filled_page, label, quantity, shown
+from rbdyn.base.words import filled_page, label, quantity, rounded_down, shown
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {

@@ -19,7 +19,6 @@ from doe.report.sections.record import (
     of_hundred,
     part,
     responses,
-    rounded_down,
     share_with_interval,
 )
 from doe.study_file import Study
@@ -31,7 +30,7 @@ from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Section, Table, Tile, Tiles
 from rbdyn.base.records import finite
-from rbdyn.base.words import chance, label, quantity, shown, with_error
+from rbdyn.base.words import chance, label, quantity, rounded_down, shown, with_error
 
 # Meaning of a clearance of the scene, by its key.
 CLEARANCES = {
@@ -96,6 +95,7 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(meaning, "small"),
         Paragraph(part(summary, "clearance_class") or "", "small"),
+        Paragraph(part(summary, "tolerances_warning") or ""),
         Paragraph(f"Tolerances: {sentence}" if sentence else ""),
     ]
 
@@ -131,6 +131,7 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
         "in operation": factor.text(running.get("pick")),
         "baseline in operation": factor.text(running.get("baseline")),
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
+        "grade of the parts": part(summary, "tolerances", factor.name, "grade") or "",
     }
     return Tile(
         factor.words, factor.text(pick[factor.name]), factor.unit, [entry for entry in further.items() if entry[1]]
@@ -361,13 +362,20 @@ def tolerances(summary: Record) -> Table:
             ""
             if width.get("probability") is None
             else share_with_interval(width["probability"], width.get("interval")),
+            _grade(width),
             label(width.get("limited_by") or ""),
         )
         for name, width in widths.items()
         if name in names and isinstance(width, Mapping)
     ]
-    header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
-    return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
+    header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
+    return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))
+
+
+def _grade(width: Record) -> str:
+    """'IT6: guide land 16 µm, cage outside 16 µm' of a tolerance."""
+    parts = [f"{label(name)} {shown(1e3 * size['width_mm'])} µm" for name, size in (width.get("parts") or {}).items()]
+    return ": ".join(filter(None, (width.get("grade") or "", ", ".join(parts))))
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:

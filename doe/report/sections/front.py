@@ -243,7 +243,7 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
     pick, survival = aware.get("pick") or {}, aware.get("survival") or {}
     points = {
         "baseline": aware.get("baseline_robust"),
-        "plain pick": aware.get("plain_pick_robust"),
+        "pick without tolerances": aware.get("plain_pick_robust"),
         "pick with tolerances": pick.get("robust"),
         "the same, nominal": pick.get("responses"),
     }
@@ -266,12 +266,12 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
             share_with_interval(survival[name], survival.get(f"{name}_interval")) for name in ("plain_pick", "pick")
         ]
         sentences.append(
-            f"Parts that still dominate the baseline: {shares[0]} at the plain pick, {shares[1]} at the pick with tolerances."
+            f"Parts that still dominate the baseline: {shares[0]} at the pick without tolerances, {shares[1]} at the pick with tolerances."
         )
     sentences.append(survival.get("open_errors") or "")
     if aware.get("plain_pick_inside") is False:
         sentences.append(
-            "The tolerances of the plain pick reach out of the design region: its figures are extrapolated."
+            "Parts of the pick without tolerances reach out of the design region: its figures are extrapolated."
         )
     caption = f"At the ends of the tolerances, {widths}: {kind}" if widths else f"At the ends of the tolerances: {kind}"
     return [Table(caption, ["point", *map(label, names)], rows), *map(Paragraph, sentences)]
