@@ -329,14 +329,14 @@ def attempt_text(text: str, version: str) -> RunOutcome:
 def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
-    Each has the shape (runs, responses).
+    Each has the shape (runs, responses). The value of a response that a run does not report is NaN.
     """
-    quantities = [[record[name] for name in names] for record in (result.as_dict() for result in results)]
+    quantities = [[record.get(name, {}) for name in names] for record in (result.as_dict() for result in results)]
     keys = "value", "statistical_error", "degrees_of_freedom"
     values, errors, freedom = ([[quantity.get(key) for quantity in row] for row in quantities] for key in keys)
     # Student's t of a mean of n independent values has n - 1 degrees of freedom.
     samples = np.nan_to_num(np.array(freedom, dtype=float) + 1.0).astype(np.int64)
-    return np.array(values), np.array(errors, dtype=float), samples
+    return np.array(values, dtype=float), np.array(errors, dtype=float), samples
 
 
 def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str, History]":

@@ -32,6 +32,8 @@ angle = np.degrees((motion.azimuth + np.pi) % (2.0 * np.pi) - np.pi)
 axis.plot(angle.ravel(), motion.inner_load.ravel(), ".", markersize=1)
 axis.set_xlabel("roller from the load direction [deg]")
 axis.set_ylabel("load on the inner race [N]")
-axis.set_title(f"power loss {with_error(result.power_loss.value, result.power_loss.error)} W, carried {carried:.0f} N")
+axis.set_title(
+    f"power loss {with_error(result.power_loss_W.value, result.power_loss_W.error)} W, carried {carried:.0f} N"
+)
 if __name__ == "__main__":
     figure.savefig("load_zone.png", dpi=130)

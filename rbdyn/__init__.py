@@ -1,11 +1,14 @@
 """Dynamics of rolling bearings: from a drawing and an operating point to forces, whirl and power loss, with errors.
 
-``Scene`` reads and checks the input, ``simulate(scene)`` runs it, the result saves itself and ``load`` reads it back.
+``Scene`` reads and checks the input. ``simulate`` runs a roller bearing, ``history`` returns its motion, ``equilibrium`` solves
+a ball bearing. Each takes a scene or the path of its file. Results save themselves, and ``load`` reads them back.
 Names are fetched when first used: importing the package loads neither numba nor scipy, nor anything else but itself.
 """
 
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rbdyn.base.faults import InputError, RunError
     from rbdyn.dynamics.motion import History, history
     from rbdyn.dynamics.simulate import simulate
@@ -33,8 +36,8 @@ _HOMES = {
 }
 
 
-def load(path: str) -> "SimulationResult":
-    """Read a saved result. Raises InputError when it is missing or not one."""
+def load(path: "Path | str") -> "SimulationResult":
+    """Read a saved result of ``simulate``. Raises InputError when the file is missing or another one."""
     from rbdyn.result import SimulationResult
 
     return SimulationResult.load(path)
@@ -51,4 +54,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES, "__version__"])
+    return sorted([*__all__, "__version__"])

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
-from rbdyn.base.records import Record, derived, json_fields, keyed
+from rbdyn.base.records import Record, derived, json_fields
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
@@ -89,13 +89,17 @@ JITTER = 0.1
 
 
 class SimulationResult(Brief, SavedRecord):
-    """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
+    """Outcome of one scene. Its figures have the names of the keys of its JSON form, units included.
 
-    - ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of the
-      contact alone
-    - ``rolling_resistance``: the loss of that name by race, "outer" and "inner"
+    - ``scene``: the resolved input
+    - ``impact_force_N``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force_N``: of
+      the contact alone
+    - ``power_loss_W``: mean friction power; ``power_terms_W``: its parts; ``rolling_resistance_W``: the part of that name by
+      race, "outer" and "inner"
+    - ``power_balance``: "relative_gap" between power supplied and lost; ``loads``: largest contact loads "max_inner_N",
+      "max_outer_N" and "max_land_N"
     - ``races``: pressure, half-width and film at the largest load of "inner" and "outer"
-    - ``clearance``: drawn and operating diametral clearance [um], with the changes by fits, temperature and rotation where a
+    - ``clearance_um``: drawn and operating diametral clearance [um], with the changes by fits, temperature and rotation where a
       mounting is given. "radial", "guide" and "pocket" have the drawn, fit, temperature, rotation and operating share of each
     - ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's.
       None where the scene states no designation
@@ -104,24 +108,24 @@ class SimulationResult(Brief, SavedRecord):
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
       play, None where nothing guides the cage
+    - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
+      None unless numerics.pulse_threshold_N is stated
     """
 
     FORMAT = "rbdyn.simulation/4"
     WHAT = "simulation result"
-    impact_force: Quantity = keyed("impact_force_N")
-    impact_contact_force: Quantity = keyed("impact_contact_force_N")
+    impact_force_N: Quantity  # noqa: N815
+    impact_contact_force_N: Quantity  # noqa: N815
     whirl_deviation_ratio: Quantity
-    power_loss: Quantity = keyed("power_loss_W")
+    power_loss_W: Quantity  # noqa: N815
     cage_speed_rpm: Quantity
     cage_slip: Quantity
-    power_gap: float = keyed("power_balance", "relative_gap")
-    max_inner_load: float = keyed("loads", "max_inner_N")
-    max_outer_load: float = keyed("loads", "max_outer_N")
-    max_land_load: float = keyed("loads", "max_land_N")
+    power_balance: dict[str, float]
+    loads: dict[str, float]
     notes: tuple[str, ...]
-    power_terms: dict[str, float] = keyed("power_terms_W")
-    rolling_resistance: dict[str, float] = keyed("rolling_resistance_W")
-    clearance: dict[str, Any] = keyed("clearance_um")
+    power_terms_W: dict[str, float]  # noqa: N815
+    rolling_resistance_W: dict[str, float]  # noqa: N815
+    clearance_um: dict[str, Any]
     friction_check: dict[str, float | None] | None
     status: str
     races: dict[str, dict[str, float]]
@@ -135,6 +139,9 @@ class SimulationResult(Brief, SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
     cage_orbit_radius_share: Quantity | None = None
+    pulse_rate_hz: Quantity | None = None
+    pulse_height_N: Quantity | None = None  # noqa: N815
+    pulse_impulse_N_s: Quantity | None = None  # noqa: N815
 
     @property
     def jitters(self) -> bool:

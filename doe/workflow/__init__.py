@@ -5,6 +5,6 @@
 - ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region
 - ``parts``: parts of a clearance and their grades; ``tolerances``: the widest tolerances of the pick
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: judgement of the pick
-- ``rig``: measurements; ``calibration``: inputs from measurements
+- ``rig``: measurements; ``signals``: figures of raw ones; ``calibration``: inputs from measurements
 - ``status``: stages and status of a command; ``whole``: the study
 """

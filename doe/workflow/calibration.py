@@ -50,7 +50,7 @@ from doe.workflow.input_sets import (
     tables_of,
     work_of_set,
 )
-from doe.workflow.rig import Rig, read_rig
+from doe.workflow.rig import PULSE_OUTPUTS, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.storage import code_version, digest_of
@@ -301,19 +301,16 @@ class _Rows:
 
     def figures(self, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
         """Cells (n, c) in logarithms, their variances and the degrees of freedom of these, of results by condition."""
-        outputs, variances, freedom = outputs_with_scatter(self.outputs, results)
-        if not (outputs > 0.0).all():
-            name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
-            raise RunError(
-                f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; leave its column out"
-            )
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
-        return (
-            np.log(outputs).reshape(shape)[:, conditions, names],
-            (variances / outputs**2).reshape(shape)[:, conditions, names],
-            freedom.reshape(shape)[:, conditions, names],
-        )
+        tables = outputs_with_scatter(self.outputs, results)
+        outputs, variances = (table.reshape(shape)[:, conditions, names] for table in tables[:2])
+        freedom = tables[2].reshape(shape)[:, conditions, names]
+        if not (outputs > 0.0).all():
+            name = self.outputs[names[int(np.argmin(outputs.min(axis=0)))]]
+            remedy = "lower threshold_N" if name in PULSE_OUTPUTS else "leave its column out"
+            raise RunError(f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; {remedy}")
+        return np.log(outputs), variances / outputs**2, freedom
 
 
 @one_thread

@@ -171,7 +171,7 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
     )
     freedom = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
     errors = statistical, numerical
-    terms, check, orbit = result.power_terms, result.friction_check, result.cage_orbit_radius_share
+    terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
     return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
 

@@ -1,166 +1,41 @@
-"""Measurements on a rig: a CSV table with a row for each operating condition, and raw signals with errors by batch means.
-
-A mean over time needs no filter. Pulses are counted by whole cage turns, so that uneven spacing of their marks cancels.
-Whirl needs a velocity: an orbit is filtered like the simulated one (``filtered_whirl``).
-"""
+"""Measurements on a rig: a CSV table with a row for each operating condition, whose raw signals ``signals`` evaluates."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from doe.workflow.input_sets import key_values, unknown_keys
+from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.words import counted
 
-# Columns of each kind of signal; some may have one of two units.
-KINDS = {
-    "cage_pulses": ("t_s",),
-    "cage_speed": ("t_s", "cage_speed_rpm"),
-    "orbit": ("t_s", "x_um or x_m", "y_um or y_m"),
-}
-# Values in any unit in use; finer steps of time are round-off, and their inverse overflows.
-SAMPLED, FINEST = Limits(1e12), 1e-12
-# A turn that takes longer than this many median turns has lost a pulse.
-LOST = 1.5
-# Turns or samples that the error of a mean needs.
-FEWEST_SAMPLES = 20
-# Batches of an orbit at most, periods of the cutoff in each at least, and periods of a record of noise at least.
-MOST_PARTS, PERIODS, STILL_PERIODS = 400, 10, 20
-# Intervals of an even signal are alike within this share.
-EVEN = 0.1
-# Largest share of noise in the mean square of a speed: its effect on the mean is known to first order.
-LOUDEST = 0.25
-
-
-class Mean(NamedTuple):
-    """A mean over a signal, its standard deviation, and a note on gaps or noise, if any."""
-
-    value: float
-    sd: float
-    note: str | None
-
-
-def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
-    """Mean cage speed [rpm]. Raises InputError."""
-    from rbdyn.dynamics.statistics.batch_means import estimate
-
-    time, *speeds = _columns(path, KINDS[kind])
-    if not (np.diff(time) >= FINEST).all():
-        row = int(np.argmin(np.diff(time) >= FINEST)) + 2
-        raise InputError(
-            [f"{path}: t_s in row {row} does not rise by {FINEST:g} s at least; sort it, or check the unit"]
-        )
-    note = None
-    if kind == "cage_pulses":
-        turn_times = np.diff(time[::pulses_per_turn])
-        complete = turn_times <= LOST * np.median(turn_times) if turn_times.size else np.zeros(0, bool)
-        if not complete.all():
-            turns = counted(turn_times.size, "turn")
-            note = f"{path}: {(~complete).sum()} of {turns} lack pulses and are left out"
-        moments = np.column_stack([np.full(complete.sum(), 60.0), turn_times[complete]])
-    else:
-        # Each sample counts for the time to the next one.
-        moments = np.column_stack([speeds[0][:-1] * np.diff(time), np.diff(time)])
-    if len(moments) < FEWEST_SAMPLES:
-        turns = counted(len(moments), "turn")
-        raise InputError([f"{path}: {turns} or samples are too few for an error; measure at least {FEWEST_SAMPLES}"])
-    mean = estimate([moments], lambda sums: sums[..., 0] / sums[..., 1])
-    if not mean.value > 0.0 or not mean.half_width:
-        raise InputError([f"{path}: no positive, varying cage speed; check the signal"])
-    return Mean(mean.value, mean.half_width / 1.96, note)
-
-
-def whirl(path: Path, cutoff: float, notches: Sequence[float], rest_record: Path | None) -> Mean:
-    """Whirl deviation ratio below ``cutoff`` without ``notches`` [Hz].
-
-    ``rest_record``: a record of the rig at rest. Noise of variance s^2 in each component adds 2 s^2 to the mean square of the
-    speed v and, to first order, s^2/(2 v) to v. Raises InputError.
-    """
-    from rbdyn.dynamics.statistics.batch_means import estimate
-    from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, WHIRL_DEVIATION_RATIO, sums_until
-
-    speed, periods = _filtered(path, cutoff, notches, FEWEST_SAMPLES * PERIODS)
-    quiet = np.zeros(1) if rest_record is None else _filtered(rest_record, cutoff, notches, STILL_PERIODS)[0]
-    noise = float((quiet**2).mean()) / 2.0
-    if 2.0 * noise > LOUDEST * float((speed**2).mean()):
-        raise InputError(
-            [
-                f"{rest_record}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"
-            ]
-        )
-    nearly = np.maximum(speed, np.sqrt(noise))
-    mean = speed - noise / (2.0 * nearly) if noise else speed
-    moments = np.stack([np.ones_like(speed), mean, speed**2 - 2.0 * noise])
-    parts = min(int(periods / PERIODS), MOST_PARTS)
-    ends = len(speed) * np.arange(1, parts + 1) // parts
-    ratio = estimate([sums_until(moments, ends)], WHIRL_DEVIATION_RATIO.of_sums)
-    if not ratio.value > 0.0 or not ratio.half_width:
-        raise InputError([f"{path}: a speed of the cage's centre that varies no more than noise; check the signal"])
-    noisy = [f"without a still_file noise below {cutoff:g} Hz counts as whirl"] if rest_record is None else []
-    slow = [f"{frequency:g} Hz" for frequency in notches if frequency * periods / cutoff < NOTCH_PERIODS]
-    short = [f"runout at {' and '.join(slow)} counts as whirl, of which it has fewer than {NOTCH_PERIODS:g} periods"]
-    note = "; ".join([*noisy, *(short if slow else [])])
-    return Mean(ratio.value, ratio.half_width / 1.96, f"{path}: {note}" if note else None)
-
-
-def _filtered(path: Path, cutoff: float, notches: Sequence[float], least_periods: int) -> tuple[Array, float]:
-    """Filtered speed [m/s] of an orbit, and its number of periods of the cutoff, ``least_periods`` at least."""
-    from rbdyn.dynamics.statistics.metrics import filtered_speed
-    from rbdyn.scene.laws import SAMPLES_A_PERIOD
-
-    time, *place = _columns(path, KINDS["orbit"])
-    interval = (time[-1] - time[0]) / max(len(time) - 1, 1)
-    if not (np.abs(np.diff(time) - interval) < EVEN * interval).all() or not interval >= FINEST:
-        raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
-    rate = 1.0 / interval
-    if rate * (1.0 + 1e-6) < SAMPLES_A_PERIOD * cutoff:
-        raise InputError(
-            [
-                f"{path}: {rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = "
-                f"{cutoff:g}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"
-            ]
-        )
-    periods = len(time) * cutoff / rate
-    if periods < least_periods:
-        raise InputError(
-            [f"{path}: shorter than {least_periods} periods of cutoff_hz = {cutoff:g}; measure longer or raise it"]
-        )
-    return filtered_speed(np.stack(place), rate, cutoff, notches), periods
-
-
-def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
-    """Numbers in SI of the columns, each of which may have one of several units. Raises InputError."""
-    sheet, numbers, faults = read_sheet(path), list[Array](), list[str]()
-    for name in names:
-        units = [unit for unit in name.split(" or ") if unit in sheet]
-        if len(units) == 1:
-            values, slips = sheet.column(units[0]).numbers(SAMPLED)
-            numbers.append(values * (1e-6 if units[0].endswith("_um") else 1.0))
-            faults += slips
-        else:
-            repetition = f"{path}: columns {' and '.join(units)} are both there; keep one"
-            faults.append(repetition if units else f"{path}: column {name} is missing; add it")
-    refuse(faults)
-    return numbers
-
-
 # Outputs of a simulation that can be measured; the others are not positive throughout.
-OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
+PULSE_OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")
+OUTPUTS = (
+    "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", *PULSE_OUTPUTS,
+)  # fmt: skip
 SD, TURNS, HOLD = "_sd", "turns", "hold"
 FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
 ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviation_ratio"
+THRESHOLD, BANDWIDTH, DEAD_TIME, MASS = "threshold_N", "bandwidth_hz", "dead_time_ms", "sensor_mass_g"
+# Columns that state how pulses are taken, and the outputs of each kind of signal.
+SETTINGS = (THRESHOLD, BANDWIDTH, DEAD_TIME)
+GIVES = {
+    "cage_pulses": (SPEED,), "cage_speed": (SPEED,), ORBIT: (WHIRL,),
+    **dict.fromkeys(TRACES, PULSE_OUTPUTS), **dict.fromkeys(LISTS, PULSE_OUTPUTS[:2]),
+}  # fmt: skip
 # Keys of the speeds whose runout is filtered out, and of the filter of the simulated whirl.
 SHAFTS = "operation.inner_speed_rpm", "operation.outer_speed_rpm"
 FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
+PULSE_KEYS = "numerics.pulse_threshold_N", "numerics.pulse_bandwidth_hz", "numerics.pulse_dead_time_ms"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Measured values in any unit in use; pulses per turn of the finest encoders.
 MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
+NOT_NEGATIVE = Limits(1e12, 1e-12, "not negative")
 # Fewest training rows; most rows, whose joint covariance is quickly solved; most conditions, each with its own seeds.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 
@@ -260,9 +135,10 @@ def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
     names = [name for name in sheet.header if name]
     keys = tuple(name for name in names if "." in name)
     kinds = sheet.column(KIND).texts if KIND in sheet else ()
-    signals = [WHIRL if kind == ORBIT else SPEED for kind in kinds if kind in KINDS]
+    signals = [name for kind in kinds for name in GIVES.get(kind, ())]
     outputs = tuple(dict.fromkeys([*(name for name in names if name in OUTPUTS), *signals]))
     columns = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
+    columns |= {*SETTINGS, MASS}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
     faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in columns]
     if not outputs:
@@ -271,8 +147,11 @@ def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
         faults.append(
             f"{sheet.path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm"
         )
-    if CUTOFF in sheet:
-        faults += [f"{sheet.path}: column {key}: {CUTOFF} sets that key; remove one" for key in FILTER if key in sheet]
+    for column, set_keys in ((CUTOFF, FILTER), (THRESHOLD, PULSE_KEYS)):
+        if column in sheet:
+            faults += [
+                f"{sheet.path}: column {key}: {column} sets that key; remove one" for key in set_keys if key in sheet
+            ]
     refuse(faults)
     return keys, outputs
 
@@ -298,7 +177,8 @@ def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
         elif name in (HOLD, FILE, KIND, STILL):
             continue
         else:
-            numbers[name], slips = column.numbers(COUNTED if name == PULSES else MEASURED, UNKNOWN)
+            limits = COUNTED if name == PULSES else NOT_NEGATIVE if name == DEAD_TIME else MEASURED
+            numbers[name], slips = column.numbers(limits, UNKNOWN)
         faults += slips
     return _Cells(sheet.path, columns, numbers, values), faults
 
@@ -306,12 +186,14 @@ def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
 def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
     """Sentences on cells of a row that are missing, twice there, or without use."""
     kind = cells.text(KIND, place) if cells.states(FILE, place) else ""
-    signal = WHIRL if kind == ORBIT else SPEED if kind in KINDS else None
-    if cells.states(FILE, place) and signal is None:
+    signals = GIVES.get(kind, ())
+    if cells.states(FILE, place) and not signals:
         yield cells.fault(KIND, place, f"is no kind of signal; choose {', '.join(KINDS)}")
         return
     measured = [name for name in outputs if cells.states(name, place)]
-    used = {PULSES: kind == "cage_pulses", STILL: kind == ORBIT, CUTOFF: WHIRL in (signal, *measured)}
+    pulses = not set(PULSE_OUTPUTS).isdisjoint((*signals, *measured))
+    used = {PULSES: kind == "cage_pulses", STILL: kind == ORBIT, CUTOFF: WHIRL in (*signals, *measured)}
+    used |= {MASS: kind == "impact_acceleration", **dict.fromkeys(SETTINGS, pulses)}
     used |= {KIND: cells.states(FILE, place)} | {name + SD: name in measured for name in outputs}
     for name, serves in used.items():
         if cells.states(name, place) and not serves:
@@ -323,8 +205,18 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
             yield cells.fault(
                 name + SD, place, f"is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
             )
-    if signal in measured:
-        yield cells.fault(str(signal), place, f"comes from {FILE} too; leave out one")
+    for name in signals:
+        if name in measured:
+            yield cells.fault(name, place, f"comes from {FILE} too; leave out one")
+    needed = {
+        THRESHOLD: "the force above which a pulse counts",
+        BANDWIDTH: "the frequency below which the force counts",
+    }
+    for name, meaning in needed.items():
+        if pulses and not cells.states(name, place):
+            yield cells.fault(name, place, f"is missing; give {meaning}")
+    if used[MASS] and not cells.states(MASS, place):
+        yield cells.fault(MASS, place, "is missing; give the force over the acceleration of a tap with a hammer")
     if kind == ORBIT and not cells.states(CUTOFF, place):
         yield cells.fault(CUTOFF, place, "is missing; give the frequency below which the orbit counts")
     if not measured and not cells.states(FILE, place):
@@ -339,21 +231,37 @@ def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | 
     values = {name: value for name in outputs if (value := cells.number(name, place)) is not None}
     sds = {name: cells.number(name + SD, place) for name in values}
     cutoff, turns, notches, note = cells.number(CUTOFF, place), cells.number(TURNS, place), tuple[float, ...](), None
+    setting = _pulse_setting(cells, place)
     if cells.states(FILE, place):
         signal, kind = cells.path.parent / cells.text(FILE, place), cells.text(KIND, place)
         if kind == ORBIT:
             assert cutoff is not None
             notches = _runout(keys, values.get(SPEED))
             rest_record = cells.path.parent / cells.text(STILL, place) if cells.states(STILL, place) else None
-            mean = whirl(signal, cutoff, notches, rest_record)
+            means = {WHIRL: whirl(signal, cutoff, notches, rest_record)}
+        elif SPEED in GIVES[kind]:
+            means = {SPEED: cage_speed(signal, kind, int(cells.number(PULSES, place) or 1))}
         else:
-            mean = cage_speed(signal, kind, int(cells.number(PULSES, place) or 1))
-        name = WHIRL if kind == ORBIT else SPEED
-        values[name], sds[name], note = mean
+            assert setting is not None
+            means, note = impact_pulses(signal, kind, setting)
+        for name, mean in means.items():
+            values[name], sds[name], note = mean.value, mean.sd, mean.note or note
     if cutoff is not None:
         # The simulated whirl has the same filter.
         keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
+    if setting is not None:
+        # So are the simulated pulses taken.
+        pulses = (setting.threshold, setting.bandwidth, 1e3 * setting.dead_time)
+        keys |= dict(zip(PULSE_KEYS, pulses, strict=True))
     return Row(place + 1, keys, values, sds, turns, cells.text(HOLD, place).lower() in YES), note
+
+
+def _pulse_setting(cells: _Cells, place: int) -> PulseSetting | None:
+    """How pulses are taken in a row; None for a row without pulses."""
+    threshold, bandwidth, dead_time, mass = (cells.number(name, place) for name in (*SETTINGS, MASS))
+    if threshold is None or bandwidth is None:
+        return None
+    return PulseSetting(threshold, bandwidth, 1e-3 * (dead_time or 0.0), None if mass is None else 1e-3 * mass)
 
 
 def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:

@@ -187,7 +187,7 @@ def signal_rows(size: int, folder: Path) -> list[str]:
     lines = (f"{row * 1e-4:.4f},{9000.0 + draw.gauss(0.0, 9.0):.2f}" for row in range(size))
     (folder / "s.csv").write_text("\n".join(["t_s,cage_speed_rpm", *lines]), "utf-8")
     return python(
-        "from doe.workflow.rig import cage_speed; cage_speed(Path(sys.argv[1]), 'cage_speed', 1)", folder / "s.csv"
+        "from doe.workflow.signals import cage_speed; cage_speed(Path(sys.argv[1]), 'cage_speed', 1)", folder / "s.csv"
     )
 
 

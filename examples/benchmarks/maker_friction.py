@@ -43,17 +43,17 @@ def scene_of(size: str, cage: str, turns: float, replicates: int) -> Scene:
 
 def rows_of(results: dict[str, SimulationResult]) -> list[list[str]]:
     """A header, and a row a bearing: power by term and in all, the makers' figures, their ratio with its statistical error."""
-    terms = {name: result.power_terms for name, result in results.items()}
+    terms = {name: result.power_terms_W for name, result in results.items()}
     every = list(next(iter(terms.values())))
     shown = [
         term for term in every
-        if any(abs(terms[name][term]) > SHOWN_SHARE * result.power_loss.value for name, result in results.items())
+        if any(abs(terms[name][term]) > SHOWN_SHARE * result.power_loss_W.value for name, result in results.items())
     ]  # fmt: skip
     header = ["bearing", "rpm", "N", *(f"{term.replace('_', ' ')} W" for term in shown), "rest W", "power loss W",
               "SKF W", "ISO 15312 W", "over SKF", "cage slip %"]  # fmt: skip
     rows = [header]
     for name, result in results.items():
-        check, loss, point = result.friction_check, result.power_loss, result.scene["operation"]
+        check, loss, point = result.friction_check, result.power_loss_W, result.scene["operation"]
         assert check is not None
         skf, heat, ratio = (check[key] for key in ("skf_power_W", "iso_15312_heat_W", "ratio"))
         assert skf and heat and ratio
@@ -70,8 +70,10 @@ def rows_of(results: dict[str, SimulationResult]) -> list[list[str]]:
 def conclusion(results: dict[str, SimulationResult]) -> str:
     """Range and median over the bearings of the loss over SKF's, and of each term that makes it."""
     every = [(result, result.friction_check["skf_power_W"]) for result in results.values() if result.friction_check]
-    ratios = [result.power_loss.value / skf for result, skf in every if skf]
-    terms = {term: [result.power_terms[term] / skf for result, skf in every if skf] for term in every[0][0].power_terms}
+    ratios = [result.power_loss_W.value / skf for result, skf in every if skf]
+    terms = {
+        term: [result.power_terms_W[term] / skf for result, skf in every if skf] for term in every[0][0].power_terms_W
+    }
     shown = {term: shares for term, shares in terms.items() if max(shares) > SHOWN_SHARE}
     parts = (f"{term.replace('_', ' ')} {_spread(shares)}" for term, shares in shown.items())
     return f"Over SKF's M_rr + M_sl, median (range): power loss {_spread(ratios)}; {', '.join(parts)}."

@@ -135,7 +135,7 @@ def simulated(file: Path, effort: Effort, overrides: tuple[str, ...] = ()) -> Si
 
 def quantity(result: SimulationResult, response: str) -> Quantity:
     """A figure of a result by the name under which it is saved."""
-    return getattr(result, response.removesuffix("_N").removesuffix("_W"))
+    return getattr(result, response)
 
 
 def error(figure: Quantity) -> float:

@@ -194,7 +194,7 @@ def friction_totals(effort: Effort | None = None, names: Sequence[str] | None = 
 def simulated_row(name: str, speed_rpm: float, load_n: float, grade: int, effort: Effort) -> tuple[str, ...]:
     """The steady calculation beside a run."""
     found, keys = point(name, speed_rpm, load_n, grade), overrides_of(name, speed_rpm, load_n, grade)
-    runs = [simulated(CHEN, effort, (*keys, *more)).power_terms["rolling_resistance"]
+    runs = [simulated(CHEN, effort, (*keys, *more)).power_terms_W["rolling_resistance"]
             for more in ((), (f"lubricant.inlet_distance={STARVED}",))]  # fmt: skip
     scene = Scene.load(CHEN, keys)
     gaps, added = open_contacts(scene)

@@ -227,11 +227,11 @@ def friction(
     for speed, load in points:
         shaft = speed * math.pi / 30.0 * 1e-3
         result = simulated(CHEN, effort, (f"operation.inner_speed_rpm={speed}", f"operation.radial_load_N={load}"))
-        terms = result.power_terms
+        terms = result.power_terms_W
         races = ("outer_race_traction", "inner_race_traction", "rolling_resistance", "race_damping")
         rolling, sliding = skf_moments(speed, load, viscosity, 27.0, 60.0)
         record = {
-            "speed_rpm": speed, "load_N": load, "total_W": result.power_loss.value,
+            "speed_rpm": speed, "load_N": load, "total_W": result.power_loss_W.value,
             "races_W": sum(terms[name] for name in races), "drag_W": terms["roller_drag"],
             "land_W": terms["land_film"] + terms["land_friction"] + terms["land_damping"],
             "skf_rolling_W": shaft * rolling, "skf_sliding_W": shaft * sliding,

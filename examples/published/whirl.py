@@ -71,8 +71,8 @@ def whirl(
             records.append({
                 "law": law, "fill": fill, "ratio": result.whirl_deviation_ratio.value,
                 "ratio_error": error(result.whirl_deviation_ratio), **moved,
-                "land_N": result.max_land_load, "impact_N": result.impact_force.value,
-                "impact_error": error(result.impact_force), "slip": result.cage_slip.value,
+                "land_N": result.loads["max_land_N"], "impact_N": result.impact_force_N.value,
+                "impact_error": error(result.impact_force_N), "slip": result.cage_slip.value,
                 "regime": regime(moved["dry_share"], moved["contacts_per_turn"]),
             })  # fmt: skip
     frame = pd.DataFrame(records)

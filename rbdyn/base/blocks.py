@@ -19,12 +19,17 @@ class Detail(IntEnum):
         return cls.LEAST if quiet else cls.ALL if verbose else cls.USUAL
 
 
+Role = Literal["", "statement", "warning", "small"]
+# First word of a warning in every rendering: no reader depends on a colour.
+WARNING = "Warning"
+
+
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences; a "statement" is a verdict, "small" is small print."""
+    """Sentences; a "statement" is good news, a "warning" bad news or an open verdict, "small" is small print."""
 
     text: str
-    role: Literal["", "statement", "small"] = ""
+    role: Role = ""
     detail: Detail = Detail.LEAST
 
 

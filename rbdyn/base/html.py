@@ -5,6 +5,7 @@ from html import escape
 from itertools import groupby
 
 from rbdyn.base.blocks import (
+    WARNING,
     Block,
     Bullets,
     Figures,
@@ -20,7 +21,7 @@ from rbdyn.base.blocks import (
 )
 
 # Classes of the style sheet by the role of a paragraph.
-CLASSES = {"": "", "statement": ' class="statement"', "small": ' class="note"'}
+CLASSES = {"": "", "statement": ' class="statement"', "warning": ' class="warning"', "small": ' class="note"'}
 
 
 def section(part: Section, widget: Callable[[str], str] = lambda name: "") -> str:
@@ -40,7 +41,8 @@ def render(block: Block) -> str:
     """HTML of a block without scripts. Raises TypeError for a widget."""
     match block:
         case Paragraph(text, role):
-            return f"<p{CLASSES[role]}>{prose(text)}</p>"
+            word = f"<strong>{WARNING}:</strong> " if role == "warning" else ""
+            return f"<p{CLASSES[role]}>{word}{prose(text)}</p>"
         case Note(text):
             return f"<p>{prose(text)}</p>"
         case Heading(text):

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 
-from rbdyn.base.blocks import Block, Bullets, Heading, Note, Paragraph, Section, Table, Tiles, says
+from rbdyn.base.blocks import WARNING, Block, Bullets, Heading, Note, Paragraph, Section, Table, Tiles, says
 
 # Characters to escape: marks of Markdown anywhere, underscores at the edge of a word, links.
 SPECIAL = re.compile(r"[\\`*|]|(?<![^\W_])_|_(?![^\W_])|(?<=\])[(\[:]|^(?:[#>+-]|\d+\.)(?=\s)")
@@ -35,6 +35,8 @@ def plain(text: str) -> str:
 
 def _render(block: Block) -> str:
     match block:
+        case Paragraph(text, "warning"):
+            return f"**{WARNING}: {plain(text)}**"
         case Paragraph(text, role):
             return f"**{plain(text)}**" if role == "statement" else plain(text)
         case Note(text):

@@ -4,16 +4,21 @@ import io
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Sequence
-from textwrap import wrap
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from textwrap import shorten, wrap
 from typing import NamedTuple
 
-from rbdyn.base.blocks import Block, Bullets, Detail, Heading, Note, Paragraph, Table, Tiles, says
+from rbdyn.base.blocks import WARNING, Block, Bullets, Detail, Heading, Note, Paragraph, Table, Tiles, says
+from rbdyn.base.words import counted
 
 # Characters around the text of each column of a table, and around the whole table.
 PADDING, FRAME = 3, 1
-# Longest cell that is never broken.
+# Longest cell that is never broken, unless it is a value with its error.
 SHORT = 20
+NOTE = "note: "
+# Notes that are shown below full detail.
+MOST_NOTES = 5
 # Width of tables in a file or a pipe.
 WIDE = 160
 
@@ -30,16 +35,35 @@ def show(blocks: Iterable[Block], detail: Detail = Detail.USUAL) -> None:
 def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | None = None, bold: bool = False) -> str:
     """Text of the blocks up to a level of detail, each on lines of its own, without pictures.
 
+    Below full detail there are at most `MOST_NOTES` notes, a line each.
+
     width : columns of the terminal; None for a file, whose sentences are one line each.
-    bold : whether headings and captions are in bold type.
+    bold : whether headings, captions and warnings are in bold type.
     """
     page = Page(width, bold)
+    shown = [block for block in blocks if block.detail <= detail and says(block)]
     written = ""
-    for block in blocks:
-        if block.detail <= detail and says(block):
-            titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
-            written += ("\n" if titled and written and not written.endswith("\n\n") else "") + _render(block, page)
+    for block in shown if detail == Detail.ALL else _few_notes(shown, page):
+        titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
+        written += ("\n" if titled and written and not written.endswith("\n\n") else "") + _render(block, page)
     return written
+
+
+def _few_notes(blocks: Sequence[Block], page: "Page") -> list[Block]:
+    """The blocks with the first notes, each cut to a line of the page, and where the others are."""
+    texts = [block.text for block in blocks if isinstance(block, Note)]
+    first = {text: page.line(text) for text in texts[:MOST_NOTES]}
+    left, cut = len(texts) - len(first), any(line != text for text, line in first.items())
+    if not left and not cut:
+        return list(blocks)
+    last = max(place for place, block in enumerate(blocks) if isinstance(block, Note) and block.text in first)
+    before = [_cut(block, first) for block in blocks[: last + 1] if not isinstance(block, Note) or block.text in first]
+    where = f"{counted(left, 'more note')} in the report (--out)" if left else "notes in full: in the report (--out)"
+    return [*before, Paragraph(where), *(block for block in blocks[last + 1 :] if not isinstance(block, Note))]
+
+
+def _cut(block: Block, lines: Mapping[str, str]) -> Block:
+    return replace(block, text=lines[block.text]) if isinstance(block, Note) else block
 
 
 class Page(NamedTuple):
@@ -55,6 +79,10 @@ class Page(NamedTuple):
         broken = (wrap(part, self.width, break_long_words=False, break_on_hyphens=False) for part in text.split("\n"))
         return "".join(f"{line}\n" for lines in broken for line in lines or [""])
 
+    def line(self, text: str) -> str:
+        """As much of a note as fits in a line of the page."""
+        return text if self.width is None else shorten(text, max(self.width - len(NOTE), 1), placeholder=" …")
+
     def title(self, text: str) -> str:
         """A heading or a caption."""
         return f"\033[1m{self.lines(text)}\033[0m" if self.bold else self.lines(text)
@@ -62,10 +90,12 @@ class Page(NamedTuple):
 
 def _render(block: Block, page: Page) -> str:
     match block:
+        case Paragraph(text, "warning"):
+            return page.title(f"{WARNING}: {text}")
         case Paragraph(text):
             return page.lines(text)
         case Note(text):
-            return page.lines(f"note: {text}")
+            return page.lines(f"{NOTE}{text}")
         case Heading(text):
             return page.title(text)
         case Bullets(items):
@@ -97,8 +127,9 @@ def _table(table: Table, page: Page) -> str:
         console.print(grid)
     caption = page.title(table.caption) if table.caption else ""
     note = page.lines(table.note) if table.note else ""
-    # rich fills every line to the width of the table.
-    body = "".join(f"{line.rstrip()}\n" for line in paper.getvalue().splitlines())
+    # rich fills every line to the width of the table and begins with an empty one.
+    lines = [line.rstrip() for line in paper.getvalue().splitlines()]
+    body = "".join(f"{line}\n" for line in lines[1 if caption else 0 :])
     return f"{caption}{body}{note}"
 
 
@@ -106,30 +137,56 @@ def fitting_parts(texts: Sequence[Sequence[str]], room: int) -> list[list[tuple[
     """Parts of a table no wider than ``room``, each with the (place, width) of its columns; ``texts``: the cells by column.
 
     A column is never narrower than its longest word and its short cells, such as a value with its error. The first column is in
-    every part. Cells too wide for the room next to it are broken.
+    every part, and its names are broken between words where that saves a part. Cells too wide for the room next to it are broken.
     """
-    from rich.cells import cell_len
+    whole = [max((_length(line) for text in column for line in text.splitlines()), default=1) for column in texts]
+    least = [_least(column) for column in texts]
+    named = [_longest(word for text in texts[0] for word in text.split()), *least[1:]]
+    ways = [_parts(widths, room - FRAME) for widths in (least, named)]
+    widths, parts = min(ways, key=lambda way: len(way[1]))
+    return [
+        list(zip(part, _widths([(widths[place], whole[place]) for place in part], room - FRAME), strict=True))
+        for part in parts
+    ]
 
-    room -= FRAME
-    whole_cells = ([*column[0].split(), *(part for text in column[1:] for part in _pieces(text))] for column in texts)
-    least = [max(map(cell_len, cells), default=1) for cells in whole_cells]
-    whole = [max((cell_len(line) for text in column for line in text.splitlines()), default=1) for column in texts]
-    first = min(least[0], max(room // 2 - PADDING, 1)) if len(texts) > 1 else min(least[0], room - PADDING)
+
+def _parts(least: Sequence[int], room: int) -> tuple[list[int], list[list[int]]]:
+    """Least widths that fit in the room, and the places of the columns of each part."""
+    half = max(room // 2 - PADDING, 1)
+    first = (
+        min(least[0], max(half, room - 2 * PADDING - max(least[1:])))
+        if len(least) > 1
+        else min(least[0], room - PADDING)
+    )
     limit = max(room - first - 2 * PADDING, 1)
-    least = [first, *(min(width, limit) for width in least[1:])]
+    widths = [first, *(min(width, limit) for width in least[1:])]
     parts: list[list[int]] = [[0]]
-    for column in range(1, len(texts)):
-        if sum(least[place] + PADDING for place in [*parts[-1], column]) > room and len(parts[-1]) > 1:
+    for column in range(1, len(least)):
+        if sum(widths[place] + PADDING for place in [*parts[-1], column]) > room and len(parts[-1]) > 1:
             parts.append([0])
         parts[-1].append(column)
-    return [
-        list(zip(part, _widths([(least[place], whole[place]) for place in part], room), strict=True)) for part in parts
-    ]
+    return widths, parts
+
+
+def _least(column: Sequence[str]) -> int:
+    """Width of a column whose heading is broken between words, and of whose cells only long ones are."""
+    return _longest([*column[0].split(), *(piece for text in column[1:] for piece in _pieces(text))])
+
+
+def _longest(pieces: Iterable[str]) -> int:
+    return max(map(_length, pieces), default=1)
+
+
+def _length(text: str) -> int:
+    """Columns that a text takes on a terminal."""
+    from rich.cells import cell_len
+
+    return cell_len(text)
 
 
 def _pieces(text: str) -> list[str]:
     """Pieces of a cell that are never broken."""
-    return text.split() if len(text) > SHORT else [text]
+    return [text] if len(text) <= SHORT or "±" in text else text.split()
 
 
 def _widths(ends: Sequence[tuple[int, int]], room: int) -> list[int]:

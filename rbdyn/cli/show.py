@@ -131,7 +131,7 @@ def _pictures(request: Request, motion: "History") -> dict[str, Callable[[Path],
         "spectra.png": partial(plots.spectra, motion),
         "roller_loads.png": partial(plots.roller_loads, motion),
         "sliding.png": partial(plots.sliding, motion),
-        "power.png": partial(plots.power_by_loss, request.result.power_terms),
+        "power.png": partial(plots.power_by_loss, request.result.power_terms_W),
     }
 
 

@@ -29,7 +29,7 @@ def blocks(result: SimulationResult) -> list[Block]:
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
-        *(_clearances(result.clearance) if result.scene.get("mounting") else ()),
+        *(_clearances(result.clearance_um) if result.scene.get("mounting") else ()),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
         *_further(result),
         *notes(result.notes),
@@ -54,16 +54,25 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":
     """Figures of a run by their words; the contact force only where a film makes it another than the whole force."""
-    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
+    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force_N}
     orbit = result.cage_orbit_radius_share
     return {
-        f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force,
-        **({} if result.impact_contact_force == result.impact_force else contact),
+        f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force_N,
+        **({} if result.impact_contact_force_N == result.impact_force_N else contact),
         "whirl deviation ratio": result.whirl_deviation_ratio,
         **({} if orbit is None else {"radius of the cage's orbit over its radial play": orbit}),
-        "power loss [W]": result.power_loss,
+        "power loss [W]": result.power_loss_W,
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
+        **{words: pulses for words, pulses in _pulses(result).items() if pulses is not None},
+    }
+
+
+def _pulses(result: SimulationResult) -> "dict[str, Quantity | None]":
+    return {
+        "rate of pulses at one pocket [Hz]": result.pulse_rate_hz,
+        "mean height of the pulses [N]": result.pulse_height_N,
+        "mean impulse of the pulses [N s]": result.pulse_impulse_N_s,
     }
 
 
@@ -82,8 +91,8 @@ def _error(error: float | None) -> str:
 
 def _run_sentence(result: SimulationResult) -> str:
     return (
-        f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power "
-        f"balance closes to {100.0 * result.power_gap:.2g} %; {counted(result.replicates, 'replicate')}, seed "
+        f"race loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
+        f"balance closes to {100.0 * result.power_balance['relative_gap']:.2g} %; {counted(result.replicates, 'replicate')}, seed "
         f"{result.seed}; {result.cost['wall_s']:.2f} s{_prediction(result.cost)}, {result.cost['compile_s']:.1f} s to "
         "load or compile"
     )
@@ -133,11 +142,11 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
 
 def _further(result: SimulationResult) -> list[Block]:
     """Full detail: the transient, the losses one by one, the cost."""
-    losses = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
+    losses = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms_W.items()]
     losses += [
-        (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance.items()
+        (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance_W.items()
     ]
-    gap = result.power_gap * result.power_loss.value
+    gap = result.power_balance["relative_gap"] * result.power_loss_W.value
     turns = result.transient_turns
     return [
         Paragraph("" if turns is None else f"transient: {counted(turns, 'shaft turn')}", detail=Detail.ALL),

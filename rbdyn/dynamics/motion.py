@@ -14,7 +14,7 @@ small separation away. Every tenth of a turn its growth is noted, and the separa
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -161,13 +161,15 @@ def history(
     samples_per_turn: int | None = None,
     stop: Stop | None = None,
     notice: Notice = log,
+    overrides: Iterable[str] = (),
 ) -> History:
     """History of one replicate, counted from 0, over the first ``turns`` counted turns.
 
-    ``scene``: also the path of its file; ``notice``: called with a sentence on a long run, as in ``simulate``. Raises
-    RunError, and InputError for another kind of bearing and for impossible turns, replicates or samples.
+    ``scene``: also the path of its file; ``overrides`` of its keys, such as ``["cage.mass_g=50"]``. ``samples_per_turn``: by
+    default that of the scene. ``notice``: called with a sentence on a long run, as in ``simulate``. Raises RunError, and
+    InputError for a faulty scene, another kind of bearing and for impossible turns, replicates or samples.
     """
-    scene = rollers_only(scene)
+    scene = rollers_only(scene, overrides)
     per_turn = scene.numerics.samples_per_turn if samples_per_turn is None else samples_per_turn
     refuse(_request_faults(scene, turns, replicate, per_turn))
     bearing = roller_bearing(scene)

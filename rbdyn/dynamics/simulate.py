@@ -1,6 +1,7 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,14 @@ from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import TIGHT, orbit_radius_share, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import (
+    TIGHT,
+    orbit_radius_share,
+    pulse_figures,
+    pulse_notes,
+    whirl_notes,
+    work_done,
+)
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
@@ -51,6 +59,7 @@ def simulate(
     stop: Stop | None = None,
     target: float | None = None,
     notice: Notice = log,
+    overrides: Iterable[str] = (),
 ) -> SimulationResult:
     """Simulate all replicates of a scene, which may be the path of its file.
 
@@ -59,11 +68,12 @@ def simulate(
     - ``target``: relative error to reach, which chooses tolerance, turns and replicates (``rbdyn.dynamics.target``)
     - ``notice(sentence)`` is called early with the time that the runs still take; by default it is a warning of the logger
       "rbdyn", None for silence
+    - ``overrides``: keys of the scene with other values, such as ``["cage.mass_g=50"]``
 
-    Raises InputError for another kind of bearing and for an impossible target or number of workers. Raises RunError when a
-    replicate cannot go on, KeyboardInterrupt on Ctrl-C.
+    Raises InputError for a faulty scene or override, another kind of bearing, and an impossible target or number of workers.
+    Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
     """
-    scene = rollers_only(scene)
+    scene = rollers_only(scene, overrides)
     if target is not None:
         from rbdyn.dynamics.target import reach
 
@@ -103,23 +113,26 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
+    pulses = pulse_figures(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",
-        impact_force=figures["impact_force_N"],
-        impact_contact_force=figures["impact_contact_force_N"],
+        impact_force_N=figures["impact_force_N"],
+        impact_contact_force_N=figures["impact_contact_force_N"],
         whirl_deviation_ratio=figures["whirl_deviation_ratio"],
-        power_loss=figures["power_loss_W"],
+        power_loss_W=figures["power_loss_W"],
         cage_speed_rpm=figures["cage_speed_rpm"],
         cage_slip=figures["cage_slip"],
-        power_gap=power_gap,
-        power_terms=terms,
-        rolling_resistance={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
-        max_inner_load=inner_load,
-        max_outer_load=outer_load,
-        max_land_load=max(run.largest_load(LAND_LOAD) for run in runs),
+        power_balance={"relative_gap": power_gap},
+        power_terms_W=terms,
+        rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
+        loads={
+            "max_inner_N": inner_load,
+            "max_outer_N": outer_load,
+            "max_land_N": max(run.largest_load(LAND_LOAD) for run in runs),
+        },
         races=races,
-        clearance=clearance_report(scene),
+        clearance_um=clearance_report(scene),
         friction_check=maker,
         impact_window_turns=scene.impact_window_turns,
         transient_turns=ensemble.transient_turns,
@@ -145,6 +158,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *friction_notes(maker),
             *_notes(scene, power_gap),
             *whirl_notes(scene, orbit),
+            *pulse_notes(scene, pulses),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault, tighter),
@@ -153,6 +167,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
+        **pulses,
     )
 
 

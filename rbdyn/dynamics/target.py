@@ -167,7 +167,7 @@ def total_error(figure: Quantity) -> float | None:
 
 def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
     """Figures that a target limits, by name."""
-    figures = (result.impact_force, result.whirl_deviation_ratio, result.power_loss)
+    figures = (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W)
     return dict(zip(AIMED, figures, strict=True))
 
 

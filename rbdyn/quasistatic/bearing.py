@@ -4,7 +4,7 @@ Under inner or half raceway control several equilibria may share a load; ``other
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -57,15 +57,17 @@ SAME = 1e-4
 
 
 def equilibrium(
-    scene: BallScene | Scene | Path | str, start: BallResult | tuple[Solution, ...] | None = None
+    scene: BallScene | Scene | Path | str,
+    start: BallResult | tuple[Solution, ...] | None = None,
+    overrides: Iterable[str] = (),
 ) -> BallResult:
     """Equilibrium of a ball bearing under its load: angles, loads, stiffness, stress and life.
 
-    ``scene``: a scene of balls or the path of its file. ``start``: a result nearby, or the solutions of its rows, to save
-    time. Without an equilibrium the ``status`` of the result states the cause. Raises InputError for another kind of scene
+    ``scene``: a scene of balls or the path of its file; ``overrides`` of its keys, such as ``["operation.axial_load_N=500"]``.
+    ``start``: a result nearby, or the solutions of its rows, to save time. Without an equilibrium the ``status`` of the result states the cause. Raises InputError for another kind of scene
     or a start that does not fit.
     """
-    scene = balls_only(scene)
+    scene = balls_only(scene, overrides)
     starts = _solutions(start, 2 if isinstance(scene, DoubleDeckerScene) else 1)
     if isinstance(scene, DoubleDeckerScene):
         return _double_decker(scene, starts)

@@ -225,7 +225,8 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     ``scene``: resolved input. ``status``: "ok", or the cause of the failure. ``report``: figures of the equilibrium, None
     without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
     equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
-    computed it. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
+    computed it. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
+    ``max_stress_MPa``, and ``inner`` and ``outer`` of a double-decker bearing. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
     loaded result or without an equilibrium. ``ratings``: data of their pressures and lives.
     """
 
@@ -253,6 +254,17 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         if result.is_equilibrium and result.report is None:
             raise KeyError("an equilibrium without its figures")
         return result
+
+    def __getattr__(self, name: str) -> Any:
+        report = self.__dict__.get("report")
+        if report is not None and name in type(report).__dataclass_fields__:
+            return getattr(report, name)
+        status = self.__dict__.get("status", "ok")
+        why = "" if status == "ok" else f"; there is no equilibrium: {status}"
+        raise AttributeError(f"BallResult has no attribute {name!r}{why}")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *({} if self.report is None else type(self.report).__dataclass_fields__)]
 
     @property
     def is_equilibrium(self) -> bool:

@@ -11,7 +11,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -32,7 +32,15 @@ from rbdyn.scene.bearing import (
     section_notes,
     with_bar_stiffness_of_section,
 )
-from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
+from rbdyn.scene.laws import (
+    MOST_FORCES,
+    MOST_SAMPLES,
+    PULSE_SAMPLES_A_PERIOD,
+    SAMPLES_A_PERIOD,
+    Laws,
+    Numerics,
+    with_bar_stiffness_of_cage,
+)
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.notes import catalogue_notes, unit_notes
 from rbdyn.scene.operation import Mounting, Operation, Support, misfits
@@ -168,6 +176,10 @@ class Scene(SceneFile):
         outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
         if cage.guidance != "roller" and not inner < land < outer:
             yield f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; fix it"
+        yield from self._sampling_faults()
+
+    def _sampling_faults(self) -> Iterator[str]:
+        """Faults of samples that the run or memory is too short for."""
         numerics = self.numerics
         if numerics.turns * numerics.samples_per_turn < 2:
             yield f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run"
@@ -183,6 +195,14 @@ class Scene(SceneFile):
                 f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: needs {samples:.3g} samples a replicate, but memory holds "
                 f"{MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
             )
+        forces = self.pulse_samples_per_turn * (numerics.turns + numerics.warm_up_turns) * self.bearing.rollers
+        if forces * (numerics.replicates + numerics.companions) > MOST_FORCES:
+            yield (
+                f"numerics.pulse_bandwidth_hz = {numerics.pulse_bandwidth_hz:g}: needs {forces:.3g} forces a replicate, but "
+                f"memory holds {MOST_FORCES:g} in all; lower it or take fewer turns or replicates"
+            )
+        if self.pulse_samples_per_turn and self.model.pocket == "off":
+            yield "numerics.pulse_threshold_N: no pocket has a force with model.pocket = 'off'; leave out one of them"
 
     def _seizures(self) -> Iterator[str]:
         """Faults of cage clearances that fits, temperature and rotation reduce to the floor of their film."""
@@ -403,6 +423,12 @@ class Scene(SceneFile):
         return 0 if cutoff is None else max(math.ceil(SAMPLES_A_PERIOD * cutoff * self.turn_s), 8)
 
     @property
+    def pulse_samples_per_turn(self) -> int:
+        """Samples of the pocket forces in a shaft turn for the pulses; 0 without pulses."""
+        bandwidth = self.numerics.pulse_bandwidth_hz
+        return 0 if bandwidth is None else max(math.ceil(PULSE_SAMPLES_A_PERIOD * bandwidth * self.turn_s), 8)
+
+    @property
     def impact_window_turns(self) -> float:
         """Window of the largest force: as stated, or the whole run where that is shorter."""
         return min(self.numerics.impact_window_turns, self.numerics.turns)
@@ -412,12 +438,15 @@ class Scene(SceneFile):
         return material_of(getattr(self.materials, part))
 
 
-def scene_of(source: Scene | BallScene | Path | str) -> Scene | BallScene:
-    """The scene itself, or that of a file. Raises InputError for anything else and for the faults of the file."""
+def scene_of(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> Scene | BallScene:
+    """The scene itself, or that of a file, with ``key.path=value`` overrides.
+
+    Raises InputError for anything else, for the faults of the file and for those of the overrides.
+    """
     if isinstance(source, Scene | BallScene):
-        return source
+        return source.overridden(overrides) if overrides else source
     if isinstance(source, str | PathLike):
-        return Scene.load(Path(source))
+        return Scene.load(Path(source), overrides)
     raise InputError(
         [
             f"scene = {one_line(repr(source), LONGEST_NAME)}: must be a Scene or the path of a scene file; Scene.from_dict takes "
@@ -426,17 +455,17 @@ def scene_of(source: Scene | BallScene | Path | str) -> Scene | BallScene:
     )
 
 
-def rollers_only(source: Scene | BallScene | Path | str) -> Scene:
+def rollers_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> Scene:
     """The scene, as ``scene_of``, of a roller bearing. Raises InputError for a ball bearing."""
-    scene = scene_of(source)
+    scene = scene_of(source, overrides)
     if isinstance(scene, Scene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
 
 
-def balls_only(source: Scene | BallScene | Path | str) -> BallScene:
+def balls_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> BallScene:
     """The scene, as ``scene_of``, of a ball bearing. Raises InputError for a roller bearing."""
-    scene = scene_of(source)
+    scene = scene_of(source, overrides)
     if isinstance(scene, BallScene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])

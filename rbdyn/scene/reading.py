@@ -69,6 +69,10 @@ class SceneFile(Consistent, metaclass=Validation):
             put_key(data, key, plain(value), f"changed {key!r}")
         return self.from_dict(data, "changed scene")
 
+    def overridden(self, overrides: Iterable[str]) -> Self:
+        """The scene with ``key.path=value`` overrides, as ``load`` takes them. Raises InputError with all faults at once."""
+        return self.from_dict(self._tables, "scene", overrides)
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy without the cached properties of the original."""
         copy = super().model_copy(update=update, deep=deep)

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
 from doe.workflow.calibration import find_calibration, read_question
-from doe.workflow.rig import cage_speed, read_rig
+from doe.workflow.rig import read_rig
+from doe.workflow.signals import cage_speed
 from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
 

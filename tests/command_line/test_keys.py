@@ -124,7 +124,7 @@ UNITS = {
     "um": """amplitude ball_diameter_errors ball_diameter_spread clearance_change height imbalance inner_interference
         land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
         roller_diameter_errors roller_diameter_spread roller_roughness""",
-    "N": "axial_load dynamic_capacity load lundberg_load preload radial_load rotating_load static_capacity",
+    "N": "axial_load dynamic_capacity load lundberg_load preload pulse_threshold radial_load rotating_load static_capacity",
     "C": "housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature",
     "K": "lower temperature_rise upper",
     "deg": "contact_angle gravity_direction phase tilt_direction",
@@ -133,7 +133,7 @@ UNITS = {
     "m_s": "blend_speed land_restitution_speed pocket_restitution_speed u_m",
     "s_m": "land_damping_alpha pocket_damping_alpha race_damping_alpha",
     "GPa": "bore_modulus elastic_modulus shaft_modulus",
-    "hz": "whirl_cutoff whirl_notches",
+    "hz": "pulse_bandwidth whirl_cutoff whirl_notches", "ms": "pulse_dead_time",
     "N_m": "pocket_bar_stiffness stiffness",
     "kg": "inner_ring_mass outer_ring_mass",
     "turns": "discard impact_window",

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from conftest import EXAMPLE, ROOT
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from instant_runs import instant_result, instantly
 from short_studies import short_study
 
@@ -124,3 +126,35 @@ def test_columns_fill_the_room_and_only_what_has_none_is_broken(room):
         assert all(width >= max(map(len, header[place].split())) for place, width in part)
     assert fitting_parts([("x" * 300, "1"), ("y" * 300, "2")], room)[0][1][1] < room
     assert fitting_parts([("only",)], room) == [[(0, 4)]]
+
+
+@st.composite
+def tables(draw) -> tuple[int, Table]:
+    """A width and a table whose headings have words of less than half of it."""
+    width = draw(st.sampled_from((40, 60, 80, 100)))
+    words = st.text("abcdefgh", min_size=1, max_size=width // 2 - 4)
+    columns = draw(st.integers(1, 7))
+    heads = st.lists(words, min_size=1, max_size=3).map(" ".join)
+    cells = st.one_of(st.just(""), st.just("11.62 ± 0.71 % less"), st.lists(words, max_size=6).map(" ".join))
+    rows = st.lists(cells, min_size=columns, max_size=columns)
+    return width, Table(
+        "", draw(st.lists(heads, min_size=columns, max_size=columns)), draw(st.lists(rows, min_size=1, max_size=3))
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(tables())
+def test_random_tables_never_break_a_word_of_a_heading(case):
+    """Property: at 40 to 100 columns every word of every heading stands whole, and no line is wider than the page."""
+    width, table = case
+    lines = terminal.text([table], width=width).splitlines()
+    assert {word for name in table.header for word in name.split()} <= {word for line in lines for word in line.split()}
+    assert max(map(len, lines)) <= width
+
+
+def test_a_value_with_its_error_is_one_line_at_80_columns():
+    """Unit: names of rows give way first, so that a change is not folded and the table is not continued below."""
+    change = "231.4685 ± 0.0079 % less"
+    rows = [("whirl deviation ratio", "231.4685 ± 0.0079", "231.4685 ± 0.0079", change)]
+    text = terminal.text([Table("", ("response", "baseline", "pick", "change"), rows)], width=80)
+    assert change in text and text.count("response") == 1 and "whirl deviation ratio" not in text

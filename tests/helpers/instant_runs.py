@@ -25,17 +25,17 @@ def instant_result(scene: Scene) -> SimulationResult:
     figures = {
         name: Quantity(base * scale, 0.01 * base * scale, None, 10.0, 9)
         for name, scale in (
-            ("impact_force", 1.0),
-            ("impact_contact_force", 1.0),
+            ("impact_force_N", 1.0),
+            ("impact_contact_force_N", 1.0),
             ("whirl_deviation_ratio", 0.01),
-            ("power_loss", 3.0),
+            ("power_loss_W", 3.0),
             ("cage_speed_rpm", 200.0),
             ("cage_slip", 0.001),
         )
     }
     return SimulationResult(
-        status="ok", **figures, power_gap=0.0, power_terms={}, rolling_resistance={}, max_inner_load=1.0, max_outer_load=1.0,
-        max_land_load=1.0, races={}, clearance={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
+        status="ok", **figures, power_balance={"relative_gap": 0.0}, power_terms_W={}, rolling_resistance_W={},
+        loads={"max_inner_N": 1.0, "max_outer_N": 1.0, "max_land_N": 1.0}, races={}, clearance_um={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
         replicates=scene.numerics.replicates, seed=seed, notes=(), versions=versions(),
         scene=scene.model_dump(mode="json"),
     )  # fmt: skip

@@ -60,13 +60,13 @@ def test_trend_outer_land_brakes_and_inner_land_drives(evaluate):
 
 def test_trend_wider_pockets_strike_harder():
     """Trend: a roller that may run further ahead or behind meets its pocket wall faster."""
-    assert_rises([result(f"cage.pocket_clearance_mm={mm}").impact_force for mm in (0.2, 0.3, 0.4)])
+    assert_rises([result(f"cage.pocket_clearance_mm={mm}").impact_force_N for mm in (0.2, 0.3, 0.4)])
 
 
 def test_trend_power_rises_with_viscosity_and_speed():
     """Trend: films shear."""
-    assert_rises([result(f"lubricant.temperature_C={celsius}").power_loss for celsius in (120, 100, 80)])
-    assert_rises([result(f"operation.inner_speed_rpm={n}").power_loss for n in (6000, 12000, 24000)])
+    assert_rises([result(f"lubricant.temperature_C={celsius}").power_loss_W for celsius in (120, 100, 80)])
+    assert_rises([result(f"operation.inner_speed_rpm={n}").power_loss_W for n in (6000, 12000, 24000)])
 
 
 def loaded_share(clearance_mm, replicate):
@@ -88,7 +88,7 @@ def test_trend_load_zone_widens_as_clearance_shrinks():
 def test_trend_power_loss_falls_with_guide_clearance():
     """Trend: the loss falls as the guide clearance grows, for a film shears less."""
     long = ("numerics.turns=40", "numerics.replicates=8")
-    assert_rises([result(*long, f"cage.guide_clearance_mm={mm}").power_loss for mm in (0.23, 0.15, 0.1, 0.066)])
+    assert_rises([result(*long, f"cage.guide_clearance_mm={mm}").power_loss_W for mm in (0.23, 0.15, 0.1, 0.066)])
 
 
 def test_trend_cage_never_outruns_rolling():

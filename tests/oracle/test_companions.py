@@ -164,8 +164,8 @@ def test_oracle_numerical_error_of_a_slow_bearing(make_scene):
         "numerics.replicates=16",
         "numerics.impact_window_turns=10",
     )
-    stated = simulate(make_scene(*SLOW, *length, "numerics.companion=true")).power_loss
-    truth = simulate(make_scene(*SLOW, *length, "numerics.rtol=1e-6")).power_loss
+    stated = simulate(make_scene(*SLOW, *length, "numerics.companion=true")).power_loss_W
+    truth = simulate(make_scene(*SLOW, *length, "numerics.rtol=1e-6")).power_loss_W
     bias = stated.value - truth.value
     noise = math.hypot(stated.statistical_error, truth.statistical_error)
     assert abs(bias) > 2.0 * noise, "stability no longer holds the steps: look for another scene"

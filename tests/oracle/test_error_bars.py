@@ -108,7 +108,7 @@ def test_invariant_power_gap_is_the_bias_of_the_loss(outer):
 
     def at(rtol):
         numerics = outer.numerics.model_copy(update={**numbers, "rtol": rtol})
-        return simulate(outer.model_copy(update={"numerics": numerics})).power_loss
+        return simulate(outer.model_copy(update={"numerics": numerics})).power_loss_W
 
     exact = at(1e-3)
     for rtol in (0.1, 0.03):
@@ -153,7 +153,7 @@ def test_literature_transient_of_the_bearing(outer):
     assert 5.0 <= auto.transient_turns <= 40.0
     assert not any("numerics.discard_turns" in note for note in auto.notes)
     # The start has no impacts and little loss.
-    assert auto.power_loss.value > short.power_loss.value
+    assert auto.power_loss_W.value > short.power_loss_W.value
 
 
 def test_unit_notes_name_the_figure_and_the_mend(outer):
@@ -204,7 +204,7 @@ def test_unit_target_learns_from_a_run(outer, outer_result):
     """Unit: the scatter of a run takes the place of the pilots'."""
     plan = choose(MODEL, outer, 0.02)
     known = learned(MODEL, outer, plan, outer_result)
-    figure = outer_result.power_loss
+    figure = outer_result.power_loss_W
     expected = figure.statistical_error / figure.value * math.sqrt(plan.turns * plan.replicates) / 1.96
     assert known.scatter["power_loss_W"] == pytest.approx(expected)
 
@@ -231,7 +231,7 @@ def test_run_to_a_target(outer):
     result = simulate(scene, target=0.1)
     told = result.target
     assert told["met"] and told["asked"] == 0.1
-    for figure in (result.impact_force, result.whirl_deviation_ratio, result.power_loss):
+    for figure in (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W):
         assert figure.error <= 0.1 * figure.value
     assert told["chosen"]["replicates"] == result.replicates
     assert 0 < told["cost"]["pilot_rhs_evaluations"] < told["cost"]["rhs_evaluations"]

@@ -75,11 +75,13 @@ def test_invariant_a_concentric_unloaded_bearing_is_driven_by_films(make_scene):
         "operation.inner_speed_rpm=4000.0", "numerics.discard_turns=20",
     )  # fmt: skip
     driven = simulate(make_scene(*unloaded, "model.open_contact_film=true"), workers=1)
-    assert driven.power_gap < 1e-4
-    assert driven.rolling_resistance["inner"] > 0.0
-    assert sum(driven.rolling_resistance.values()) == pytest.approx(driven.power_terms["rolling_resistance"], rel=1e-12)
+    assert driven.power_balance["relative_gap"] < 1e-4
+    assert driven.rolling_resistance_W["inner"] > 0.0
+    assert sum(driven.rolling_resistance_W.values()) == pytest.approx(
+        driven.power_terms_W["rolling_resistance"], rel=1e-12
+    )
     alone = simulate(make_scene(*unloaded), workers=1)
-    assert alone.rolling_resistance["inner"] == alone.power_terms["inner_race_traction"] == 0.0
+    assert alone.rolling_resistance_W["inner"] == alone.power_terms_W["inner_race_traction"] == 0.0
     assert driven.cage_slip.value < alone.cage_slip.value - 0.02
 
 

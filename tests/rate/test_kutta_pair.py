@@ -129,7 +129,7 @@ def test_invariant_power_balance(make_scene):
 
 def test_oracle_statistics_of_the_other_pair(results):
     """Oracle: figures agree within their errors (1.5 of both together), for fewer right-hand sides."""
-    for name in ("impact_force", "whirl_deviation_ratio", "power_loss", "cage_slip"):
+    for name in ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_slip"):
         one, other = (getattr(result, name) for result in results.values())
         error = np.hypot(one.statistical_error, other.statistical_error)
         assert abs(one.value - other.value) < 1.5 * error, name
@@ -146,7 +146,7 @@ def test_unit_stiffness_is_seen_by_either(results):
 def test_invariant_workers_change_nothing(make_scene):
     """Invariant: the same bits whatever the number of workers."""
     one, two = (simulate(make_scene(RK43), workers=workers) for workers in (1, 2))
-    assert one.impact_force == two.impact_force and one.power_loss == two.power_loss
+    assert one.impact_force_N == two.impact_force_N and one.power_loss_W == two.power_loss_W
 
 
 def test_unit_peak_is_never_below_a_step_end(make_scene):

@@ -111,3 +111,26 @@ def test_a_terminal_breaks_sentences_between_words():
     lines = terminal.text([Paragraph(sentence)], width=40).splitlines()
     assert max(map(len, lines)) <= 40 and " ".join(lines) == sentence
     assert terminal.text([Paragraph(sentence)]) == f"{sentence}\n"
+
+
+def test_bad_news_has_a_word_and_a_class_of_its_own():
+    """Unit: a warning begins with that word in all renderings, and no class of good news is on it."""
+    block = Paragraph("LIMIT BROKEN at the pick: power loss <= 250.", "warning")
+    written = page.render(block)
+    assert 'class="warning"' in written and "Warning:" in written and "statement" not in written
+    assert markdown.text([block]).startswith("**Warning: LIMIT BROKEN")
+    assert terminal.text([block]).startswith("Warning: LIMIT BROKEN")
+    assert terminal.text([block], width=80, bold=True).startswith("\033[1mWarning: ")
+
+
+def test_a_screen_has_five_notes_of_a_line_each_and_says_where_the_others_are():
+    """Unit: below full detail the first five, cut at the width; a file has them whole; at full detail all."""
+    tree = [Paragraph("before"), *(Note(f"{number}: {'word ' * 30}end") for number in range(8)), Paragraph("after")]
+    lines = terminal.text(tree, width=80).splitlines()
+    assert [line[:7] for line in lines[1:6]] == [f"note: {number}" for number in range(5)]
+    assert all(len(line) <= 80 and line.endswith("…") for line in lines[1:6])
+    assert lines[6].startswith("3 more notes in the report") and lines[7:] == ["after"]
+    whole = terminal.text(tree)
+    assert whole.count("end\n") == 5 and "3 more notes in the report" in whole
+    assert terminal.text(tree, Detail.ALL, 80).count("end") == 8
+    assert "more note" not in terminal.text(tree[:6]) and "in full" in terminal.text(tree[:3], width=80)

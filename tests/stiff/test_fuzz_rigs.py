@@ -17,10 +17,12 @@ from mutations import EXTREMES, mutated, outcome
 
 from doe.study_file.study import study_of_table
 from doe.workflow.input_sets import read_sample
-from doe.workflow.rig import OUTPUTS, Mean, Rig, cage_speed, read_rig, whirl
+from doe.workflow.rig import OUTPUTS, PULSE_OUTPUTS, Rig, read_rig
 from doe.workflow.runs import read_runs
+from doe.workflow.signals import Mean, cage_speed, whirl
 from rbdyn.scene.uncertain import Law
 
+PULSE_COLUMNS = {"threshold_N": "numerics.pulse_threshold_N", "bandwidth_hz": "numerics.pulse_bandwidth_hz"}
 # What a hand or another program writes for a number.
 SLIPS = ["", " ", "nan", "inf", "-1", "0", "-0", "1e400", "-1e-300", "1e13", "1e-13", "5000", "2", "0x10", "1_000", "１２", "3,5", "25O",
          "2024-01-01", "10:30", "true", "False", "yes", "no", "hold", "1.", ".5", "+7", "1e3", "9" * 399, "9" * 401, "9" * 5000, "1e-9",
@@ -85,7 +87,8 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
     keys = draw.sample(list(KEYS), draw.randrange(1, 5))
     outputs = draw.sample(OUTPUTS, draw.randrange(1, 4))
     signal = ["signal_file", "signal_kind"] if "cage_speed_rpm" not in outputs and draw.random() < 0.4 else []
-    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal]
+    pulses = ["threshold_N", "bandwidth_hz"] if not set(outputs).isdisjoint(PULSE_OUTPUTS) else []
+    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal, *pulses]
     rows = [header]
     for _ in range(draw.randrange(3, 9)):
         measured = [f"{draw.lognormvariate(3.0, 2.0):.{draw.randrange(1, 17)}g}" for _ in outputs]
@@ -93,7 +96,15 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
         turns = draw.choice(["40", "1e3"]) if "" in sds else ""
         raw = draw.choice([["", ""], ["signal.csv", "cage_speed"]]) if signal else []
         rows.append(
-            [*(draw.choice(KEYS[key]) for key in keys), *measured, *sds, turns, draw.choice(["", "0", "no"]), *raw]
+            [
+                *(draw.choice(KEYS[key]) for key in keys),
+                *measured,
+                *sds,
+                turns,
+                draw.choice(["", "0", "no"]),
+                *raw,
+                *("20", "5e3")[: len(pulses)],
+            ]
         )
     return rows
 
@@ -116,6 +127,8 @@ def check_rig(data: bytes, rig: Rig) -> None:
                 assert row.turns == float(text) or (blank and row.turns is None)
             elif name == "hold":
                 assert row.hold == (text.lower() in ("1", "yes", "true"))
+            elif name in PULSE_COLUMNS:
+                assert row.keys[PULSE_COLUMNS[name]] == float(text)
             elif name == "signal_kind":
                 assert "cage_speed_rpm" in row.values and texts["signal_file"]
             else:

@@ -72,9 +72,9 @@ def ending(assignments):
     except RunError as error:
         assert len(str(error)) > 40 and "\n" not in str(error)
         return "stopped", 0.0, ()
-    figures = (result.impact_force, result.whirl_deviation_ratio, result.power_loss, result.cage_speed_rpm)
+    figures = (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W, result.cage_speed_rpm)
     assert all(math.isfinite(figure.value) for figure in figures)
-    return "done", result.power_gap, result.notes
+    return "done", result.power_balance["relative_gap"], result.notes
 
 
 @pytest.mark.slow

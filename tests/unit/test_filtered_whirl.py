@@ -10,7 +10,8 @@ from scipy.special import ellipe
 
 from doe.workflow.calibration import cases_of
 from doe.workflow.input_sets import case_of
-from doe.workflow.rig import read_rig, whirl
+from doe.workflow.rig import read_rig
+from doe.workflow.signals import whirl
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion import history

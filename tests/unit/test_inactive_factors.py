@@ -91,7 +91,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
         found, off = plain(scene), scene.cage.guidance == "roller"
         assert not off or scene.cage.guide_clearance_mm == 0.15
         share = 0.3 if off else 1.0
-        return replace(found, impact_force=replace(found.impact_force, value=share * found.impact_force.value))
+        return replace(found, impact_force_N=replace(found.impact_force_N, value=share * found.impact_force_N.value))
 
     monkeypatch.setattr(instant_runs, "instant_result", result)
     unillustrated(monkeypatch.setattr)

@@ -17,7 +17,7 @@ def results(outer, outer_result):
     """Each kind of result, and what its table must tell: words, value with its error, unit."""
     ball = rbdyn.equilibrium(rbdyn.Scene.load(EXAMPLES / "deep_groove_ball.toml"))
     motion = history(outer, 1.0)
-    loss, stress = outer_result.power_loss, ball.report.max_stress_MPa["inner"]
+    loss, stress = outer_result.power_loss_W, ball.report.max_stress_MPa["inner"]
     return {
         "simulation": (outer_result, f"power loss {loss.value:.1f}"[:12], "W"),
         "ball": (ball, f"pressure, inner race {stress:.4f}"[:24], "MPa"),
@@ -43,8 +43,8 @@ def test_unit_errors_stand_beside_the_figures(outer_result):
     """Unit: value and stated error to the error's two digits."""
     rows = dict(re.findall(r'left">([^<]*)</th><td>([^<]*)</td>', outer_result._repr_html_()))
     value, error = (float(part) for part in rows["power loss"].split(" ± "))
-    assert error == pytest.approx(outer_result.power_loss.error, rel=0.06)
-    assert value == pytest.approx(outer_result.power_loss.value, abs=0.06 * error)
+    assert error == pytest.approx(outer_result.power_loss_W.error, rel=0.06)
+    assert value == pytest.approx(outer_result.power_loss_W.value, abs=0.06 * error)
     assert set(rows) >= {"impact force", "whirl deviation ratio", "cage speed", "cage slip"}
 
 

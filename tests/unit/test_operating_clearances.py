@@ -276,8 +276,8 @@ def test_unit_the_report_of_a_run_states_every_share():
         assert play["operating"] == pytest.approx(sum(play.values()) - play["operating"])
     assert report["radial"]["operating"] == pytest.approx(report["operating"])
     assert clearance_report(mounted.changed({"cage.guidance": "roller"}))["guide"] is None
-    kept = replace(instant_result(mounted), clearance=report)
-    assert type(kept).from_dict(kept.as_dict()).clearance == report == kept.as_dict()["clearance_um"]
+    kept = replace(instant_result(mounted), clearance_um=report)
+    assert type(kept).from_dict(kept.as_dict()).clearance_um == report == kept.as_dict()["clearance_um"]
 
 
 def test_unit_ranges_of_the_cage_in_operation():

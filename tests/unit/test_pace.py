@@ -106,7 +106,7 @@ def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)
     assert "shaft turns in all remain" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
-    assert (again.impact_force, again.power_loss) == (plain.impact_force, plain.power_loss)
+    assert (again.impact_force_N, again.power_loss_W) == (plain.impact_force_N, plain.power_loss_W)
     assert 0.0 < again.cost["predicted_least_s"] <= again.cost["predicted_most_s"]
 
 

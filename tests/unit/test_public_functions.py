@@ -31,8 +31,8 @@ def short_file(tmp_path_factory):
 def test_unit_public_functions_take_the_path_of_a_scene(short_file):
     """Unit: simulate, history and equilibrium of a path, as text or not, are those of the scene that it holds."""
     scene = rbdyn.Scene.load(short_file)
-    whole = rbdyn.simulate(scene).power_loss
-    assert rbdyn.simulate(str(short_file)).power_loss == whole == rbdyn.simulate(short_file).power_loss
+    whole = rbdyn.simulate(scene).power_loss_W
+    assert rbdyn.simulate(str(short_file)).power_loss_W == whole == rbdyn.simulate(short_file).power_loss_W
     motion = rbdyn.history(scene, 0.1)
     for given in (short_file, str(short_file)):
         assert np.array_equal(rbdyn.history(given, np.float64(0.1), np.int64(0)).cage_x, motion.cage_x)

@@ -281,7 +281,7 @@ def test_unit_method_and_cage_tolerance(outer):
 
 def test_unit_coverage_counts(outer_result):
     """Unit: shares, widths and offsets of hand-made results, and what is concluded from them."""
-    names = ("impact_force", "impact_contact_force", "whirl_deviation_ratio", "power_loss", "cage_speed_rpm")
+    names = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 
     def result(value, statistical, numerical):
         figures = {name: Quantity(value, statistical, numerical, 9.0) for name in names}
@@ -354,7 +354,7 @@ def test_oracle_a_slow_regime_is_held(outer):
     held = [
         abs(ours.value - exact.value) <= math.hypot(ours.error, exact.statistical_error)
         for result in (run(**numbers, seed=seed) for seed in range(1, 11))
-        for ours, exact in ((result.impact_force, truth.impact_force), (result.power_loss, truth.power_loss))
+        for ours, exact in ((result.impact_force_N, truth.impact_force_N), (result.power_loss_W, truth.power_loss_W))
     ]
     # Of 20 intervals at 95 % fewer than 17 hold by chance in 2 of 100 cases.
     assert sum(held) >= 17

@@ -66,31 +66,31 @@ def test_unit_seeds_differ(outer, outer_result):
     """Unit: another seed is another sample, and says so."""
     other = simulate(changed(outer, seed=2))
     assert other.seed == 2
-    assert other.impact_force.value != outer_result.impact_force.value
-    assert other.power_loss.value != outer_result.power_loss.value
+    assert other.impact_force_N.value != outer_result.impact_force_N.value
+    assert other.power_loss_W.value != outer_result.power_loss_W.value
 
 
 def test_unit_replicates_are_independent_of_their_number(outer, outer_result):
     """Unit: the first replicate alone has a statistical error from its batches, and says that these are few."""
     one = simulate(changed(outer, replicates=1))
-    assert one.power_loss.statistical_error > 0.0
-    assert one.power_loss.effective_samples <= 4.0
+    assert one.power_loss_W.statistical_error > 0.0
+    assert one.power_loss_W.effective_samples <= 4.0
     assert any("fewer than 10 effective samples" in note for note in one.notes)
     window = simulate(changed(outer, replicates=1, impact_window_turns=4.0))
     assert window.as_dict()["impact_force_N"]["statistical_error"] is None
     # Two values a, b: mean of both lies half way between.
-    assert outer_result.power_loss.value != one.power_loss.value
-    assert outer_result.power_loss.statistical_error is not None
+    assert outer_result.power_loss_W.value != one.power_loss_W.value
+    assert outer_result.power_loss_W.statistical_error is not None
 
 
 def test_unit_companions_give_a_numerical_error(outer, outer_result):
     """Unit: with companions there is a numerical error, and the values stay those of the asked tolerance."""
     both = simulate(changed(outer, companion=True))
-    assert both.power_loss.value == outer_result.power_loss.value
-    assert both.impact_force.numerical_error > 0.0
-    assert outer_result.impact_force.numerical_error is None
+    assert both.power_loss_W.value == outer_result.power_loss_W.value
+    assert both.impact_force_N.numerical_error > 0.0
+    assert outer_result.impact_force_N.numerical_error is None
     # Of the loss the power balance tells a part without companions.
-    assert both.power_loss.numerical_error > outer_result.power_loss.numerical_error > 0.0
+    assert both.power_loss_W.numerical_error > outer_result.power_loss_W.numerical_error > 0.0
     # A quarter of the replicates, at least one.
     assert both.cost["turns"] == outer_result.cost["turns"] + 4 + 2
 
@@ -107,7 +107,7 @@ def test_unit_a_failing_companion_leaves_the_figures(outer, outer_result, monkey
 
     monkeypatch.setattr(module, "Run", Failing)
     alone = simulate(changed(outer, companion=True))
-    assert alone.impact_force == outer_result.impact_force
+    assert alone.impact_force_N == outer_result.impact_force_N
     assert any("not estimated" in note and "replicate 1 stopped" in note for note in alone.notes)
 
 
@@ -139,15 +139,15 @@ def test_unit_json_keys_and_values(outer_result):
 
 def test_unit_figures_of_the_shared_scene(outer_result):
     """Unit: figures are those of 48 seeds of this scene (24 either way round), within five of their standard deviations."""
-    assert outer_result.impact_force.value == pytest.approx(93.0, abs=5.0 * 1.5)
+    assert outer_result.impact_force_N.value == pytest.approx(93.0, abs=5.0 * 1.5)
     # Without a film the contact is all there is on a wall.
-    assert outer_result.impact_contact_force == outer_result.impact_force
-    assert outer_result.power_loss.value == pytest.approx(238.07, abs=5.0 * 0.18)
+    assert outer_result.impact_contact_force_N == outer_result.impact_force_N
+    assert outer_result.power_loss_W.value == pytest.approx(238.07, abs=5.0 * 0.18)
     assert outer_result.cage_slip.value == pytest.approx(0.011614, abs=5.0 * 2e-5)
-    assert outer_result.power_gap < 1e-5
-    assert outer_result.max_inner_load == pytest.approx(725.0, abs=5.0 * 4.1)
+    assert outer_result.power_balance["relative_gap"] < 1e-5
+    assert outer_result.loads["max_inner_N"] == pytest.approx(725.0, abs=5.0 * 4.1)
     # The centrifugal force of a roller.
-    assert outer_result.max_outer_load - outer_result.max_inner_load == pytest.approx(54.0, abs=0.3)
+    assert outer_result.loads["max_outer_N"] - outer_result.loads["max_inner_N"] == pytest.approx(54.0, abs=0.3)
 
 
 def test_unit_saved_result_comes_back(outer_result, tmp_path):
@@ -183,17 +183,17 @@ def test_unit_impact_windows(outer, outer_result):
     long = simulate(changed(outer, impact_window_turns=100.0))
     short = simulate(changed(outer, impact_window_turns=1.0))
     assert long.impact_window_turns == 4.0
-    assert short.impact_force.value < outer_result.impact_force.value < long.impact_force.value
+    assert short.impact_force_N.value < outer_result.impact_force_N.value < long.impact_force_N.value
     # Steps end at the window's ends, so paths differ by round-off and then by chaos: figures of a kind, not bits.
-    assert short.power_loss.value == pytest.approx(outer_result.power_loss.value, abs=5.0 * 0.25)
+    assert short.power_loss_W.value == pytest.approx(outer_result.power_loss_W.value, abs=5.0 * 0.25)
 
 
 def test_unit_everything_off_loses_nothing(conservative):
     """Unit: with every law off each power is exactly zero, and so is the shaft's."""
     result = simulate(changed(conservative, replicates=1))
-    assert set(result.power_terms.values()) == {0.0}
-    assert result.power_loss.value == 0.0
-    assert result.impact_force.value > 0.0
+    assert set(result.power_terms_W.values()) == {0.0}
+    assert result.power_loss_W.value == 0.0
+    assert result.impact_force_N.value > 0.0
 
 
 def test_invariant_guidance_brakes_or_drives(outer, inner, outer_result, evaluate):
@@ -218,7 +218,7 @@ def test_invariant_reversed_shaft(outer, outer_result):
     # Other starts, four turns: within five standard deviations over 24 seeds, of both.
     assert turned.cage_speed_rpm.value == pytest.approx(-outer_result.cage_speed_rpm.value, abs=5.0 * 0.25)
     assert turned.cage_slip.value == pytest.approx(outer_result.cage_slip.value, abs=5.0 * 2.6e-5)
-    assert turned.power_loss.value == pytest.approx(outer_result.power_loss.value, abs=5.0 * 0.25)
+    assert turned.power_loss_W.value == pytest.approx(outer_result.power_loss_W.value, abs=5.0 * 0.25)
 
 
 @pytest.fixture(scope="module")

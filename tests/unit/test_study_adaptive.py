@@ -231,7 +231,7 @@ def guided(monkeypatch):
     def result(scene):
         found = plain(scene)
         share = (0.5 if scene.cage.guidance == "inner" else 1.0) * (1.2 - 0.02 * scene.bearing.rollers)
-        return replace(found, impact_force=replace(found.impact_force, value=share * found.impact_force.value))
+        return replace(found, impact_force_N=replace(found.impact_force_N, value=share * found.impact_force_N.value))
 
     monkeypatch.setattr(instant_runs, "instant_result", result)
 

@@ -1,0 +1,290 @@
+"""Impact pulses: synthetic trains by closed forms, a simulated force read back as a rig's signal, and bad signals."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from doe.cli import app
+from doe.workflow.rig import PULSE_OUTPUTS, read_rig
+from doe.workflow.signals import PulseSetting, impact_pulses
+from rbdyn.base.faults import InputError
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.motion import history
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import record
+from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics.pulses import Pulses, low_passed, pulse_sums, pulses_of, without_echoes
+from rbdyn.scene import Scene
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
+RATE, BANDWIDTH, THRESHOLD = 200_000.0, 10_000.0, 10.0
+
+
+def half_sines(starts: Any, heights: Any, width: float, seconds: float, rate: float = RATE) -> tuple[Any, Any]:
+    """Times, and a force that is zero but for half sines of a width [s] from ``starts`` [s] on."""
+    time = np.arange(round(seconds * rate)) / rate
+    force = np.zeros(time.size)
+    for start, height in zip(starts, heights, strict=True):
+        first, last = np.searchsorted(time, [start, start + width])
+        force[first:last] = height * np.sin(np.pi * (time[first:last] - start) / width)
+    return time, force
+
+
+def written(folder: Path, *columns: Any, header: str = "t_s,force_N", name: str = "trace.csv") -> Path:
+    """A file of a signal."""
+    np.savetxt(folder / name, np.column_stack(columns), "%.9g", ",", header=header, comments="")
+    return folder / name
+
+
+def test_long_pulses_keep_height_impulse_and_time() -> None:
+    """Half sines of 1 ms below 10 kHz lose 1 - pi^2 s^2/(2 w^2) of their height, s the spread of the filter."""
+    width, starts, heights = 1e-3, np.array([0.01, 0.02, 0.031]), np.array([50.0, 80.0, 30.0])
+    _, force = half_sines(starts, heights, width, 0.05)
+    pulses = pulses_of(low_passed(force, RATE, BANDWIDTH), RATE, 1.0, 0.0)
+    spread = np.sqrt(np.log(2.0)) / (2.0 * np.pi * BANDWIDTH)
+    assert pulses.height == pytest.approx(heights * np.exp(-0.5 * (np.pi * spread / width) ** 2), rel=1e-4)
+    assert pulses.time == pytest.approx(starts + 0.5 * width, abs=0.2 / RATE)
+    assert pulses.impulse == pytest.approx(2.0 * heights * width / np.pi, rel=2e-3)
+
+
+@pytest.mark.parametrize("rate", [100_000.0, RATE, 1_000_000.0])
+def test_short_pulses_get_the_height_of_their_impulse(rate: float) -> None:
+    """A pulse far shorter than the bandwidth has the height J f sqrt(2 pi/ln 2), whatever its own height."""
+    impulse = 4e-3
+    force = np.zeros(round(0.01 * rate))
+    force[len(force) // 2] = impulse * rate
+    pulses = pulses_of(low_passed(force, rate, BANDWIDTH), rate, 1e-3, 0.0)
+    assert pulses.height == pytest.approx([impulse * BANDWIDTH * np.sqrt(2.0 * np.pi / np.log(2.0))], rel=2e-3)
+    assert pulses.impulse == pytest.approx([impulse], rel=2e-3)
+
+
+def test_too_few_samples_underestimate_a_height() -> None:
+    """Samples at twice the width of unfiltered half sines see at most their share, on average 1/pi of the height."""
+    starts = np.arange(1, 400) * 1.2345e-3
+    _, force = half_sines(starts, np.full(399, 60.0), 1e-4, 0.5, 5_000.0)
+    sizes = force[(starts * 5_000.0).astype(int) + 1]
+    assert sizes.mean() == pytest.approx(60.0 / np.pi, rel=0.1)
+
+
+def test_unit_a_pulse_at_an_end_is_left_out_and_both_signs_count() -> None:
+    """Unit: stretches that the record cuts have no height of their own."""
+    force = np.array([20.0, 20.0, 0.0, -5.0, -30.0, -5.0, 0.0, 12.0, 0.0, 40.0])
+    pulses = pulses_of(force, 1.0, 10.0, 0.0)
+    assert pulses.time.tolist() == [4.0, 7.0]
+    # On straight lines from crossing to crossing: two pieces of 0.8 from 10 to 30, and of 2/12 from 10 to 12.
+    assert pulses.impulse == pytest.approx([2 * 0.8 * 20.0, 2 * (2.0 / 12.0) * 11.0])
+    assert pulses_of(np.full(9, 50.0), 1.0, 10.0, 0.0).time.size == 0
+    assert pulses_of(np.zeros(9), 1.0, 10.0, 0.0).time.size == 0
+
+
+def test_unit_the_dead_time_joins_echoes() -> None:
+    """Unit: it starts at a pulse and is not prolonged by those within it."""
+    pulses = Pulses(np.array([0.0, 0.6, 1.1, 1.5, 4.0]), np.array([3.0, 9.0, 4.0, 2.0, 1.0]), np.full(5, 0.5))
+    joined = without_echoes(pulses, 1.0)
+    assert joined.time.tolist() == [0.0, 1.1, 4.0]
+    assert joined.height.tolist() == [9.0, 4.0, 1.0] and joined.impulse.tolist() == [1.0, 1.0, 0.5]
+    assert without_echoes(pulses, 0.0) is pulses
+    sums = pulse_sums(pulses, np.array([1.0, 2.0, 3.0, 4.0]))
+    assert sums[:, 0].tolist() == [2.0, 2.0, 0.0, 1.0] and sums[:, 1].tolist() == [12.0, 6.0, 0.0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def train() -> tuple[Any, Any, Any]:
+    """A trace of 300 half sines of 0.4 ms at random, with heights and the noise of a sensor."""
+    random = np.random.default_rng(3)
+    starts = np.cumsum(random.uniform(1e-3, 3e-3, 300))
+    heights = random.uniform(20.0, 100.0, 300)
+    time, force = half_sines(starts, heights, 4e-4, float(starts[-1]) + 2e-3, 100_000.0)
+    return time, force + 0.5 * random.standard_normal(force.size), heights
+
+
+@pytest.mark.parametrize("kind", ["impact_force", "impact_acceleration", "impact_pulses"])
+def test_a_train_of_pulses_is_recovered_within_its_error(tmp_path: Path, train: Any, kind: str) -> None:
+    time, force, heights = train
+    rate = 300 / time[-1]
+    setting = PulseSetting(THRESHOLD, BANDWIDTH, 0.0)
+    if kind == "impact_pulses":
+        pulses = pulses_of(low_passed(force, 1e5, BANDWIDTH), 1e5, 1.0 * THRESHOLD, 0.0)
+        path = written(tmp_path, pulses.time, 1e-3 * pulses.height, header="t_s,height_kN")
+    elif kind == "impact_acceleration":
+        path, setting = written(tmp_path, time, force / 0.2, header="t_s,acceleration_m_s2"), setting._replace(mass=0.2)
+    else:
+        path = written(tmp_path, time, force)
+    means, note = impact_pulses(path, kind, setting)
+    assert note is None and set(means) == set(PULSE_OUTPUTS[: 2 if kind == "impact_pulses" else 3])
+    assert abs(means["pulse_rate_hz"].value - rate) < 4.0 * means["pulse_rate_hz"].sd < 0.1 * rate
+    # Of the scatter of the heights, uniform from 20 to 100 N, among 300 pulses.
+    height = means["pulse_height_N"]
+    assert height.value == pytest.approx(heights.mean() * np.exp(-0.5 * (np.pi * 0.13253e-4 / 4e-4) ** 2), rel=4e-3)
+    assert height.sd == pytest.approx(80.0 / np.sqrt(12.0 * 300.0), rel=0.4)
+    if kind != "impact_pulses":
+        # Less what lies below the threshold at the ends, of a pulse of height h: h - sqrt(h^2 - 100 N^2).
+        impulse = 2.0 * 4e-4 / np.pi * np.sqrt(heights**2 - THRESHOLD**2).mean()
+        assert means["pulse_impulse_N_s"].value == pytest.approx(impulse, rel=0.01)
+
+
+def test_a_simulated_force_read_back_as_a_signal_is_the_statistic_of_the_run(tmp_path: Path) -> None:
+    """Forces at samples are those of a history as long as round-off does not part them; figures of all pockets, statistically."""
+    changes: dict[str, Any] = {"turns": 40.0, "discard_turns": 0.0, "replicates": 1, "extend": False}
+    changes |= {"pulse_threshold_N": 10.0, "pulse_bandwidth_hz": 5000.0, "pulse_dead_time_ms": 0.1}
+    scene = Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in changes.items()})
+    assert scene.pulse_samples_per_turn == 250
+    run = record(Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop()))
+    motion = history(scene, 40.0, samples_per_turn=250)
+    rate = 250 / scene.turn_s
+    start = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
+    walls = start.walls(0.0, 250, 200)
+    assert walls == pytest.approx(motion.pocket_load[:200], abs=1e-4) and np.abs(walls).max() > 1.0
+    path = written(tmp_path, motion.time, motion.pocket_load[:, 0])
+    with pytest.raises(InputError, match="at least 100 are needed, so measure longer or lower it"):
+        impact_pulses(path, "impact_force", PulseSetting(10.0, 5000.0, 1e-4))
+    joined = np.concatenate(motion.pocket_load.T)
+    path = written(tmp_path, np.arange(joined.size) / rate, joined)
+    means, _ = impact_pulses(path, "impact_force", PulseSetting(10.0, 5000.0, 1e-4))
+    total = run.pulses.sum(axis=0)
+    expected = [total[0] / run.durations.sum() / motion.pocket_load.shape[1], total[1] / total[0], total[2] / total[0]]
+    for name, value in zip(PULSE_OUTPUTS, expected, strict=True):
+        assert means[name].value == pytest.approx(value, rel=0.05)
+
+
+def test_a_result_reports_pulses_where_they_are_asked_for() -> None:
+    short = {"turns": 6.0, "discard_turns": 1.0, "replicates": 2, "extend": False, "companion": False}
+    scene = Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in short.items()})
+    plain = simulate(scene, notice=None)
+    assert "pulse_rate_hz" not in plain.as_dict()
+    pulses = {"numerics.pulse_threshold_N": 10.0, "numerics.pulse_bandwidth_hz": 5000.0}
+    result = simulate(scene.changed(pulses), notice=None)
+    record_ = result.as_dict()
+    assert type(result).from_dict(record_) == result
+    assert record_["pulse_height_N"]["value"] > 10.0 and record_["pulse_rate_hz"]["statistical_error"] > 0.0
+    assert any(note.startswith("pulses: forces at one pocket above 10 N, below 5000 Hz") for note in result.notes)
+    none = simulate(scene.changed({**pulses, "numerics.pulse_threshold_N": 1e6}), notice=None)
+    assert none.pulse_height_N is not None and none.pulse_height_N.value == 0.0
+    assert any(note.endswith("none is so high, so lower numerics.pulse_threshold_N") for note in none.notes)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"pulse_threshold_N": 9.0}, "numerics.pulse_bandwidth_hz: is missing"),
+        ({"pulse_bandwidth_hz": 9e3}, "numerics.pulse_threshold_N: is missing"),
+        ({"pulse_dead_time_ms": 1.0}, "numerics.pulse_dead_time_ms: has no use"),
+        ({"pulse_threshold_N": 9.0, "pulse_bandwidth_hz": 1e8}, "pulse_bandwidth_hz = 1e+08: needs"),
+    ],
+)
+def test_bad_keys_of_pulses_end_in_a_sentence(keys: dict[str, float], sentence: str) -> None:
+    with pytest.raises(InputError) as error:
+        Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in keys.items()})
+    assert any(sentence in fault for fault in error.value.faults)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "sentence"),
+    [
+        ("impact_force", {"header": "t_s,force"}, "column force_N or force_kN is missing; add it"),
+        ("impact_force", {"bandwidth": 10_001.0}, "1e+05 samples a second are fewer than 10 a period of bandwidth_hz = 10001"),
+        ("impact_force", {"threshold": 99.9}, "above threshold_N = 99.9; at least 100 are needed"),
+        ("impact_force", {"uneven": True}, "t_s does not rise evenly; give samples at equal intervals"),
+        ("impact_pulses", {"header": "t_s,height_N", "reverse": True}, "t_s does not rise from pulse to pulse"),
+    ],
+)  # fmt: skip
+def test_bad_traces_end_in_a_sentence(tmp_path: Path, train: Any, kind: str, change: Any, sentence: str) -> None:
+    time, force = (column[:40_000] for column in train[:2])
+    rows = np.delete(np.arange(time.size), 700 if change.get("uneven") else [])
+    rows = rows[::-1] if change.get("reverse") else rows
+    path = written(tmp_path, time[rows], force[rows], header=change.get("header", "t_s,force_N"))
+    setting = PulseSetting(change.get("threshold", THRESHOLD), change.get("bandwidth", BANDWIDTH), 0.0)
+    with pytest.raises(InputError) as error:
+        impact_pulses(path, kind, setting)
+    assert len(error.value.faults) == 1 and sentence in error.value.faults[0]
+
+
+def test_noise_a_clipped_sensor_and_short_pulses_are_noted(tmp_path: Path, train: Any) -> None:
+    time, force, _ = train
+    noisy = force + 20.0 * np.random.default_rng(1).standard_normal(force.size)
+    _, note = impact_pulses(written(tmp_path, time, noisy), "impact_force", PulseSetting(THRESHOLD, BANDWIDTH, 1e-3))
+    assert note is not None and "threshold_N = 10 is below 4 times the background of" in note
+    clipped = np.minimum(force, 60.0)
+    _, note = impact_pulses(written(tmp_path, time, clipped), "impact_force", PulseSetting(THRESHOLD, BANDWIDTH, 0.0))
+    assert note is not None and "are the largest one, 60 N; the sensor may be at the end of its range" in note
+    _, note = impact_pulses(written(tmp_path, time, force), "impact_force", PulseSetting(5.0, 500.0, 0.0))
+    assert note is not None and "so their height shows the impulse, not the stiffness" in note
+
+
+HEADER = "operation.inner_speed_rpm,power_loss_W,power_loss_W_sd,signal_file,signal_kind,threshold_N,bandwidth_hz,dead_time_ms"
+
+
+def test_rows_with_pulses_are_conditions_whose_runs_take_them_alike(tmp_path: Path, train: Any) -> None:
+    written(tmp_path, *train[:2])
+    rows = [
+        "12000,40,1,trace.csv,impact_force,10,9000,0.1",
+        "18000,100,2,trace.csv,impact_force,12,9000,",
+        "24000,180,3,,,,,",
+    ]
+    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
+    rig = read_rig(tmp_path / "rig.csv")
+    assert rig.outputs == ("power_loss_W", *PULSE_OUTPUTS)
+    assert [len(row.values) for row in rig.rows] == [4, 4, 1]
+    keys = [
+        [row.keys.get(f"numerics.pulse_{key}") for key in ("threshold_N", "bandwidth_hz", "dead_time_ms")]
+        for row in rig.rows
+    ]
+    assert keys == [[10.0, 9000.0, pytest.approx(0.1)], [12.0, 9000.0, 0.0], [None, None, None]]
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        ("12000,40,1,trace.csv,impact_force,,9000,", "threshold_N in row 1: is missing; give the force above which"),
+        ("12000,40,1,trace.csv,impact_force,10,,", "bandwidth_hz in row 1: is missing; give the frequency"),
+        ("12000,40,1,,,10,9000,", "threshold_N in row 1 = 10: has no use in this row"),
+        ("12000,40,1,trace.csv,impact_force,10,9000,-1", "dead_time_ms in row 1 = -1: is below 0"),
+        (
+            "12000,40,1,trace.csv,impact_acceleration,10,9000,",
+            "sensor_mass_g in row 1: is missing; give the force over",
+        ),
+    ],
+)
+def test_bad_rows_of_pulses_end_in_a_sentence(tmp_path: Path, row: str, sentence: str) -> None:
+    rows = [row, "18000,100,2,,,,,", "24000,180,3,,,,,"]
+    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
+    with pytest.raises(InputError) as error:
+        read_rig(tmp_path / "rig.csv")
+    assert any(sentence in fault for fault in error.value.faults), error.value.faults
+
+
+@pytest.mark.slow
+def test_the_stiffness_of_the_bars_is_found_from_pulses_of_a_simulated_rig(tmp_path: Path) -> None:
+    """The traces of all pockets one after the other, of a cage whose stiffness is hidden, at four speeds."""
+    short = [
+        "numerics.turns=4", "numerics.discard_turns=2", "numerics.impact_window_turns=1", "numerics.replicates=2",
+        "numerics.extend=false", "numerics.companion=false",
+    ]  # fmt: skip
+    key, hidden, rows = "model.pocket_bar_stiffness_N_m", 2.5e7, list[str]()
+    for speed in (9000, 14000, 19000, 24000):
+        changes = {key: hidden, "operation.inner_speed_rpm": speed, "numerics.discard_turns": 2.0, "numerics.seed": 77}
+        scene = Scene.load(EXAMPLE).changed(changes)
+        per_turn = round(2e5 * scene.turn_s)
+        motion = history(scene, 12.0, samples_per_turn=per_turn)
+        force = np.concatenate(motion.pocket_load.T)
+        written(tmp_path, np.arange(force.size) * (motion.time[1] - motion.time[0]), force, name=f"{speed}.csv")
+        rows.append(f"{speed},{speed}.csv,impact_force,10,20000")
+    header = "operation.inner_speed_rpm,signal_file,signal_kind,threshold_N,bandwidth_hz"
+    (tmp_path / "rig.csv").write_text("\n".join([header, *rows]), "utf-8")
+    declared = (
+        f'\n[uncertain]\ndefaults = "none"\nset = {json.dumps(short)}\n'
+        f'"{key}" = {{ law = "log_uniform", low = 1e7, high = 2e8 }}\n[calibrate]\nwaves = 1\n'
+    )
+    (tmp_path / "scene.toml").write_text(EXAMPLE.read_text("utf-8") + declared, "utf-8")
+    command = ["calibrate", str(tmp_path / "scene.toml"), "--data", str(tmp_path / "rig.csv"), "--json"]
+    answer = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "out")])
+    print(answer.stdout[:3000], answer.stderr[:3000])
+    record_ = json.loads(answer.stdout)
+    found = record_["inputs"][key]
+    assert found["low"] < hidden < found["high"] < 2.0 * found["low"] and found["seen"] == "learned"
+    assert record_["outputs"].keys() == set(PULSE_OUTPUTS)
