@@ -152,7 +152,8 @@ def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bo
     factors = _factors(data)
     if not tolerances and not chains:
         return {"factors": "\n".join(map(_factor_text, factors)), "parts": HINT}
-    from doe.commands.new_parts import chain_text, clearance_parts, manufacture_of, tolerances_text
+    from doe.commands.new_parts import chain_text, manufacture_of, tolerances_text
+    from doe.workflow.parts import clearance_parts
 
     groups = clearance_parts(scene)
     manufactures = {factor.name: manufacture_of(groups[factor.name], factor.step) for factor in factors}

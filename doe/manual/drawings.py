@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from doe.commands.new_parts import clearance_parts
+from doe.workflow.parts import clearance_parts
 from rbdyn.plots.sketches import WIDTH, Canvas, Sketch
 
 if TYPE_CHECKING:

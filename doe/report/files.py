@@ -177,8 +177,10 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     if outcome.robust is not None:
         record["robust"] = robust_record(outcome.robust, study.factors)
     if outcome.tolerances is not None:
-        record["tolerances"] = outcome.tolerances.as_dict(study.factors)
+        record["tolerances"] = outcome.tolerances.as_dict()
+        record["tolerances_gains"] = outcome.tolerances.gains_record()
         record["tolerances_sentence"] = outcome.tolerances.sentence
+        record["tolerances_warning"] = outcome.tolerances.warning
     return record
 
 

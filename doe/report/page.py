@@ -28,13 +28,12 @@ from doe.report.sections.record import (
     readable,
     record_table,
     responses,
-    rounded_down,
 )
 from rbdyn.base import markdown
 from rbdyn.base.blocks import Block, Bullets, Note, Section, Table, Widget
 from rbdyn.base.identity import Identity
 from rbdyn.base.page import identity_section, page
-from rbdyn.base.words import label, quantity, shown
+from rbdyn.base.words import label, quantity, rounded_down, shown
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {

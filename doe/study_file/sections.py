@@ -6,7 +6,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from rbdyn.base.faults import Consistent, Figure, InputError, Number, Positive, Strict, no_power_of_two, read_toml
+from rbdyn.base.faults import (
+    Consistent,
+    Figure,
+    InputError,
+    NonNegative,
+    Number,
+    Positive,
+    Strict,
+    no_power_of_two,
+    read_toml,
+)
 
 # A name that heads a column of a table, and is one field of CSV for any reader.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
@@ -247,9 +257,18 @@ class Tolerances(Strict):
     """Widest tolerances of the factors about the pick."""
 
     probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-    """Probability that a part keeps its share of every predicted gain, and all limits."""
+    """Probability that a part keeps its share of every gain that counts, and all limits."""
     keep: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    """Share of each predicted gain that a part must keep."""
+    """Share of each predicted gain that counts which a part must keep, where at_least does not state it."""
+    gains: Annotated[list[str], Field(min_length=1)] | None = None
+    """Responses whose gains count, with those of at_least. Without both keys, a predicted gain of at least three times
+    smallest_difference_percent counts; if none is so large, all real gains count."""
+    at_least: dict[str, NonNegative] = {}
+    """Gain over the baseline that a part must keep at least, by response, in percent of the baseline."""
+    smallest_difference_percent: Positive = 1.0
+    """Smallest difference of a response that matters, in percent of the baseline."""
+    finest_grade: Annotated[int, Field(ge=1, le=18)] = 4
+    """Finest grade of ISO 286 that the shop holds. Parts of a finer one are a warning, with the response that demands them."""
     aim: Literal["ratios", "product", "sum"] = "ratios"
     """"ratios" keeps the ratios of the factors' own tolerances, or of their steps if one has none; "product" and "sum" of
     the half widths are maximised."""

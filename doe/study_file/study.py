@@ -190,7 +190,22 @@ class StudyFile(Consistent):
             for chain in self.chain
             if chain.factor not in names
         ]
-        return [*faults, *self._key_faults(keys), *self._set_faults(keys)]
+        return [*faults, *self._gain_faults(), *self._key_faults(keys), *self._set_faults(keys)]
+
+    def _gain_faults(self) -> Iterator[str]:
+        """Faults of the gains that parts must keep."""
+        if self.tolerances is None:
+            return
+        goals = {response.name: response.goal for response in self.response}
+        choices = ", ".join(name for name, goal in goals.items() if goal != "none")
+        named = [("gains", name) for name in self.tolerances.gains or []]
+        repeated = [key for key, count in Counter(named).items() if count > 1]
+        for key, name in dict.fromkeys([*named, *(("at_least", name) for name in self.tolerances.at_least)]):
+            if name not in goals:
+                yield f"tolerances.{key} = {name!r}: no such response; name one of {choices}"
+            elif goals[name] == "none":
+                yield f'tolerances.{key} = {name!r}: goal = "none" has no gain; name one of {choices}'
+        yield from (f"tolerances.{key} = {name!r}: used more than once; name each once" for key, name in repeated)
 
     def _key_faults(self, keys: Sequence[str]) -> Iterator[str]:
         """Faults of keys whose values no run would have."""

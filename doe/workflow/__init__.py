@@ -2,7 +2,8 @@
 
 - ``runs``: the design with its region, and its runs; ``surfaces``: goals, fits, predictions, random draws, a published table
 - ``confirmation``: simulated points, intervals, limits; ``front``: tolerances, the front on surfaces, back-off from limits
-- ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region, the widest tolerances
+- ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region
+- ``parts``: parts of a clearance and their grades; ``tolerances``: the widest tolerances of the pick
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: judgement of the pick
 - ``rig``: measurements; ``signals``: figures of raw ones; ``calibration``: inputs from measurements
 - ``status``: stages and status of a command; ``whole``: the study

@@ -1,7 +1,8 @@
-"""The pick of a front: the points worth a simulation, where the pick lies in the region, and its widest tolerances.
+"""The pick of a front: the points worth a simulation, and where the pick lies in the region.
 
 A pick that does not keep its limits gives way to the next best point. At the edge of the region the change beyond it is
-predicted. Within the widest tolerances, parts keep the gains of the pick.
+predicted. Where the study asks for a tolerance-aware front, parts at the ends of the factors' own tolerances beat the
+baseline in every response with a goal, whichever gains the widest tolerances keep later.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,19 +16,11 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.front import pick_shares
-from doe.pareto.tolerance import (
-    Neighbourhood,
-    SimulatedAware,
-    WidestTolerances,
-    pick_among,
-    simulated_aware,
-    widest_tolerances,
-)
+from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware
 from doe.response_surface import Surface
 from doe.response_surface.adequacy import REACH
 from doe.running.store import Failure
 from doe.study_file import Study
-from doe.study_file.sections import Tolerances
 from doe.workflow.adaptive import Adaptive, emulator_draws
 from doe.workflow.confirmation import (
     ORDER,
@@ -40,22 +33,9 @@ from doe.workflow.confirmation import (
     limits_of,
     verdict_of,
 )
-from doe.workflow.front import (
-    DRAWS,
-    Draws,
-    ErrorField,
-    Misses,
-    draws_of,
-    find_front,
-    keeping,
-    known_tolerances,
-    open_errors,
-    rigid_factors,
-    standard_errors_of,
-    tolerance_box,
-)
+from doe.workflow.front import DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
 from doe.workflow.runs import beyond_runs, region_of, rounded_within
-from doe.workflow.surfaces import CHUNK, draw_all, goals_of, jacobian, predict_all, predict_paired, quadratics
+from doe.workflow.surfaces import CHUNK, goals_of, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json
@@ -107,7 +87,7 @@ def searched_pick(
         if not (violations <= 0.0).all(axis=1).any():
             violations = goals.violations(front.values - below, front.values + above)
         baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
-        suffix = ", at the ends of its tolerances"
+        suffix = " also at the ends of their tolerances"
     rounded = [rounded_within(study, point) for point in front.points]
     is_new = np.array([not any(np.array_equal(point, confirmed.point) for confirmed in simulated) for point in rounded])
     rows = np.flatnonzero(is_new) if is_new.any() else np.arange(len(front.points))
@@ -498,90 +478,3 @@ def _gains_by_simulation(
         figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
         gains_beyond[index] = dict(zip(responses, figures, strict=True))
     return gains_beyond
-
-
-def widest_tolerances_of(
-    study: Study,
-    surfaces: Sequence[Surface],
-    point: Array,
-    settings: Tolerances,
-    confirmed: Mapping[str, Confirmed] | None = None,
-    neighbours: Neighbourhood | None = None,
-    search_draws: Draws | None = None,
-) -> WidestTolerances | None:
-    """Widest half widths, in factor units, about a point (k,) in factor units; None where no factor has a tolerance.
-
-    A part keeps its promise if all limits hold and each response with a goal keeps the share ``keep`` of its predicted
-    gain. A predicted loss may not grow. ``confirmed``: simulated points, "baseline" among them; they
-    narrow the errors of the surfaces.
-
-    With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
-    lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
-    """
-    free = np.flatnonzero(~rigid_factors(study))
-    if not free.size:
-        return None
-    goals = goals_of(study)
-    simulated = None if neighbours is None or confirmed is None else confirmed["baseline"].values
-    base, nominal = (study.coded(location)[None] for location in (study.baseline, point))
-    ends = [predict_all(surfaces, location) for location in (base, nominal)]
-    if neighbours is not None and simulated is not None:
-        ends = [simulated[None], neighbours.values]
-    gain = (goals.costs(ends[0]) - goals.costs(ends[1]))[0]
-    keep = np.where(gain > 0.0, settings.keep * gain, gain)
-    coefficients = draw_all(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
-
-    def responses(coded: Array) -> Array:
-        return predict_all(surfaces, coded) if coefficients is None else predict_paired(surfaces, coefficients, coded)
-
-    def objectives(parts: Array) -> Array:
-        points = np.tile(point, (len(parts), 1))
-        points[:, free] = parts
-        coded = study.coded(points)
-        values = responses(coded)
-        if neighbours is not None:
-            values = values - centre_values + neighbours.values + (coded - neighbours.points) @ neighbours.slopes[0]
-        return np.hstack([goals.costs(values), goals.violations(values, values)])
-
-    # Each part has its own nominal point and baseline, because each may have its own draw of the surfaces.
-    repeated = [np.repeat(location, settings.samples, axis=0) for location in (nominal, base)]
-    centre_values, reference_values = map(responses, repeated)
-    if simulated is not None:
-        reference_values = np.broadcast_to(simulated, reference_values.shape)
-    reference = goals.costs(reference_values)
-    no_violations = np.zeros((settings.samples, len(goals.limited)))
-    half_widths = known_tolerances(study)
-    ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
-    low, high = _box(study, point, None if neighbours is None else np.nan_to_num(ratios))
-    slack = 1e-9 * np.abs(gain).max()
-    promise = f"keep {100.0 * settings.keep:g} % of every gain{' and all limits' if goals.limited else ''}"
-    tolerances = widest_tolerances(
-        objectives,
-        point[free],
-        np.hstack([reference - keep, no_violations]) + slack,
-        (study.step if np.isnan(ratios[free]).any() else ratios)[free],
-        lower=low[free],
-        upper=high[free],
-        names=_names(study),
-        promise=promise,
-        count_on_draws=keeping(study, search_draws or draws_of(study, surfaces, confirmed), point, free, keep - slack),
-        open_errors=open_errors(surfaces, searched=neighbours is not None),
-        **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
-    )
-    return tolerances.among(free, point.size)
-
-
-def _names(study: Study) -> list[str]:
-    """Names of the gains and limits that parts must keep."""
-    goals = goals_of(study)
-    gains = (f"the gain of {study.responses[index]}" for index in goals.objectives)
-    return [*gains, *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited)]
-
-
-def _box(study: Study, point: Array, extent: Array | None) -> tuple[Array, Array]:
-    """Ends (k,) of the region in which parts may lie, at least ``extent`` (k,) from the point, if stated."""
-    reach = region_of(study) * study.step
-    region = study.centre - reach, study.centre + reach
-    if extent is None:
-        return region
-    return np.minimum(region[0], point - extent), np.maximum(region[1], point + extent)

@@ -19,7 +19,6 @@ from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
 from doe.pareto import ParetoFront
-from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
 from doe.running.store import Failure, Store
@@ -40,16 +39,7 @@ from doe.workflow.confirmation import (
     whirl_sentence,
 )
 from doe.workflow.front import check_goals, find_front, with_survival
-from doe.workflow.pick import (
-    Edge,
-    SearchedPick,
-    Selection,
-    choose,
-    draws_about,
-    edge_of,
-    neighbourhood,
-    widest_tolerances_of,
-)
+from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
 from doe.workflow.runs import (
@@ -65,6 +55,7 @@ from doe.workflow.runs import (
 )
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
+from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.records import Record
@@ -172,7 +163,7 @@ def _widest_half_widths(study: Study) -> Array:
 
 
 def solve_chains(
-    study: Study, pick: Array, tolerances: WidestTolerances | None
+    study: Study, pick: Array, tolerances: PickTolerances | None
 ) -> tuple[dict[str, ChainResult], list[str]]:
     """Every chain by name at the picked point (k,), and notes on chains without a solution."""
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
@@ -185,7 +176,7 @@ def solve_chains(
         if half_width is not None and half_width > limit:
             notes.append(
                 f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
-                "the gains are kept as [tolerances] asks; narrow it, or lower keep"
+                "the gains are kept as [tolerances] asks; narrow it, or demand less there"
             )
         try:
             parts = _chain(study, number, pick, half_widths)
@@ -248,7 +239,7 @@ class StudyResult:
     tries: int
     confirmed: Mapping[str, Confirmed]
     gains: Mapping[str, list[Gain]]
-    tolerances: WidestTolerances | None
+    tolerances: PickTolerances | None
     chains: Mapping[str, ChainResult]
     published_comparisons: list[PublishedComparison]
     reference_values: Array | None
@@ -423,15 +414,16 @@ def _edge(
 
 def _tolerances(
     study: Study, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
-) -> WidestTolerances | None:
+) -> PickTolerances | None:
     pick, settings = confirmed["pick"], study.file.tolerances
     if settings is None:
         return None
+    scene = clearance.confirmation_scene(study, pick.point)
     if searched is None:
-        return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed)
+        return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, scene=scene)
     neighbours = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
     draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
-    return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws)
+    return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:

@@ -141,6 +141,14 @@ def chance(probability: float) -> str:
     return "below 0.001" if probability < 0.0005 else f"{probability:.3f}"
 
 
+def rounded_down(width: float) -> str:
+    """A half width in two digits and no wider: 0.001875 as '0.0018'."""
+    if width <= 0.0:
+        return "0"
+    digit = math.floor(math.log10(width)) - 1
+    return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
+
+
 class Figure(NamedTuple):
     """A figure of a result: its description, its value, the half-width of its 95 % interval if any, its unit."""
 

@@ -11,7 +11,7 @@ from doe.cli import app
 from doe.report.sections.front import front_record
 from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front, known_tolerances
-from doe.workflow.pick import widest_tolerances_of
+from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
 
@@ -191,7 +191,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     study = edited_study(tmp_path, *TOLERANCES)
     surfaces = table_surfaces(study)
     point = np.array([0.0136, 0.184, 0.301])
-    found = widest_tolerances_of(study, surfaces, point, Tolerances())
+    found = widest_tolerances_of(study, surfaces, point, Tolerances(gains=study.responses))
     ratios = list(known_tolerances(study).values())
     assert found.half_widths / ratios == pytest.approx([found.half_widths[0] / ratios[0]] * 3)
     # Counted afresh: parts that keep half of every gain.
@@ -202,7 +202,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
         at = [surface.predict((each - study.centre) / study.step) for each in (study.baseline, point, parts)]
         kept &= at[2] <= at[0] - 0.5 * (at[0] - at[1])
     assert kept.mean() == pytest.approx(0.95, abs=0.01)
-    unsure = widest_tolerances_of(study, surfaces, point, Tolerances(surface_uncertainty=True))
+    unsure = widest_tolerances_of(study, surfaces, point, Tolerances(gains=study.responses, surface_uncertainty=True))
     assert unsure.half_widths.tolist() == [0.0, 0.0, 0.0] and "even the exact pick" in unsure.sentence
 
 

@@ -8,9 +8,10 @@ import tomllib
 import pytest
 from doe_command import doe
 
-from doe.commands.new_parts import clearance_parts, manufacture_of
+from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
 from doe.study_file.sections import StudyChain, chain_table
+from doe.workflow.parts import clearance_parts
 from rbdyn.base.faults import InputError
 from rbdyn.properties.tolerances import grade_tolerances
 from rbdyn.scene import Scene

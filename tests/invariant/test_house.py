@@ -30,7 +30,6 @@ EDGES = {
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
     "doe/workflow": "asks for chains",
-    "doe/commands/new_parts.py": "writes chains",
     "doe/study_file/sections.py": "checks chains",
 }
 

@@ -21,13 +21,13 @@ from doe.report.pictures import response_surface
 from doe.report.sections.answer import CLEARANCES
 from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
-from doe.report.sections.record import change, rounded_down, scalars
+from doe.report.sections.record import change, scalars
 from doe.report.still import Still
 from doe.study_file import Study
 from doe.workflow.pick import Outward
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
-from rbdyn.base.words import label, quantity, shown, with_error
+from rbdyn.base.words import label, quantity, rounded_down, shown, with_error
 from rbdyn.plots.roller import cage_orbit
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

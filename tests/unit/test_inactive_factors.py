@@ -19,9 +19,9 @@ from doe.study_file import Study
 from doe.study_file.sections import Tolerances
 from doe.workflow.adaptive import check_adaptive, region_in_units
 from doe.workflow.front import tolerances_of
-from doe.workflow.pick import widest_tolerances_of
 from doe.workflow.runs import Runs, check_runs, design_of
 from doe.workflow.surfaces import fit_surfaces
+from doe.workflow.tolerances import widest_tolerances_of
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 

@@ -95,7 +95,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     outcome = run_study(study, tmp_path, 1, lambda title: told.append(title) or silent, adaptive=True)
     chosen, front = outcome.searched_pick, outcome.adaptive.front
     assert outcome.pick.point == pytest.approx(front.points[chosen.row], abs=6e-4)
-    assert "adaptive front" in outcome.pick.reason and "at the ends of its tolerances" in outcome.pick.reason
+    assert "adaptive front" in outcome.pick.reason and "also at the ends of their tolerances" in outcome.pick.reason
     assert "pick_of_surfaces" in outcome.confirmed
     assert any("% to gain" in title for title in told)
     record = write(outcome, tmp_path)

@@ -22,7 +22,6 @@ from doe.report.sections.record import (
     of_hundred,
     part,
     responses,
-    rounded_down,
     share_with_interval,
     sizes,
 )
@@ -47,7 +46,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
-from rbdyn.base.words import chance, label, quantity, shown, with_error
+from rbdyn.base.words import chance, label, quantity, rounded_down, shown, with_error
 
 # Meaning of a clearance of the scene, by its key.
 CLEARANCES = {
@@ -184,6 +183,7 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
+        Paragraph(part(summary, "tolerances_warning") or "", "warning"),
         Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
 
@@ -216,6 +216,7 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     tolerance = tolerance_of(summary, factor)
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
+        "grade of the parts": part(summary, "tolerances", factor.name, "grade") or "",
         "baseline": factor.text(before.get(factor.name)),
         "in operation": factor.text(running.get("pick")),
         "baseline in operation": factor.text(running.get("baseline")),
@@ -447,13 +448,20 @@ def tolerances(summary: Record) -> Table:
             ""
             if width.get("probability") is None
             else share_with_interval(width["probability"], width.get("interval")),
+            _grade(width),
             label(width.get("limited_by") or ""),
         )
         for name, width in widths.items()
         if name in names and isinstance(width, Mapping)
     ]
-    header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
-    return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
+    header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
+    return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))
+
+
+def _grade(width: Record) -> str:
+    """'IT6: guide land 16 µm, cage outside 16 µm' of a tolerance."""
+    parts = [f"{label(name)} {shown(1e3 * size['width_mm'])} µm" for name, size in (width.get("parts") or {}).items()]
+    return ": ".join(filter(None, (width.get("grade") or "", ", ".join(parts))))
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:

@@ -175,14 +175,6 @@ def probability(value: float | None) -> str:
     return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
 
 
-def rounded_down(width: float) -> str:
-    """A half width in two digits and no wider: 0.001875 as '0.0018'."""
-    if width <= 0.0:
-        return "0"
-    digit = math.floor(math.log10(width)) - 1
-    return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
-
-
 def of_hundred(share: Sequence[float]) -> str:
     """'87 (80 to 92)' of a share with the ends of its interval: in how many of 100 cases."""
     value, low, high = (100.0 * number for number in share)

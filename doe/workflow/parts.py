@@ -1,0 +1,229 @@
+"""Parts that make a clearance, and the grade of ISO 286 at which a shop must make them for a tolerance of that clearance.
+
+A clearance is the sum of coefficient times nominal of its parts: radial, outer less inner raceway less two rollers; guide, land and
+cage; pocket, its width less the roller. All are diametral and of the loose bearing. Rollers are graded by size: one diameter in a bearing.
+
+A tolerance of a clearance is shared by its parts: its grade is the widest that all of them may have together. A dimension
+chain of the study names the parts; without one they are those of the scene. Any other length is a part by itself.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from doe.dimension_chain import Chain, chain_from, grade_tolerances
+from doe.dimension_chain.links import stated_parts
+from doe.study_file import Study
+from doe.study_file.sections import StudyChain, chain_table
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, MethodError
+from rbdyn.properties.tolerances import STANDARD_TOLERANCES
+from rbdyn.scene import Scene
+
+# Usual grades: of ground raceways, of turned and milled cages and their lands.
+RACEWAY_GRADE, CAGE_GRADE = "IT5", "IT7"
+# Decimals [mm] of an estimated land, and of sums.
+MICROMETRES, DIGITS = 3, 9
+# Half width of rollers of one lot [mm].
+LOT = 0.001
+GRADES = list(STANDARD_TOLERANCES)
+FINER = f"finer than {GRADES[0]}"
+# ISO 286 begins its coarse grades at this size [mm]; smaller lengths are no sizes of a part.
+SMALLEST_SIZE = 1.0
+# Half width [mm] of a chain whose links are read but not solved.
+ANY_WIDTH = 1.0
+
+
+class Part(NamedTuple):
+    """A part: its name, what the clearance changes by per unit of it, its nominal [mm], where that comes from; rollers are graded."""
+
+    name: str
+    coefficient: float
+    nominal: float
+    source: str = ""
+
+    @property
+    def graded(self) -> bool:
+        """Whether it is a roller, whose tolerance is that of its lot."""
+        return not self.source
+
+
+class ClearanceParts(NamedTuple):
+    """The parts of one clearance: names of chain and factor, what the chain is in words, the usual grade, the part that is adjusted."""
+
+    name: str
+    factor: str
+    sentence: str
+    grade: str
+    parts: tuple[Part, ...]
+    adjust: str
+
+    @property
+    def clearance(self) -> float:
+        """What the nominals close to [mm]."""
+        return sum(part.coefficient * part.nominal for part in self.parts)
+
+
+def clearance_parts(scene: Scene) -> dict[str, ClearanceParts]:
+    """Parts of the radial, the guide and the pocket clearances of a scene, by factor; those that the scene has."""
+    bearing, cage = scene.bearing, scene.cage
+    pitch, roller, radial = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, bearing.radial_clearance_mm
+    around = "pitch diameter {} roller {} half of the clearance"
+    # The outer raceway is at the resolution of a drawing, and the inner one closes to the clearance.
+    outer = round(pitch + roller + 0.5 * radial, MICROMETRES)
+    raceways = (
+        Part("outer_raceway", 1.0, outer, around.format("+", "+")),
+        Part("inner_raceway", -1.0, _size(outer - 2.0 * roller - radial), around.format("-", "-")),
+        Part("rollers", -2.0, roller),
+    )
+    pocket = (
+        Part("pocket_width", 1.0, _size(roller + cage.pocket_clearance_mm), "roller + clearance"),
+        Part("roller_diameter", -1.0, roller),
+    )
+    groups = [
+        ClearanceParts(
+            "radial", "radial_clearance_mm", "outer raceway less inner raceway less two rollers, of the loose bearing",
+            RACEWAY_GRADE, raceways, "outer_raceway",
+        ),
+        *_guide(scene),
+        ClearanceParts(
+            "pocket", "pocket_clearance_mm", "width of the pocket less roller diameter",
+            CAGE_GRADE, pocket, "pocket_width",
+        ),
+        *_lips(scene),
+    ]  # fmt: skip
+    return {group.factor: group for group in groups}
+
+
+def _guide(scene: Scene) -> Iterator[ClearanceParts]:
+    """Land and cage; none where the rollers guide the cage."""
+    clearance, land = scene.cage.guide_clearance_mm, round(scene.land_diameter_mm, MICROMETRES)
+    if clearance is None or scene.cage.guidance == "roller":
+        return
+    on_drawing = scene.cage.land_diameter_mm is not None
+    source = "cage.land_diameter_mm" if on_drawing else "estimated: pitch diameter {} 2/3 roller; put in the drawing's"
+    if scene.cage.guidance == "outer":
+        words = "land of the outer ring less outside diameter of the cage"
+        parts = (
+            Part("guide_land", 1.0, _size(land), source.format("+")),
+            Part("cage_outside", -1.0, _size(land - clearance), "land - clearance"),
+        )
+    else:
+        words = "bore of the cage less land of the inner ring"
+        parts = (
+            Part("cage_bore", 1.0, _size(land + clearance), "land + clearance"),
+            Part("guide_land", -1.0, _size(land), source.format("-")),
+        )
+    adjust = next(part.name for part in parts if part.name != "guide_land")
+    yield ClearanceParts("guide", "guide_clearance_mm", words, CAGE_GRADE, parts, adjust)
+
+
+def _lips(scene: Scene) -> Iterator[ClearanceParts]:
+    """Pocket lips and roller; none where a ring guides the cage."""
+    roller, clearance = scene.bearing.roller_diameter_mm, scene.cage.lip_clearance_mm
+    if clearance is None:
+        return
+    parts = (
+        Part("pocket_lips", 1.0, _size(roller + clearance), "roller + clearance"),
+        Part("roller_diameter", -1.0, roller),
+    )
+    words = "width between the pocket's lips less roller diameter"
+    yield ClearanceParts("lips", "pocket_radial_clearance_mm", words, CAGE_GRADE, parts, "pocket_lips")
+
+
+def _size(value: float) -> float:
+    return round(value, DIGITS)
+
+
+class Grade(NamedTuple):
+    """Grade of the parts of a tolerance, such as "IT5" or `FINER`, its place in `GRADES` (-1: finer than all), size and width [mm]
+    by part."""
+
+    name: str
+    place: int
+    widths: Mapping[str, tuple[float, float]]
+
+    def finer_than(self, number: int) -> bool:
+        """Whether it is finer than the grade of this number."""
+        return self.place < GRADES.index(f"IT{number}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON: the grade, and the size and the width of each part."""
+        parts = {name: {"nominal_mm": size, "width_mm": width} for name, (size, width) in self.widths.items()}
+        return {"grade": self.name, "parts": parts}
+
+
+@dataclass(frozen=True)
+class SharedTolerance:
+    """``parts`` that share a tolerance, and the widths [mm] ``taken`` by bought or graded parts.
+
+    ``squares``: widths add by the root sum square, as the chain asks; else by the worst case.
+    """
+
+    parts: tuple[Part, ...]
+    taken: tuple[float, ...] = ()
+    squares: bool = False
+
+    def grade(self, width: float) -> Grade:
+        """The widest grade of the parts that fits a width [mm]. Raises MethodError for a size outside the tables."""
+        tables = {part.name: list(grade_tolerances(part.nominal).values()) for part in self.parts}
+
+        def whole(place: int) -> float:
+            terms = [abs(part.coefficient) * tables[part.name][place] for part in self.parts]
+            return math.hypot(*terms, *self.taken) if self.squares else sum((*terms, *self.taken))
+
+        fitting = [place for place in range(len(GRADES)) if whole(place) <= width * (1.0 + 1e-9)]
+        if not fitting:
+            return Grade(FINER, -1, {})
+        best = fitting[-1]
+        return Grade(GRADES[best], best, {part.name: (part.nominal, tables[part.name][best]) for part in self.parts})
+
+
+def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> dict[str, Grade]:
+    """Grades by factor of half widths (k,) about a point (k,), whose scene it is; none for a factor that is no length in ISO 286."""
+    groups, grades = clearance_parts(scene), {}
+    closing = {chain.factor: chain for chain in reversed(study.file.chain)}
+    for factor, value, half in zip(study.file.factor, point.tolist(), half_widths.tolist(), strict=True):
+        shared = _of_chain(study, closing.get(factor.name), value) or _of_scene(groups, factor.key, factor.name, value)
+        if shared is None or math.isnan(half):
+            continue
+        try:
+            grades[factor.name] = shared.grade(2.0 * half)
+        except MethodError:
+            # No grade is listed for a part of this size.
+            continue
+    return grades
+
+
+def _of_chain(study: Study, chain: StudyChain | None, value: float) -> SharedTolerance | None:
+    """Parts of a chain at a value [mm]; None without a chain, or where functions of its links count too."""
+    if chain is None:
+        return None
+    try:
+        links = chain_from(chain_table(chain, study.path.parent, value, ANY_WIDTH), chain.name)
+    except InputError:
+        # The solution of the chain names its faults.
+        return None
+    return _shared(links)
+
+
+def _shared(chain: Chain) -> SharedTolerance | None:
+    links = [link for link in chain.link if link.coefficient != 0]
+    free = [link for link in chain.free if link.coefficient != 0]
+    if not free or not all(link.is_dimension for link in links):
+        return None
+    names = {link.name for link in free}
+    taken = [abs(part.coefficient) * part.tolerance_mm for part in stated_parts(links) if part.name not in names]
+    parts = tuple(Part(link.name, link.coefficient, link.nominal, chain.allocate.method) for link in free)
+    return SharedTolerance(parts, tuple(taken), chain.allocate.mode != "worst_case")
+
+
+def _of_scene(groups: Mapping[str, ClearanceParts], key: str, name: str, value: float) -> SharedTolerance | None:
+    """Parts of a clearance of the scene, or a length of the scene as a part by itself."""
+    group = groups.get(key.rpartition(".")[2])
+    if group is None:
+        sized = key.endswith("_mm") and value >= SMALLEST_SIZE
+        return SharedTolerance((Part(name, 1.0, value, key),)) if sized else None
+    rollers = [2.0 * LOT * abs(part.coefficient) for part in group.parts if part.graded]
+    return SharedTolerance(tuple(part for part in group.parts if not part.graded), tuple(rollers))

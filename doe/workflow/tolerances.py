@@ -1,0 +1,435 @@
+"""The widest tolerances about a pick: the gains that parts keep, the grades of the parts, and what letting a gain go would give.
+
+A gain counts if [tolerances] names it in ``gains`` or ``at_least``. Without both, a predicted gain counts from three times the
+smallest difference that matters; if none is so large, all real gains count. A gain that does not count is free: the
+record says where its response lies among the parts.
+
+Tolerances that need parts of a finer grade than the shop's are a warning. It names the gain that demands them, and the widest
+tolerances without that gain.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from doe.pareto.goals import Goals
+from doe.pareto.manufacture import random_offsets
+from doe.pareto.tolerance import RIM, Neighbourhood, WidestTolerances, widest_tolerances
+from doe.response_surface import Surface
+from doe.study_file import Study
+from doe.study_file.sections import Tolerances
+from doe.workflow.confirmation import Confirmed, gains
+from doe.workflow.front import Draws, draws_of, keeping, known_tolerances, open_errors, rigid_factors
+from doe.workflow.parts import Grade, grades_of
+from doe.workflow.runs import region_of
+from doe.workflow.surfaces import draw_all, goals_of, predict_all, predict_paired
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.words import improvement, quantity, rounded_down, shown
+from rbdyn.scene import Scene
+
+ENOUGH = 3.0  # times the smallest difference that matters, from which a gain counts by default
+GAIN = "the gain of "
+MIDDLE = (0.025, 0.975)  # quantiles of a response among the parts
+
+
+@dataclass(frozen=True)
+class Demand:
+    """A response with a goal, its predicted gain in percent of the baseline, and the ``least`` of it that a part keeps.
+
+    ``least`` is None for a gain that does not count.
+    """
+
+    response: str
+    goal: str
+    percent: float
+    least: float | None
+
+    @property
+    def words(self) -> str:
+        """'impact force'."""
+        return quantity(self.response)[0]
+
+    def let_go(self, response: str) -> "Demand":
+        """The same demand, but none for the gain of ``response``."""
+        return replace(self, least=None) if self.response == response else self
+
+
+def demands_of(
+    study: Study, settings: Tolerances, percent: Array, simulated: tuple[Confirmed, Confirmed] | None = None
+) -> tuple[Demand, ...]:
+    """Demands on the responses with a goal, whose predicted gains are ``percent`` (q,) of the baseline.
+
+    ``simulated``: baseline and pick, which say whether a gain is real; without them every gain above zero is.
+    """
+    responses = [study.file.response[index] for index in goals_of(study).objectives]
+    names = [response.name for response in responses]
+    by_name = dict(zip(names, percent.tolist(), strict=True))
+    counted = _counted(
+        settings,
+        by_name,
+        simulated and {gain.response for gain in gains(study, *simulated) if gain.percent > gain.error},
+    )
+    least = {name: settings.at_least.get(name, settings.keep * by_name[name]) for name in names if name in counted}
+    return tuple(Demand(one.name, one.goal, by_name[one.name], least.get(one.name)) for one in responses)
+
+
+def _counted(settings: Tolerances, percent: Mapping[str, float], real: Collection[str] | None) -> Collection[str]:
+    """Names of the responses whose gains count."""
+    if settings.gains is not None or settings.at_least:
+        return {*(settings.gains or []), *settings.at_least}
+    positive = [name for name, gain in percent.items() if gain > 0.0]
+    large = [name for name in positive if percent[name] >= ENOUGH * settings.smallest_difference_percent]
+    return large or [name for name in positive if real is None or name in real]
+
+
+@dataclass(frozen=True, eq=False)
+class PickTolerances:
+    """The widest tolerances of a pick, with the ``demands`` on its gains and the ``grades`` of the parts by factor.
+
+    ``free``: lowest and highest gain [%] of 95 % of the parts, by response whose gain does not count. ``relaxed``: the
+    tolerances without the limiting gain, None where no grade is too fine or no gain limits.
+    """
+
+    settings: Tolerances
+    factors: tuple[str, ...]
+    widest: WidestTolerances
+    demands: tuple[Demand, ...]
+    free: Mapping[str, tuple[float, float]]
+    grades: Mapping[str, Grade]
+    relaxed: "PickTolerances | None" = None
+
+    @property
+    def half_widths(self) -> Array:
+        """Half widths (k,) in factor units, NaN for factors without one."""
+        return self.widest.half_widths
+
+    @property
+    def limiting_gain(self) -> str:
+        """Response whose gain limits the tolerances; empty where a limit or the rim of the region does."""
+        name = self.widest.limited_by
+        return name.removeprefix(GAIN) if name.startswith(GAIN) else ""
+
+    @property
+    def too_fine(self) -> list[str]:
+        """Factors whose parts need a finer grade than the shop's."""
+        return [name for name, grade in self.grades.items() if grade.finer_than(self.settings.finest_grade)]
+
+    def as_dict(self) -> dict[str, dict[str, Any]]:
+        """JSON by factor: as the widest tolerances, with the grade, the parts, and the tolerance without the limiting gain."""
+        record = self.widest.as_dict(self.factors)
+        without = {} if self.relaxed is None else self.relaxed.as_dict()
+        return {
+            name: values
+            | (self.grades[name].as_dict() if name in self.grades else {"grade": None, "parts": {}})
+            | {"without_limiting_gain": self._without(without.get(name))}
+            for name, values in record.items()
+        }
+
+    def _without(self, record: Mapping[str, Any] | None) -> dict[str, Any] | None:
+        if record is None:
+            return None
+        return {"gain": self.limiting_gain, **{key: record[key] for key in ("half_width", "grade", "limited_by")}}
+
+    def gains_record(self) -> dict[str, dict[str, Any]]:
+        """JSON of the demands by response; ``parts_percent`` is the range of a gain that does not count."""
+        return {
+            demand.response: {
+                "predicted_percent": demand.percent,
+                "at_least_percent": demand.least,
+                "counts": demand.least is not None,
+                "parts_percent": list(self.free[demand.response]) if demand.response in self.free else None,
+            }
+            for demand in self.demands
+        }
+
+    @property
+    def sentence(self) -> str:
+        """The tolerances, what limits them, and which gains count, in words."""
+        counted = [
+            f"{one.words} {shown(one.least, 2)} of {shown(one.percent, 2)} %"
+            for one in self.demands
+            if one.least is not None
+        ]
+        kept = f"Gains that parts keep at least: {', '.join(counted)}." if counted else ""
+        return " ".join(filter(None, [self.widest.sentence, kept, *self._rule_sentences(bool(counted))]))
+
+    def _rule_sentences(self, counted: bool) -> list[str]:
+        """The gains that do not count with the reason, and where their responses lie among the parts."""
+        settings = self.settings
+        free = [one for one in self.demands if one.least is None]
+        gains = ", ".join(f"{one.words} {improvement(one.percent, None, one.goal)}" for one in free)
+        smallest = f"{ENOUGH:g} times the smallest difference that matters, {settings.smallest_difference_percent:g} %"
+        if settings.gains is not None or settings.at_least:
+            sentences = [f"[tolerances] does not name {gains}."] if free else []
+        elif any(one.percent >= ENOUGH * settings.smallest_difference_percent for one in self.demands):
+            sentences = [f"A gain counts from {smallest}; {gains} does not."] if free else []
+        else:
+            sentences = [f"No gain reaches {smallest}, so all real gains count."] if counted else []
+            sentences += [f"Not real: {gains}."] if free else []
+        if self.free:
+            sentences.append(f"In 95 % of these parts, compared with the baseline: {self._spread(self.free)}.")
+        return sentences
+
+    def _spread(self, names: Collection[str]) -> str:
+        """'power loss 0.90 % more to 1.20 % less' of responses whose gains do not count."""
+        goals = {one.response: one.goal for one in self.demands}
+        texts = []
+        for name in names:
+            low, high = (improvement(end, None, goals[name]) for end in self.free[name])
+            texts.append(f"{quantity(name)[0]} {low} to {high}")
+        return ", ".join(texts)
+
+    @property
+    def warning(self) -> str:
+        """Parts of too fine a grade, what demands them, and what letting that go would give; empty if there are none."""
+        at_rim = dict(zip(self.factors, self.widest.at_rim.tolist(), strict=True))
+        rim, fine = ([name for name in self.too_fine if at_rim[name] is side] for side in (True, False))
+        grade, cause, sentences = f"IT{self.settings.finest_grade}", _limit_words(self.widest.limited_by), list[str]()
+        if fine:
+            sentences.append(f"{_begun(cause)} demands parts finer than {grade}: {self._listed(fine)}.")
+        if fine and self.relaxed is not None:
+            wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
+            sentences.append(f"Without {cause} the tolerance would be {wider}, limited by {limit}.")
+            sentences.append(f"Then, in 95 % of the parts: {self.relaxed._spread([self.limiting_gain])}.")
+        elif fine:
+            sentences.append("A pick with more room to it has wider tolerances.")
+        if rim:
+            sentences.append(f"The rim of the region demands parts finer than {grade}: {self._listed(rim)}.")
+            sentences.append("A wider design gives these more room.")
+        return " ".join(sentences)
+
+    def _listed(self, names: Sequence[str]) -> str:
+        """'guide clearance ± 0.018 mm (IT8)' of factors."""
+        widths = dict(zip(self.factors, self.half_widths.tolist(), strict=True))
+        return ", ".join(
+            f"{quantity(name)[0]} ± {rounded_down(widths[name])} mm ({self.grades[name].name})" for name in names
+        )
+
+
+def _limit_words(limit: str) -> str:
+    """What limits the tolerances, with a response by its words."""
+    if limit.startswith(GAIN):
+        return GAIN + quantity(limit.removeprefix(GAIN))[0]
+    name, _, bound = limit.partition(" ")
+    return limit if limit == RIM else f"the limit {' '.join((quantity(name)[0], bound, quantity(name)[1]))}".rstrip()
+
+
+def _begun(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def widest_tolerances_of(
+    study: Study,
+    surfaces: Sequence[Surface],
+    point: Array,
+    settings: Tolerances,
+    confirmed: Mapping[str, Confirmed] | None = None,
+    neighbours: Neighbourhood | None = None,
+    search_draws: Draws | None = None,
+    scene: Scene | None = None,
+) -> PickTolerances | None:
+    """Widest tolerances about a point (k,) in factor units; None where no factor has a tolerance.
+
+    A part keeps its promise if all limits hold and each gain that counts has its least size. ``confirmed``: simulated
+    points, "baseline" and "pick" among them; they narrow the errors of the surfaces and say which gains are real. ``scene``: the bearing at the
+    point, whose parts have grades; without it none are stated.
+
+    With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
+    lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
+    """
+    if rigid_factors(study).all():
+        return None
+    parts = _PickParts(study, surfaces, point, settings, confirmed or {}, neighbours, scene)
+    simulated = (confirmed["baseline"], confirmed["pick"]) if confirmed and "pick" in confirmed else None
+    demands = demands_of(study, settings, parts.percent, simulated)
+    draws = search_draws or draws_of(study, surfaces, confirmed)
+    tolerances = parts.tolerances(demands, draws)
+    if not any(demand.least is not None for demand in demands) and not parts.goals.limited:
+        return replace(tolerances, widest=_none(tolerances.widest), free={}, grades={})
+    gain = tolerances.limiting_gain
+    if not gain or not tolerances.too_fine:
+        return tolerances
+    relaxed = parts.tolerances([demand.let_go(gain) for demand in demands], None)
+    return replace(tolerances, relaxed=relaxed)
+
+
+def _none(widest: WidestTolerances) -> WidestTolerances:
+    """No tolerances, for a pick without a gain or a limit to keep."""
+    sentence = "No tolerances follow, for the pick has no gain to keep and no response has a limit."
+    return replace(widest, half_widths=np.full_like(widest.half_widths, np.nan), limited_by="", sentence=sentence)
+
+
+def _impossible(demands: Sequence[Demand]) -> str:
+    """The first gain that the pick itself does not have, in a sentence; empty if it has them all."""
+    for one in demands:
+        if one.least is not None and one.percent <= 0.0:
+            return (
+                f"No tolerance is possible: the pick has no gain in {one.words} to keep; leave it out of [tolerances]."
+            )
+        if one.least is not None and one.least > one.percent:
+            return (
+                f"No tolerance is possible: at_least.{one.response} = {one.least:g} exceeds the predicted gain of "
+                f"{shown(one.percent, 3)} %; state less."
+            )
+    return ""
+
+
+@dataclass(frozen=True, eq=False)
+class _PickParts:
+    """Parts about a pick: their responses, the predicted gains there, and the widest tolerances for demands on these."""
+
+    study: Study
+    surfaces: Sequence[Surface]
+    point: Array
+    settings: Tolerances
+    confirmed: Mapping[str, Confirmed]
+    neighbours: Neighbourhood | None
+    scene: Scene | None
+
+    @cached_property
+    def goals(self) -> Goals:
+        """The goals of the study."""
+        return goals_of(self.study)
+
+    @cached_property
+    def free_factors(self) -> Rows:
+        """Places of the factors that have a tolerance."""
+        return np.flatnonzero(~rigid_factors(self.study))
+
+    @cached_property
+    def simulated_baseline(self) -> Array | None:
+        """Simulated responses (m,) of the baseline, if these count instead of the surfaces."""
+        return None if self.neighbours is None or not self.confirmed else self.confirmed["baseline"].values
+
+    @cached_property
+    def ends(self) -> list[Array]:
+        """Predicted responses (1, m) at the baseline and at the pick."""
+        if self.neighbours is not None and self.simulated_baseline is not None:
+            return [self.simulated_baseline[None], self.neighbours.values]
+        places = (self.study.baseline, self.point)
+        return [predict_all(self.surfaces, self.study.coded(place)[None]) for place in places]
+
+    @cached_property
+    def gain(self) -> Array:
+        """Predicted gains (q,) in costs."""
+        return np.asarray((self.goals.costs(self.ends[0]) - self.goals.costs(self.ends[1]))[0])
+
+    @cached_property
+    def unit(self) -> Array:
+        """Costs (q,) that are one percent of the baseline."""
+        return np.abs(self.ends[0][0, self.goals.objectives]) / 100.0
+
+    @property
+    def percent(self) -> Array:
+        """Predicted gains (q,) in percent of the baseline; of a baseline of zero, infinite."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.gain == 0.0, 0.0, self.gain / self.unit)
+
+    @cached_property
+    def _coefficients(self) -> list[Array] | None:
+        settings = self.settings
+        return draw_all(self.surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
+
+    def _responses(self, coded: Array) -> Array:
+        """Responses (samples, m); with the errors of the surfaces, each row on its own draw."""
+        if self._coefficients is None:
+            return predict_all(self.surfaces, coded)
+        return predict_paired(self.surfaces, self._coefficients, coded)
+
+    def _at(self, place: Array) -> Array:
+        """Responses (samples, m) at one place (k,), for each part may have its own draw of the surfaces."""
+        return self._responses(np.repeat(self.study.coded(place)[None], self.settings.samples, axis=0))
+
+    @cached_property
+    def _centre_values(self) -> Array:
+        return self._at(self.point)
+
+    @cached_property
+    def _reference(self) -> Array:
+        """Costs (samples, q) of the baseline."""
+        if self.simulated_baseline is not None:
+            return self.goals.costs(np.broadcast_to(self.simulated_baseline, self._centre_values.shape))
+        return self.goals.costs(self._at(self.study.baseline))
+
+    def _costs(self, parts: Array) -> Array:
+        """Costs and violations (samples, q + c) of parts (samples, f), values of the factors that have a tolerance."""
+        points = np.tile(self.point, (len(parts), 1))
+        points[:, self.free_factors] = parts
+        coded = self.study.coded(points)
+        values = self._responses(coded)
+        if (here := self.neighbours) is not None:
+            values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
+        return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
+
+    def tolerances(self, demands: Sequence[Demand], draws: Draws | None) -> PickTolerances:
+        """The widest tolerances that keep the demands; with ``draws``, the interval has the errors of the surfaces."""
+        widest = self._widest(demands, draws)
+        grades = {} if self.scene is None else grades_of(self.study, self.scene, self.point, widest.half_widths)
+        free = self._free_gains(demands, widest)
+        return PickTolerances(self.settings, tuple(self.study.factors), widest, tuple(demands), free, grades)
+
+    def _widest(self, demands: Sequence[Demand], draws: Draws | None) -> WidestTolerances:
+        study, settings, free = self.study, self.settings, self.free_factors
+        least = np.array([-np.inf if one.least is None else one.least for one in demands]) * np.maximum(
+            self.unit, 1e-300
+        )
+        share = np.array([one.least is not None and one.response not in settings.at_least for one in demands])
+        least[share] = settings.keep * self.gain[share]
+        slack = 1e-9 * np.abs(self.gain).max()
+        no_violations = np.zeros((settings.samples, len(self.goals.limited)))
+        half_widths = known_tolerances(study)
+        ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
+        low, high = _box(study, self.point, None if self.neighbours is None else np.nan_to_num(ratios))
+        count = None if draws is None else keeping(study, draws, self.point, free, least - slack)
+        tolerances = widest_tolerances(
+            self._costs,
+            self.point[free],
+            np.hstack([self._reference - least, no_violations]) + slack,
+            (study.step if np.isnan(ratios[free]).any() else ratios)[free],
+            lower=low[free],
+            upper=high[free],
+            names=self._names,
+            promise=self._promise(demands),
+            count_on_draws=count,
+            open_errors=open_errors(self.surfaces, searched=self.neighbours is not None),
+            **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
+        )
+        return replace(tolerances, sentence=_impossible(demands) or tolerances.sentence).among(free, self.point.size)
+
+    def _promise(self, demands: Sequence[Demand]) -> str:
+        """What parts keep, in words."""
+        counted = any(one.least is not None for one in demands)
+        kept = [*["the gains that count"] * counted, *["all limits"] * bool(self.goals.limited)]
+        return f"keep {' and '.join(kept)}"
+
+    @property
+    def _names(self) -> list[str]:
+        """Names of the gains and limits."""
+        responses = self.study.responses
+        names = [f"{GAIN}{responses[index]}" for index in self.goals.objectives]
+        return [*names, *(f"{responses[index]} {sense} {limit:g}" for index, sense, limit in self.goals.limited)]
+
+    def _free_gains(self, demands: Sequence[Demand], widest: WidestTolerances) -> dict[str, tuple[float, float]]:
+        """Ends [%] of the gains of 95 % of the parts, by response whose gain does not count."""
+        half = np.nan_to_num(widest.half_widths[self.free_factors])
+        settings = self.settings
+        offsets = random_offsets(settings.samples, half.size, settings.distribution, settings.seed)
+        costs = self._costs(self.point[self.free_factors] + half * offsets)
+        ends = np.quantile(self._reference - costs[:, : len(demands)], MIDDLE, axis=0) / np.maximum(self.unit, 1e-300)
+        return {
+            one.response: (float(low), float(high))
+            for one, low, high in zip(demands, *ends, strict=True)
+            if one.least is None
+        }
+
+
+def _box(study: Study, point: Array, extent: Array | None) -> tuple[Array, Array]:
+    """Ends (k,) of the region in which parts may lie, at least ``extent`` (k,) from the point, if stated."""
+    reach = region_of(study) * study.step
+    region = study.centre - reach, study.centre + reach
+    if extent is None:
+        return region
+    return np.minimum(region[0], point - extent), np.maximum(region[1], point + extent)
