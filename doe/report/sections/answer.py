@@ -95,7 +95,7 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(meaning, "small"),
         Paragraph(part(summary, "clearance_class") or "", "small"),
-        Paragraph(part(summary, "tolerances_warning") or ""),
+        Paragraph(part(summary, "tolerances_warning") or "", "warning"),
         Paragraph(f"Tolerances: {sentence}" if sentence else ""),
     ]
 
