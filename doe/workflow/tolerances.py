@@ -107,6 +107,11 @@ class PickTolerances:
         return self.widest.half_widths
 
     @property
+    def any_width(self) -> bool:
+        """Whether parts may differ at all."""
+        return bool((self.half_widths > 0.0).any())
+
+    @property
     def limiting_gain(self) -> str:
         """Response whose gain limits the tolerances; empty where a limit or the rim of the region does."""
         name = self.widest.limited_by
@@ -148,6 +153,8 @@ class PickTolerances:
     @property
     def sentence(self) -> str:
         """The tolerances, what limits them, and which gains count, in words."""
+        if not self.any_width:
+            return self.widest.sentence
         counted = [
             f"{one.words} {shown(one.least, 2)} of {shown(one.percent, 2)} %"
             for one in self.demands
@@ -188,7 +195,9 @@ class PickTolerances:
         at_rim = dict(zip(self.factors, self.widest.at_rim.tolist(), strict=True))
         rim, fine = ([name for name in self.too_fine if at_rim[name] is side] for side in (True, False))
         grade, cause, sentences = f"IT{self.settings.finest_grade}", _limit_words(self.widest.limited_by), list[str]()
-        if fine:
+        if fine and not self.any_width:
+            sentences.append(f"{_begun(cause)} leaves no tolerance.")
+        elif fine:
             sentences.append(f"{_begun(cause)} demands parts finer than {grade}: {self._listed(fine)}.")
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
