@@ -84,18 +84,16 @@ def _parts_table(name: str, chain: Record) -> Table:
 
 def _sizes_table(title: str, rows: Mapping[str, Record]) -> Table:
     cells = [
-        (
-            label(name),
-            dimension(row),
-            row.get("grade_words") or row.get("grade") or "",
-            moved(row),
-            row.get("origin") or "",
-            row.get("iso_class") or "",
-        )
-        for name, row in rows.items()
+        (label(name), dimension(row), _grade(row), moved(row), row.get("origin") or "") for name, row in rows.items()
     ]
-    header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations", "ISO 286 class within")
-    return Table(title, header, cells, text_columns=(2, 4, 5)).without_empty_columns()
+    header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations")
+    return Table(title, header, cells, text_columns=(2, 4)).without_empty_columns()
+
+
+def _grade(row: Record) -> str:
+    """'IT7, m6 within' of a part: its grade, and of a seat the class of ISO 286 within its limits."""
+    within = f"{row['iso_class']} within" if row.get("iso_class") else ""
+    return ", ".join(word for word in (row.get("grade_words") or row.get("grade"), within) if word)
 
 
 def refused(chain: Record) -> bool:
@@ -109,7 +107,7 @@ def _refusal(chain: Record) -> list[Block]:
     figures = ("nominal_mm", "upper_mm", "lower_mm")
     differs = any(row[key] != stated[name][key] for name, row in nearest.items() if name in stated for key in figures)
     return [
-        Paragraph(_miss(chain), "statement"),
+        Paragraph(_miss(chain), "warning"),
         Paragraph(_sentence(str(chain["status"]))),
         Paragraph(part(chain, "remedy", "sentence") or ""),
         _sizes_table("The nearest sizes that meet the limits", nearest if differs else {}),
@@ -248,6 +246,7 @@ def _selective(assembly: Record) -> list[Block]:
     low, high = assembly["worst_case_mm"]
     needed = assembly.get("classes_needed")
     enough = "no number of classes keeps the limits" if needed is None else f"{needed} classes keep the limits"
+    enough = "random assemblies keep the limits" if needed == 1 else enough
     classes = counted(assembly["classes"], "class")
     good = with_error(assembly["good_of_matched"], NORMAL * assembly["standard_error"])
     rows = [
