@@ -31,7 +31,14 @@ StudyOut = Annotated[
 ]
 Save = Annotated[Path | None, folder_option("Also write the JSON record here.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, only the answer.")]
-Verbose = Annotated[bool, flag("--verbose", "-v", says="Also print the analysis of variance.")]
+Verbose = Annotated[
+    bool,
+    flag(
+        "--verbose",
+        "-v",
+        says="Also every confirmed point, chains, the published table, the analysis of variance, all notes in full.",
+    ),
+]
 
 
 @contextmanager

@@ -40,6 +40,7 @@ def blocks(result: BallResult) -> list[Block]:
 
     return [
         *rows,
+        Heading("whole bearing" if sentences and any(titles.values()) else ""),
         *map(Paragraph, sentences),
         *tables,
         *notes(result.notes or ()),

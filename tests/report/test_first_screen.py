@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import date
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import EXAMPLE, ROOT
+from instant_runs import instant_result
 from pareto_cases import TOLERANCES, edited_study, table_surfaces
 from synthetic_study import RESPONSES, summary
+from typer.testing import CliRunner
 
 from doe.report.files import answer_text, blocks
 from doe.report.page import html_report
@@ -20,6 +25,7 @@ from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
+from rbdyn.cli.app import app
 
 ORDER = (
     "made-up bearing",
@@ -188,3 +194,23 @@ def test_a_better_point_that_speaks_for_itself_is_recommended(predicted):
     forecast.at, forecast.searched = (lambda point: None), SimpleNamespace(name="adaptive")
     (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
     assert "no point of the adaptive front, from which the pick is chosen" in sentence
+
+
+def test_a_simulation_begins_with_bearing_point_and_date(monkeypatch):
+    """Then its figures with their errors."""
+
+    def simulate(scene, *rest, **more):
+        return replace(instant_result(scene), cost={"wall_s": 1.0, "compile_s": 0.0})
+
+    monkeypatch.setattr("rbdyn.dynamics.simulate.simulate", simulate)
+    shown = CliRunner().invoke(app, ["simulate", str(EXAMPLE)]).stdout
+    bearing, point, day = shown.splitlines()[0].split("; ")
+    assert bearing == "cylindrical roller bearing, 10 rollers 9 x 5 mm, pitch diameter 43.5 mm"
+    assert point == "24000 rpm, 1300 N radial, MIL-L-7808 at 100 °C" and date.fromisoformat(day)
+    assert shown.index("power loss [W]") < shown.index("race loads")
+
+
+def test_balls_have_their_figures_before_the_table_of_all_balls():
+    shown = CliRunner().invoke(app, ["ball", str(ROOT / "examples" / "angular_contact_ball.toml")]).stdout
+    assert shown.startswith("angular contact ball bearing, ")
+    assert shown.index("life L10r") < shown.index("stiffness: ") < shown.index("azimuth")
