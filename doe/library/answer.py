@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from doe.running.runner import Agenda
 from rbdyn.base import html, terminal
-from rbdyn.base.blocks import Block, Detail, Section, Widget, says
+from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, says
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.result import write_json
 
@@ -105,9 +105,9 @@ class Answer(Mapping[str, Any]):
 
 
 def _still(section: Section) -> Section:
-    """The section without empty blocks and without places of interactive pictures, which need scripts."""
+    """The section without empty blocks and interactive pictures, and with tables for tiles: a cell has no scripts or styles."""
     blocks = [block for block in section.blocks if says(block) and not isinstance(block, Widget)]
-    return replace(section, blocks=blocks)
+    return replace(section, blocks=[block.table if isinstance(block, Tiles) else block for block in blocks])
 
 
 def _rendered(section: Section) -> str:
