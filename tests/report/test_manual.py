@@ -243,7 +243,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
         ("map", rollers, "--speed", "20000:24000:2", "--load", "1300:1500:2", *brief),
         ("ball", balls),
         ("ball", balls, "--sweep", "operation.inner_speed_rpm=1000:2000:2"),
-        ("ball", balls, "--preload", "100:200:2"),
+        ("ball", balls, "--preload", "100:300:3"),
     ):
         folder = tmp_path / "_".join((name, *(str(word).strip("-") for word in call[1:2])))
         assert command(name, *call, "--out", folder).returncode == 0
