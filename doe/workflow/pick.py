@@ -49,7 +49,8 @@ LARGE_FREEDOM = 1e9
 class SearchedPick:
     """A row of the searched front and why it was picked; ``aware`` is None where the study asks for no tolerances.
 
-    ``shares`` (f,): share of draws of the errors in which each row of the front is the pick.
+    ``shares`` (f,): share of draws of the errors of the front's runs in which each row is the pick. The changes within the
+    tolerances are not drawn.
     """
 
     row: int

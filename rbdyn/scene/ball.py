@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Largest difference of a stated contact angle from that of a stated clearance.
 AGREED_DEG = 0.2
 
-# Shoulder height of catalogue bearings over the ball's diameter, and how far a steep contact angle stays below its shoulder.
+# Estimated shoulder height over the ball's diameter, and how far a steep contact angle stays below its shoulder.
 SHOULDER, BELOW_SHOULDER_DEG = 0.2, 20.0
 
 GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
@@ -53,9 +53,10 @@ class BallRow(Consistent):
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
     inner_shoulder_height_mm: Positive | None = None
-    """Height of the inner ring's shoulder over the bottom of its groove. Default: a fifth of the ball's diameter. Catalogue
-    shoulders of deep groove bearings 6205 and 6208 have 0.21 and 0.19 of it, a spindle bearing of 15 degrees 0.25. For contact
-    angles above some 32 degrees the default reaches 20 degrees beyond them. A note says where a contact climbs over it."""
+    """Height of the inner ring's shoulder over the bottom of its groove, half of what a maker's shoulder diameter is larger than
+    the raceway. Default: a fifth of the ball's diameter, an estimate. A published spindle bearing of 15 degrees (pitch 18 mm,
+    balls of 4.485 mm, shoulders of 15.74 and 21.4 mm) has 0.25 of it inside and 0.12 outside. For contact angles above some 32
+    degrees the default reaches 20 degrees beyond them. A note says where a contact climbs over it."""
     outer_shoulder_height_mm: Positive | None = None
     """The same height of the outer ring's shoulder, with the same default."""
     bore_mm: Positive | None = None

@@ -187,7 +187,7 @@ def test_bad_keys_of_pulses_end_in_a_sentence(keys: dict[str, float], sentence: 
     ("kind", "change", "sentence"),
     [
         ("impact_force", {"header": "t_s,force"}, "column force_N or force_kN is missing; add it"),
-        ("impact_force", {"bandwidth": 10_001.0}, "1e+05 samples a second are fewer than 10 a period of bandwidth_hz = 10001"),
+        ("impact_force", {"bandwidth": 10_010.0}, "1e+05 samples a second are fewer than 10 a period of bandwidth_hz = 10010"),
         ("impact_force", {"threshold": 99.9}, "above threshold_N = 99.9; at least 100 are needed"),
         ("impact_force", {"uneven": True}, "t_s does not rise evenly; give samples at equal intervals"),
         ("impact_pulses", {"header": "t_s,height_N", "reverse": True}, "t_s does not rise from pulse to pulse"),
