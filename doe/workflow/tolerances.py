@@ -172,7 +172,8 @@ class PickTolerances:
         if settings.gains is not None or settings.at_least:
             sentences = [f"[tolerances] does not name {gains}."] if free else []
         elif any(one.percent >= ENOUGH * settings.smallest_difference_percent for one in self.demands):
-            sentences = [f"A gain counts from {smallest}; {gains} does not."] if free else []
+            verb = "does" if len(free) == 1 else "do"
+            sentences = [f"A gain counts from {smallest}; {gains} {verb} not."] if free else []
         else:
             sentences = [f"No gain reaches {smallest}, so all real gains count."] if counted else []
             sentences += [f"Not real: {gains}."] if free else []
