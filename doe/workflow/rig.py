@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, gap_notes, listed, read_sheet
 from doe.workflow.input_sets import key_values, unknown_keys
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
@@ -94,7 +96,7 @@ def read_rig(path: Path) -> Rig:
         rows.append(row)
         notes += [note] if note else []
     refuse(faults)
-    gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs}
+    gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
     rig = Rig(path, rows, keys, outputs, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))
     if len(rig.conditions) > MOST_CONDITIONS:
         raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])
