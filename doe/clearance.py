@@ -21,6 +21,7 @@ from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, read_toml, refuse
+from rbdyn.base.forecast import Measured
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -206,6 +207,30 @@ def work_of(scene: Scene) -> float:
     """Least shaft turns of a run of a scene, with those of its companions."""
     numerics = scene.numerics
     return (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
+
+
+# Shaft turns of a probe at most, the part between two looks at the clock, and the time [s] after which it ends.
+PROBE_TURNS, PROBE_PART, PROBE_S = 4.0, 0.25, 0.5
+
+
+def probe(scene: Scene) -> Measured:
+    """Pace of a scene's runs by its first shaft turns, which are run for it and not kept. Raises RunError."""
+    from rbdyn.dynamics.ensemble import Stop
+    from rbdyn.dynamics.parameters.model import roller_bearing
+    from rbdyn.dynamics.run import Run, prepare
+
+    bearing = roller_bearing(scene)
+    prepare(scene, bearing)
+    run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
+    turns, started = 0.0, time.perf_counter()
+    while turns < PROBE_TURNS and time.perf_counter() - started < PROBE_S:
+        turns += PROBE_PART
+        if scene.pulse_samples_per_turn:
+            run.walls(
+                turns - PROBE_PART, scene.pulse_samples_per_turn, round(PROBE_PART * scene.pulse_samples_per_turn)
+            )
+        run.to(turns)
+    return Measured().plus(turns, time.perf_counter() - started)
 
 
 def points_of(

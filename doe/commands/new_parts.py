@@ -65,9 +65,11 @@ def clearance_parts(scene: Scene) -> dict[str, ClearanceParts]:
     bearing, cage = scene.bearing, scene.cage
     pitch, roller, radial = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, bearing.radial_clearance_mm
     around = "pitch diameter {} roller {} half of the clearance"
+    # The outer raceway is at the resolution of a drawing, and the inner one closes to the clearance.
+    outer = round(pitch + roller + 0.5 * radial, MICROMETRES)
     raceways = (
-        Part("outer_raceway", 1.0, _size(pitch + roller + 0.5 * radial), around.format("+", "+")),
-        Part("inner_raceway", -1.0, _size(pitch - roller - 0.5 * radial), around.format("-", "-")),
+        Part("outer_raceway", 1.0, outer, around.format("+", "+")),
+        Part("inner_raceway", -1.0, _size(outer - 2.0 * roller - radial), around.format("-", "-")),
         Part("rollers", -2.0, roller),
     )
     pocket = (

@@ -1,22 +1,16 @@
-"""Options of several commands, with the simulations, surfaces, agenda and record that follow from them."""
+"""Options of several commands, and what they print while runs go on and after these."""
 
-import os
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rbdyn.base.command import checkpoint_message, flag, folder_option, notice, output_folder, progress_bar, valued
-from rbdyn.base.faults import RunError
+from rbdyn.base.command import checkpoint_message, flag, folder_option, progress_bar, valued
 
 if TYPE_CHECKING:
-    from doe.clearance import Simulations
-    from doe.response_surface import Surface
-    from doe.running.runner import AgendaKeeper, Progress
-    from doe.study_file import Study
+    from doe.running.runner import Agenda, Progress
 
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
@@ -40,129 +34,36 @@ Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, only the answer
 Verbose = Annotated[bool, flag("--verbose", "-v", says="Also print the analysis of variance.")]
 
 
-def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> None:
-    """Write the JSON record of the file ``source`` into the folder of ``--out``, if there is one."""
-    if out is not None:
-        from rbdyn.result import write_json
-
-        write_json(output_folder(out, "doe", source) / name, record)
-
-
 @contextmanager
-def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
-    """Register that the file ``source`` runs in ``out``, for ``doe status``.
-
-    On Ctrl-C a sentence says that the store in ``out`` keeps the finished runs.
-    """
-    from doe.running.store import at_work
+def keeping_runs(out: Path | None) -> Iterator[None]:
+    """On Ctrl-C a sentence says that the store in ``out`` keeps the finished runs."""
     from doe.workflow.runs import STORE
 
-    with (
-        checkpoint_message(None if out is None else out / STORE),
-        nullcontext() if out is None else at_work(source, out / STORE),
-    ):
+    with checkpoint_message(None if out is None else out / STORE):
         yield
 
 
 @contextmanager
-def stages(quiet: bool, workers: int | None) -> "Iterator[Callable[[str], Progress]]":
-    """Progress of stages by title, one after the other, because a terminal has room for one bar; ``workers`` run at once."""
-    with ExitStack() as bars:
+def bars(quiet: bool, workers: int | None) -> "Iterator[Callable[[str, int, int], None]]":
+    """``progress(stage, done, total)`` on a terminal, one bar at a time for which it has room; ``workers`` run at once."""
+    with ExitStack() as stack:
+        stage, last = "", 0
+        bar: Progress | None = None
 
-        def stage(title: str) -> "Progress":
-            bars.close()
-            return bars.enter_context(progress_bar(title, quiet, workers))
+        def progress(title: str, done: int, total: int) -> None:
+            nonlocal stage, last, bar
+            if bar is None or title != stage or done < last:
+                stack.close()
+                bar = stack.enter_context(progress_bar(title, quiet, workers))
+            stage, last = title, done
+            bar(done, total)
 
-        yield stage
-
-
-@contextmanager
-def simulations_in(
-    folder: Path,
-    source: Path,
-    workers: int | None,
-    scheduler: str | None,
-    retry: bool,
-    quiet: bool,
-    agenda: "AgendaKeeper | None" = None,
-) -> "Iterator[Simulations]":
-    """Simulations for the file ``source``, stored in a folder and counted in an agenda."""
-    from doe.clearance import Simulations
-    from doe.running.store import Store
-    from doe.workflow.runs import STORE
-
-    with Store(folder / STORE, source.stem) as store, stages(quiet, workers) as progress:
-        progress = progress if agenda is None else agenda.announced(progress)
-        yield Simulations(store, workers, scheduler, retry, progress, agenda)
+        yield progress
 
 
-@contextmanager
-def noted_agenda(
-    folder: Path,
-    command: str,
-    workers: int | None,
-    quiet: bool,
-    options: Mapping[str, bool] | None = None,
-    inputs: str = "",
-    question: str = "",
-) -> "Iterator[AgendaKeeper]":
-    """The agenda of a command in the store of its folder, for ``doe status``; unless ``quiet`` it states a prediction.
-
-    ``inputs``: digest of the inputs of its answer; ``question``: digest of all that decides its runs.
-    """
-    from doe.running.runner import agenda_in
-    from doe.workflow.runs import STORE
-
-    threads = workers or os.cpu_count() or 1
-    with agenda_in(folder / STORE, command, threads, options, inputs, notice(quiet), question) as agenda:
-        yield agenda
-
-
-def print_predicted(agenda: "AgendaKeeper | None", as_json: bool) -> None:
+def print_predicted(agenda: "Agenda | None", as_json: bool) -> None:
     """Print the time of a command compared with the prediction, if there was one."""
     from rbdyn.base.forecast import duration, span
 
-    noted = None if agenda is None or as_json else agenda.agenda
-    if noted is not None and noted.prediction_s is not None and noted.took_s is not None:
-        print(f"The whole command took {duration(noted.took_s)}; predicted were {span(*noted.prediction_s)}")
-
-
-class Effort(NamedTuple):
-    """Options of the runs of a command: ``--out``, ``--workers``, ``--scheduler``, ``--retry``, and whether it is quiet."""
-
-    out: Path | None
-    workers: int | None
-    scheduler: str | None
-    retry: bool
-    quiet: bool
-
-
-def fitted(study: "Study", data: Path | None, effort: Effort) -> "tuple[list[Surface], tuple[str, ...]]":
-    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
-
-    Raises InputError, RunError, KeyboardInterrupt.
-    """
-    from doe.workflow.runs import read_runs, run_design
-    from doe.workflow.surfaces import fit_surfaces
-
-    if data is not None:
-        runs = read_runs(study, data)
-        return fit_surfaces(study, runs), runs.notes
-    out, workers, scheduler, retry, quiet = effort
-    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
-        return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry)), ()
-
-
-@contextmanager
-def _store_folder(out: Path | None, source: Path) -> Iterator[Path]:
-    """The stated folder, or one that lasts as long as the command."""
-    if out is not None:
-        yield output_folder(out, "doe", source)
-        return
-    from doe.running.store import StoppedError
-
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            yield Path(folder)
-        except StoppedError as error:
-            raise RunError("{}; without --out no finished run is kept: {}".format(*error.args)) from None
+    if agenda is not None and not as_json and agenda.prediction_s is not None and agenda.took_s is not None:
+        print(f"The whole command took {duration(agenda.took_s)}; predicted were {span(*agenda.prediction_s)}")

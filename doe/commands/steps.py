@@ -1,21 +1,15 @@
 """One step of a study alone: ``doe design``, ``doe fit``, ``doe front`` and ``doe chain``."""
 
 import sys
-from collections.abc import Mapping
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from doe.commands.options import Data, Effort, Out, Quiet, Retry, Save, Scheduler, StudyPath, fitted, keeping_runs, save
-from rbdyn.base.blocks import Block, Detail, Note, Paragraph
-from rbdyn.base.command import BAD_INPUT, Json, Workers, flag, guarded, hand_over, valued
-from rbdyn.base.faults import InputError, refuse
+from doe.commands.options import Data, Out, Quiet, Retry, Save, Scheduler, StudyPath, bars, keeping_runs
+from rbdyn.base.blocks import Detail
+from rbdyn.base.command import FAILED, Json, Workers, flag, guarded, hand_over, valued
 from rbdyn.base.terminal import show
-
-if TYPE_CHECKING:
-    from doe.study_file import Study
 
 
 def design(
@@ -28,28 +22,12 @@ def design(
 ) -> None:
     """Print the design: every run, and how well the runs identify the terms of the models."""
     with guarded(as_json):
-        from doe.report.sections.design import design_blocks, design_record, print_csv
-        from doe.study_file import Study
-        from doe.workflow.runs import augment_notes, design_of, evaluation
-        from doe.workflow.whole import check_study
+        from doe.library.steps import design
+        from doe.report.sections.design import print_csv
 
-        loaded = Study.load(path)
-        # Without a scene the runs are made elsewhere, and only the design itself is checked.
-        if loaded.file.scene and loaded.path_of(loaded.scene.file).exists():
-            check_study(loaded)
-        points = design_of(loaded)
-        notes = augment_notes(loaded)
-        record = design_record(loaded, points, evaluation(loaded, points)) | ({"notes": list(notes)} if notes else {})
-        save(out, path, "design.json", record)
-        detail = Detail.of(quiet, verbose)
-
-        def answer() -> None:
-            if as_csv:
-                print_csv(record)
-            else:
-                show(_noted(record, design_blocks(record)), detail)
-
-        hand_over(lambda: record, as_json, answer)
+        answer, detail = design(path, out), Detail.of(quiet, verbose)
+        record = answer.as_dict()
+        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(answer.blocks(), detail))
 
 
 def fit(
@@ -80,69 +58,12 @@ def fit(
     ] = False,
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
-    with guarded(as_json), ExitStack() as contexts:
-        loaded, notes = _study_or_table(path, data, {"factor": factor, "response": response, "model": model})
-        contexts.enter_context(keeping_runs(out, loaded.path))
-        from doe.report.sections.fit import fit_record, fit_tables
-        from doe.workflow.surfaces import unrivalled, with_rivals
+    with guarded(as_json), keeping_runs(out):
+        from doe.library.steps import fit
 
-        surfaces, reading = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
-        surfaces = with_rivals(surfaces)
-        remarks = [*reading, *notes, *unrivalled(surfaces)]
-        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
-        save(out, loaded.path, "fit.json", record)
-        if out is not None:
-            from rbdyn.base.records import save_table
-
-            for name, rows in fit_tables(surfaces).items():
-                save_table(rows, out / name)
-        hand_over(
-            lambda: record, as_json, lambda: show(_fit_answer(record, loaded, data, path), Detail.of(quiet, verbose))
-        )
-
-
-def _noted(record: dict[str, Any], blocks: list[Block]) -> list[Block]:
-    """The blocks behind the notes of their record."""
-    return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
-
-
-def _fit_answer(record: dict[str, Any], study: "Study", data: Path | None, path: Path | None) -> list[Block]:
-    """The factors and responses of a table without a study, notes, and the fits."""
-    from doe.report.sections.fit import fit_blocks
-    from doe.report.sections.record import drop_undefined, readable
-
-    columns = (
-        f"{data}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends of "
-        "a factor's range"
-    )
-    fits = [
-        block
-        for name, fitted in drop_undefined(record["responses"]).items()
-        for block in fit_blocks(name, fitted, study.factors)
-    ]
-    return [Paragraph(columns if path is None else ""), *_noted(record, readable(fits, {}))]
-
-
-def _study_or_table(
-    path: Path | None, data: Path | None, options: Mapping[str, Any]
-) -> "tuple[Study, tuple[str, ...]]":
-    """The study of the file, or else that of the table with the options that name its columns; and notes.
-
-    Raises InputError.
-    """
-    from doe.study_file import Study
-    from doe.study_file.study import study_of_table
-
-    if path is not None:
-        refuse(
-            f"--{option}: {path} states it; leave out one or the other" for option, value in options.items() if value
-        )
-        return Study.load(path), ()
-    if data is None:
-        raise InputError(
-            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
-        )
-    return study_of_table(data, options["factor"] or [], options["response"] or [], options["model"] or "quadratic")
+        with bars(quiet or as_json, workers) as progress:
+            answer = fit(path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
 
 
 Point = Annotated[
@@ -168,64 +89,12 @@ def front(
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
-    with guarded(as_json), keeping_runs(out, path):
-        from doe.report.sections.answer import asked_record
-        from doe.report.sections.front import front_record, given_point_record
-        from doe.study_file import Study
-        from doe.workflow.front import check_goals, find_front, with_survival
+    with guarded(as_json), keeping_runs(out):
+        from doe.library.steps import front
 
-        loaded = Study.load(path)
-        check_goals(loaded)
-        values = None if point is None else _point(loaded, point)
-        effort = Effort(out, workers, scheduler, retry, quiet or as_json)
-        surfaces, reading = fitted(loaded, data, effort)
-        pareto = with_survival(loaded, surfaces, find_front(loaded, surfaces))
-        record = front_record(loaded, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
-        if values is not None:
-            import numpy as np
-
-            record["point"] = given_point_record(loaded, surfaces, pareto, np.array(values))
-        save(out, path, "front.json", record)
-        summary = {"asked": asked_record(loaded), "front": record}
-        hand_over(lambda: record, as_json, lambda: show(_front_answer(summary), Detail.of(quiet, verbose)))
-
-
-def _front_answer(summary: dict[str, Any]) -> list[Block]:
-    """The front's section of a report; ``asked`` holds its factors and responses, ``front`` its record."""
-    from doe.report.sections.front import front_blocks
-    from doe.report.sections.record import drop_undefined, readable
-
-    clean = drop_undefined(summary)
-    return _noted(summary["front"], readable(front_blocks(clean), clean))
-
-
-def _point(study: "Study", text: str) -> list[float]:
-    """Factor values of ``--point``. Raises InputError with every fault."""
-    from collections import Counter
-    from math import nan
-
-    from doe.study_file.table import RUN, is_number
-
-    values = study.by_factor(study.baseline)
-    parts = [part.strip() for part in text.split(",")]
-    by_name = any("=" in part for part in parts)
-    if not by_name and len(parts) != len(study.factors):
-        raise InputError([f"--point {text}: give a value for each factor ({', '.join(study.factors)}), or name=value"])
-    pairs = [part.partition("=")[::2] for part in parts] if by_name else list(zip(study.factors, parts, strict=True))
-    stripped = [(name.strip(), number.strip()) for name, number in pairs]
-    counts = Counter(name for name, _ in stripped)
-    faults = [f"--point {name}: given {count} times; give it once" for name, count in counts.items() if count > 1]
-    for name, number in stripped:
-        if name not in values:
-            faults.append(f"--point {name}: no such factor; name one of {', '.join(values)}")
-            continue
-        value = float(number) if is_number(number) else nan
-        if RUN.contains(value):
-            values[name] = value
-        else:
-            faults.append(f"--point {name} = {number}: {RUN.fault(value)}")
-    refuse(faults)
-    return list(values.values())
+        with bars(quiet or as_json, workers) as progress:
+            answer = front(path, data, out, point, workers, scheduler, retry, progress)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
 
 
 def chain(
@@ -237,29 +106,14 @@ def chain(
     quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
 ) -> None:
-    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits is refused."""
+    """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits ends with exit code 1."""
     with guarded(as_json):
-        from doe.dimension_chain import is_several, read_chains, solve
-        from doe.report.sections.chain import chain_blocks, chains_record
+        from doe.library.steps import chain
 
-        several = is_several(path)
-        results, faults = {}, []
-        for name, chain_table in read_chains(path).items():
-            try:
-                results[name] = solve(chain_table, source=f'{path}: chain "{name}"' if several else str(path))
-            except InputError as error:
-                faults += error.faults
-        refuse(faults)
-        record = chains_record(results) if several else next(iter(results.values())).as_dict()
-        save(out, path, "chain.json", record)
-
-        def answer() -> None:
-            for name, result in results.items():
-                show(chain_blocks(name, result.as_dict()), Detail.of(quiet, verbose))
-
-        hand_over(lambda: record, as_json, answer)
-        refused = {name: result.status for name, result in results.items() if result.refused}
-        for name, status in refused.items():
+        answer = chain(path, out)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
+        several = "chains" in answer
+        for name, status in answer.refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)
-        if refused:
-            raise typer.Exit(BAD_INPUT)
+        if answer.refused:
+            raise typer.Exit(FAILED)

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,17 +16,19 @@ from doe.commands.options import (
     StudyOut,
     StudyPath,
     Verbose,
+    bars,
     keeping_runs,
-    noted_agenda,
     print_predicted,
-    stages,
 )
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
-from rbdyn.base.command import FAILED, Json, Workers, folder_option, guarded, hand_over, output_folder, print_json
+from rbdyn.base.command import FAILED, Json, Workers, folder_option, guarded, hand_over, notice, print_json
 from rbdyn.base.faults import InputError
 from rbdyn.base.forecast import duration, span
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted
+
+if TYPE_CHECKING:
+    from doe.library.whole import StudyAnswer
 
 
 def study(
@@ -43,44 +45,45 @@ def study(
 ) -> None:
     """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
     folder = out or Path(f"{path.stem}_results")
-    with guarded(as_json), keeping_runs(folder, path):
-        from doe.study_file import Study
+    with guarded(as_json), keeping_runs(folder):
+        from doe.library.whole import study
 
-        loaded = Study.load(path)
-        output_folder(folder, "doe", path)
-        from doe.workflow.status import finished_record, inputs_digest
-
-        digest = inputs_digest(loaded, adaptive, robust)
-        if not (verbose or retry) and (record := finished_record(folder, digest)):
-            if not as_json:
-                print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
-                print(f"Finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
-            _leave_by(record, as_json)
-            return
-        from doe.report.files import blocks, write
-        from doe.workflow.whole import run_study
-
-        options = {"adaptive": adaptive, "robust": robust}
-        with noted_agenda(folder, "doe study", workers, quiet, options, digest) as agenda:
-            with stages(quiet or as_json, workers) as progress:
-                bars = agenda.announced(progress)
-                outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
-            record = write(outcome, folder)
-            agenda.finish(record["files"])
+        with bars(quiet or as_json, workers) as progress:
+            answer = study(path, folder, adaptive, robust, workers, scheduler, retry, progress, notice(quiet))
+        record = answer.as_dict()
         if not as_json:
-            show(blocks(record), Detail.of(quiet, verbose))
-            print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
-            print_predicted(agenda, as_json)
-            print(f"written to {folder}: {', '.join(record['files'])}")
+            _print(answer, Detail.of(quiet, verbose))
         _leave_by(record, as_json)
 
 
+def _print(answer: "StudyAnswer", detail: Detail) -> None:
+    """The answer of a study; one that was finished before as its answer.txt states it."""
+    files = ", ".join(answer.files)
+    assert answer.folder is not None
+    if answer.finished_before:
+        if detail is Detail.ALL:
+            show(answer.blocks(), detail)
+        else:
+            print((answer.folder / "answer.txt").read_text(encoding="utf-8"), end="")
+        print(f"Finished before, nothing has changed since: {answer.folder} holds {files}")
+        return
+    show(answer.blocks(), detail)
+    cost = answer["cost"]
+    print(f"{cost['total_s']:.1f} s, of which design runs {cost['design_s']:.1f} s")
+    print_predicted(answer.agenda, as_json=False)
+    print(f"written to {answer.folder}: {files}")
+
+
 def _leave_by(record: dict[str, Any], as_json: bool) -> None:
-    """Print the record if asked for, and fail if the pick did not keep its limits."""
+    """Print the record if asked for, and fail if the pick did not keep its limits, or a chain misses its own."""
     if as_json:
         print_json(record)
+    missed = record.get("missed_chains") or {}
     if record["status"] != "ok":
         print(record["limits_sentence"], file=sys.stderr)
+    for name, why in missed.items():
+        print(f"chain {name}: {why}", file=sys.stderr)
+    if missed or record["status"] != "ok":
         raise typer.Exit(FAILED)
 
 

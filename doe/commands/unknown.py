@@ -1,15 +1,17 @@
 """Unknown inputs of a scene: ``doe uncertainty`` and ``doe calibrate``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Quiet, Retry, Scheduler, keeping_runs, noted_agenda, print_predicted, simulations_in
+from doe.commands.options import Quiet, Retry, Scheduler, bars, keeping_runs, print_predicted
 from rbdyn.base.blocks import Detail
-from rbdyn.base.command import Json, Set, Workers, folder_option, guarded, hand_over, output_folder, valued
-from rbdyn.base.faults import no_power_of_two, refuse
+from rbdyn.base.command import Json, Set, Workers, folder_option, guarded, hand_over, notice, valued
 from rbdyn.base.terminal import show
+
+if TYPE_CHECKING:
+    from doe.library.answer import Answer
 
 
 def uncertainty(
@@ -32,32 +34,24 @@ def uncertainty(
 ) -> None:
     """List the unknown inputs of a scene, the range of every output over them, and the share of each input."""
     folder = out or Path(f"{path.stem}_uncertainty")
-    with guarded(as_json), keeping_runs(folder, path):
-        from doe.report.sections.unknown import uncertainty_blocks, uncertainty_record, write_uncertainty
-        from doe.running.runner import ANSWER
-        from doe.workflow.status import content_digest, runs_digest
-        from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
+    with guarded(as_json), keeping_runs(folder):
+        from doe.library.unknown import uncertainty
         from rbdyn.dynamics.target import target_of
 
-        refuse([] if points is None else no_power_of_two("--points ", points))
-        accuracy = target_of(target)
-        output_folder(folder, "doe", path)
-        inputs, runs = content_digest(path), runs_digest(path, overrides or ())
-        with noted_agenda(folder, "doe uncertainty", workers, quiet, inputs=inputs, question=runs) as agenda:
-            agenda.plan(uncertainty_stages(path, overrides or (), points))
-            with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
-                result = find_uncertainty(path, overrides or (), simulations, points, accuracy)
-            agenda.enter(ANSWER)
-            files = write_uncertainty(result, folder)
-            agenda.finish(files)
-        hand_over(
-            lambda: uncertainty_record(result),
-            as_json,
-            lambda: show(uncertainty_blocks(result), Detail.of(quiet)),
-            folder,
-            files,
-        )
-        print_predicted(agenda, as_json)
+        with bars(quiet or as_json, workers) as progress:
+            answer = uncertainty(
+                path,
+                points,
+                target_of(target),
+                overrides or (),
+                folder,
+                workers,
+                scheduler,
+                retry,
+                progress,
+                notice(quiet),
+            )
+        _hand_over(answer, as_json, quiet)
 
 
 def calibrate(
@@ -81,33 +75,18 @@ def calibrate(
 ) -> None:
     """Identify the unknown inputs of a scene from measurements on a rig, and state whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
-    with guarded(as_json), keeping_runs(folder, path):
-        from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
-        from doe.running.runner import ANSWER
-        from doe.workflow.calibration import calibration_stages, find_calibration, question_of, read_question
-        from doe.workflow.status import content_digest
+    with guarded(as_json), keeping_runs(folder):
+        from doe.library.unknown import calibrate
 
-        question = read_question(path, data, free or (), overrides or ())
-        identity = question_of(question)
-        output_folder(folder, "doe", path)
-        record, noted = None if retry else stored(folder, identity), None
-        if record is None:
-            inputs = content_digest(path)
-            with noted_agenda(folder, "doe calibrate", workers, quiet, inputs=inputs, question=identity) as agenda:
-                agenda.plan(calibration_stages(question))
-                with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
-                    result = find_calibration(question, simulations)
-                agenda.enter(ANSWER)
-                record = record_of(result, identity)
-                write(result, record, folder)
-                agenda.finish(files_of(record))
-                noted = agenda
-        finished_record = record
-        hand_over(
-            lambda: finished_record,
-            as_json,
-            lambda: show(blocks(finished_record), Detail.of(quiet)),
-            folder,
-            files_of(finished_record),
-        )
-        print_predicted(noted, as_json)
+        with bars(quiet or as_json, workers) as progress:
+            answer = calibrate(
+                path, data, free or (), overrides or (), folder, workers, scheduler, retry, progress, notice(quiet)
+            )
+        _hand_over(answer, as_json, quiet)
+
+
+def _hand_over(answer: "Answer", as_json: bool, quiet: bool) -> None:
+    """Print the answer with the names of its files, and its time compared with the prediction."""
+    detail = Detail.of(quiet)
+    hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
+    print_predicted(answer.agenda, as_json)

@@ -4,6 +4,8 @@
 - ``closing``: the closing link as a function of its parts, expressions included, and its intervals
 - ``yields``: distributions of parts, yield of tolerances, selective assembly
 - ``allocation``: tolerances of parts from the limits of the closing link
+- ``drawing``: sizes on the steps of a drawing's resolution
+- ``refusal``: by how much a chain misses its limits, why, and what would meet them
 - ``solution``: ``solve`` and its record
 """
 

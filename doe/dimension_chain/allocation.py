@@ -4,7 +4,8 @@
 the cheapest tolerances by the curves of the links. Together they fill the limits by worst case, root sum square, or a
 yield. For a yield, or in a chain with functions, one factor scales the tolerances of the linear rule until they fill the
 limits. The nominal of one part is moved so that the closing link's maximum is at its upper limit. For a yield its
-mean is midway between the limits, or the middle of its tails in a chain with functions.
+mean is midway between the limits, or the middle of its tails in a chain with functions. Last, all sizes are rounded to the
+resolution of the drawing and judged again; the widest tolerances are narrowed until the rounded parts keep the limits.
 
 The cheapest tolerances are the Lagrange optimum of cost curves a + b/T^k with one multiplier L. By worst case
 T = (k b/(L |c|))^(1/(k+1)) with sum |c| T = W. By root sum square T = (k b/(2 L c^2))^(1/(k+2)) with sum c^2 T^2 = W^2. Each
@@ -14,13 +15,14 @@ Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (198
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import exp, inf, sqrt
 
 import numpy as np
 
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
+from doe.dimension_chain.drawing import at_nominal, least_tolerance, narrower, places, rounded_part
 from doe.dimension_chain.links import (
     DIGITS,
     SLACK,
@@ -44,13 +46,8 @@ WANDER = 0.5  # share of the nominal beyond which the steps of Newton have lost 
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
+Grades = Mapping[str, str]
 SPAN = 700.0  # of the logarithm of the multiplier, the range of a float
-
-
-def moved_by(part: Part, step: float) -> Part:
-    """The part with another nominal."""
-    nominal = round(part.nominal_mm + step, DIGITS)
-    return replace(part, nominal_mm=nominal, moved_mm=round(part.moved_mm + nominal - part.nominal_mm, DIGITS))
 
 
 @dataclass(frozen=True)
@@ -70,26 +67,50 @@ class Allocation:
         return self.chain.allocate.mode
 
     @property
+    def resolution(self) -> float:
+        """Resolution of the drawing, mm."""
+        return self.chain.allocate.resolution_mm
+
+    @property
     def adjusted(self) -> Link:
         """The link whose nominal is moved."""
-        free = {link.name: link for link in self.chain.free if link.coefficient != 0}
+        free = {link.name: link for link in self.chain.free if link.coefficient or link.name in self.function.arguments}
         name = self.chain.allocate.adjust
-        return free[name] if name else min(free.values(), key=lambda link: link.coefficient < 0)
+        ranks = {1: 0, -1: 1, 0: 2}
+        return free[name] if name else min(free.values(), key=lambda link: ranks[int(np.sign(link.coefficient))])
 
-    def parts(self, tolerances: Tolerances, grades: Mapping[str, str] | None = None) -> list[Part]:
+    @cached_property
+    def slopes(self) -> dict[str, float]:
+        """Change of the closing link per unit of each free link, at the stated nominals where the coefficient is 0."""
+        by_coefficient = {link.name: link.coefficient for link in self.chain.free}
+        if all(by_coefficient.values()):
+            return by_coefficient
+        by_name = {link.name: link for link in self.chain.link}
+        parts = [stated_part(link, by_name) for link in self.chain.link if link.is_dimension or link.thermal_growth]
+        slopes = self.function.sensitivities(middle(parts))
+        return {name: coefficient or slopes[name] for name, coefficient in by_coefficient.items()}
+
+    def parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[Part]:
         """All parts, with ``tolerances`` in mm of those that are not fixed, and with one nominal moved.
 
         Raises MethodError where no nominal of that part brings the closing link to its limits.
         """
+        return self._adjusted_parts(self._parts(tolerances, grades or {}))
+
+    def _parts(self, tolerances: Tolerances, grades: Grades) -> list[Part]:
+        """All parts at their stated nominals."""
         by_name = {link.name: link for link in self.chain.link}
-        parts = [
-            allocated_part(link, tolerances[link.name], (grades or {}).get(link.name))
+        return [
+            allocated_part(link, tolerances[link.name], grades.get(link.name), self.slopes[link.name])
             if link.name in tolerances
             else stated_part(link, by_name)
             for link in self.chain.link
             if link.is_dimension or link.thermal_growth
         ]
-        moved, distance = self.adjusted.name, 0.0
+
+    def _adjusted_parts(self, parts: list[Part]) -> list[Part]:
+        """The parts with one nominal moved. Raises MethodError as ``parts``."""
+        stated, moved, distance = parts, self.adjusted.name, 0.0
         # One step is exact unless a function uses the moved part; then these are steps of Newton's method.
         for _ in range(NEWTON_STEPS):
             try:
@@ -100,13 +121,38 @@ class Allocation:
                 if distance:
                     break
                 raise
-            parts = [moved_by(part, step) if part.name == moved else part for part in parts]
+            if not abs(step) < inf:
+                break
+            nominals = {part.name: round(part.nominal_mm + step, DIGITS) for part in parts if part.name == moved}
+            parts = [at_nominal(part, nominals.get(part.name, part.nominal_mm)) for part in parts]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
             distance += abs(step)
             if not distance <= WANDER * abs(self.adjusted.nominal):
                 break
+        # A fit that is loose changes nothing: the closing link may be within its limits and reach neither.
+        if moved in self.function.arguments and self.fits(stated):
+            return stated
         raise MethodError("no nominal of this part brings the closing link to its limits; name another part")
+
+    def rounded_parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[list[Part]]:
+        """The parts as the drawing states them, with the moved nominal on the steps next to its place, the nearer first."""
+        parts = [rounded_part(part, self.resolution) for part in self._parts(tolerances, grades or {})]
+        parts = self._adjusted_parts(parts)
+        moved = next(part for part in parts if part.name == self.adjusted.name)
+        return [
+            [place if part.name == moved.name else part for part in parts] for place in places(moved, self.resolution)
+        ]
+
+    def narrowest(self) -> list[Part]:
+        """The parts with the narrowest tolerances that drawing and processes carry; those that fit, if any do."""
+        candidates = self.rounded_parts(self.least)
+        return next((parts for parts in candidates if self.fits(parts)), candidates[0])
+
+    @cached_property
+    def least(self) -> dict[str, float]:
+        """Narrowest tolerance, mm, of each free link."""
+        return {link.name: least_tolerance(link, self.resolution) for link in self.chain.free}
 
     def fits(self, parts: list[Part]) -> bool:
         """Whether parts keep the limits in the mode of the chain."""
@@ -129,19 +175,41 @@ class Allocation:
         low, high = np.quantile(self._assemblies(parts).values, (tail, 1 - tail))
         return float(low), float(high)
 
-    def allocated(self) -> list[Part]:
-        """Parts whose tolerances fill the limits, with grades if the chain demands them."""
+    def allocated(self) -> list[Part] | None:
+        """Parts whose tolerances fill the limits, as the drawing states them; None where even the narrowest do not fit."""
+        narrowest = self.narrowest()
+        if not self.fits(narrowest):
+            return None
         rule = self.linear_rule()
         scale = 1.0 if self.function.linear and self.mode != "yield" else self._scale(rule)
-        tolerances = {name: scale * t for name, t in rule.items()}
-        if not self.chain.allocate.grades:
-            return self.parts(tolerances)
-        return self._graded(tolerances)
+        tolerances = {name: max(scale * t, self.least[name]) for name, t in rule.items()}
+        grades: dict[str, str] = {}
+        if self.chain.allocate.grades:
+            tolerances, grades = self._graded(tolerances)
+        return self._narrowed(tolerances, grades) or narrowest
+
+    def _narrowed(self, tolerances: dict[str, float], grades: dict[str, str]) -> list[Part] | None:
+        """Rounded parts that keep the limits, the widest tolerances narrowed until they do; None where all are narrowest."""
+        while True:
+            try:
+                candidates = self.rounded_parts(tolerances, grades)
+            except MethodError:
+                # The tolerances are too wide for a move of the nominal.
+                candidates = []
+            for parts in candidates:
+                if self.fits(parts):
+                    return parts
+            wide = [name for name, tolerance in tolerances.items() if tolerance > self.least[name]]
+            if not wide:
+                return None
+            widest = max(wide, key=lambda name: abs(self.slopes[name]) * tolerances[name])
+            tolerances[widest] = narrower(tolerances[widest], self.least[widest], self.resolution)
+            grades.pop(widest, None)
 
     def linear_rule(self) -> dict[str, float]:
         """Tolerances, mm, that fill the limits of the linear chain; for a yield by root sum square.
 
-        Raises MethodError where a part has no effect, or the narrowest tolerances of cost curves are too wide.
+        Raises MethodError where a part has no effect.
         """
         rule, free = self.chain.allocate, self.chain.free
         mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
@@ -157,7 +225,11 @@ class Allocation:
             raise MethodError(f'"{idle[0]}" does not change the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
-            widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
+            try:
+                widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
+            except MethodError:
+                # A yield may have room where the root sum square has none.
+                widths = [self.least[link.name] for link in free]
             return {link.name: t for link, t in zip(free, widths, strict=True)}
         iso = rule.method == "iso286"
         weights = {link.name: tolerance_unit(link.nominal) if iso else 1.0 for link in free}
@@ -182,26 +254,32 @@ class Allocation:
             low, high = (half, high) if fits_at(half) else (low, half)
         return low
 
-    def _graded(self, tolerances: Tolerances) -> list[Part]:
-        """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
+    def _graded(self, tolerances: Tolerances) -> tuple[dict[str, float], dict[str, str]]:
+        """Each tolerance, mm, at the widest grade within it, and these grades; one finer than IT01 keeps its width."""
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
         room = {name: tolerances[name] + SLACK for name in ladders}
         steps = {name: sum(width <= room[name] for _, width in ladder) - 1 for name, ladder in ladders.items()}
 
-        def parts(steps: Mapping[str, int]) -> list[Part]:
-            choice = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
-            widths = {name: choice[name][1] if name in choice else t for name, t in tolerances.items()}
-            return self.parts(widths, {name: grade for name, (grade, _) in choice.items()})
+        def choice(steps: Mapping[str, int]) -> tuple[dict[str, float], dict[str, str]]:
+            grades = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
+            widths = {name: grades[name][1] if name in grades else t for name, t in tolerances.items()}
+            return widths, {name: grade for name, (grade, _) in grades.items()}
 
         while self.chain.allocate.spend_slack:
             open_ones = [name for name, step in steps.items() if 0 <= step < len(ladders[name]) - 1]
-            wider = [name for name in open_ones if self.fits(parts({**steps, name: steps[name] + 1}))]
+            wider = [name for name in open_ones if self._fits_rounded(*choice({**steps, name: steps[name] + 1}))]
             if not wider:
                 break
             best = max(wider, key=lambda name: self._worth(free[name], ladders[name], steps[name]))
             steps[best] += 1
-        return parts(steps)
+        return choice(steps)
+
+    def _fits_rounded(self, tolerances: Tolerances, grades: Grades) -> bool:
+        try:
+            return any(self.fits(parts) for parts in self.rounded_parts(tolerances, grades))
+        except MethodError:
+            return False
 
     def _worth(self, link: Link, ladder: list[tuple[str, float]], step: int) -> tuple[float, float]:
         """Value of the next wider grade: the saved cost, or without a curve the fineness of the present grade."""
@@ -248,10 +326,7 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
 
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
-        raise MethodError(
-            f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm; widen the limits or permit "
-            "narrower tolerances"
-        )
+        raise MethodError(f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm")
     if excess(-SPAN / 4) < 0:
         return tolerances(-SPAN / 4)
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))

@@ -4,7 +4,8 @@ A link is a dimension of a part, or a function of links before it: the growth of
 temperature, an expression. The closing link is the sum of coefficient times link. A dimension that only functions use has
 the coefficient 0.
 
-The limits of a part come from stated deviations, codes of fits (ISO 286, ISO 492), or allocated tolerances.
+The limits of a part come from stated deviations, codes of fits (ISO 286, ISO 492), or allocated tolerances. Stated ones stay as
+they are written, to the last digit; allocated ones are rounded to the resolution of the drawing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,8 +29,11 @@ Position = Literal[
     "D", "E", "F", "G", "H", "JS",
 ]  # fmt: skip
 
+Origin = Literal["stated", "allocated", "temperature"]
+
 SLACK = 1e-9  # mm: rounding tolerated at a limit
 DIGITS = 12  # decimals of an allocated size in mm
+DRAWING_DECIMALS = 3  # least decimals of a size in mm
 
 
 # All assemblies stay in memory and are sorted for quantiles: a hundred million take 2 GB.
@@ -172,6 +176,9 @@ class Allocate(Strict):
     """Share of the assemblies that mode = "yield" keeps within the limits; 3 sigma."""
     adjust: str | None = None
     """Part whose nominal is moved; by default the first that is not fixed, if possible of positive coefficient."""
+    resolution_mm: Annotated[float, Field(ge=0.0, le=1.0)] = 0.001
+    """Resolution of the drawing, to which nominals and deviations of allocated parts are rounded, so that the closing link stays
+    within its limits; 0 leaves them unrounded. Stated deviations are never rounded."""
 
 
 class MonteCarlo(Strict):
@@ -221,14 +228,26 @@ class Chain(Strict):
 
     @property
     def free(self) -> list[Link]:
-        """Dimensions for the allocation: those without deviations or, if all have some, all that are not fixed."""
+        """Dimensions for the allocation: those without deviations.
+
+        If all have some, those that are neither fixed nor stated by a code; if all are stated by codes, these.
+        """
         loose = [link for link in self.link if link.is_dimension and not link.fixed]
-        return [link for link in loose if not link.has_deviations] or loose
+        bare = [link for link in loose if not link.has_deviations]
+        return bare or [link for link in loose if link.fit is None] or loose
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the deviations of all links are stated, so that nothing is to be allocated."""
+        return all(link.has_deviations for link in self.free)
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal."""
+    """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal.
+
+    ``origin``: stated deviations, allocated ones, or the growth of another part by temperature. ``fit``: code that states them.
+    """
 
     name: str
     coefficient: float
@@ -240,6 +259,8 @@ class Part:
     grade: str | None = None
     capability: float = 1.0
     moved_mm: float = 0.0
+    origin: Origin = "stated"
+    fit: str | None = None
 
     @property
     def tolerance_mm(self) -> float:
@@ -258,9 +279,20 @@ class Part:
 
     @property
     def text(self) -> str:
-        """Nominal and deviations, such as '9.2900 0/-0.0050'."""
-        upper, lower = (f"{value:+.4f}" if value else "0" for value in (self.upper_mm, self.lower_mm))
-        return f"{self.nominal_mm:.4f} {upper}/{lower}"
+        """Size on a drawing, such as '9.290 0/-0.005'; stated by a code '27 k5 (+0.011/+0.002)'."""
+        return size_text(self.nominal_mm, self.upper_mm, self.lower_mm, self.fit)
+
+
+def size_text(nominal_mm: float, upper_mm: float, lower_mm: float, fit: str | None = None) -> str:
+    """'9.290 0/-0.005' of a nominal and deviations, to a micrometre or the last stated digit; with a code as it stands."""
+    decimals = max(DRAWING_DECIMALS, *(_decimals(value) for value in (nominal_mm, upper_mm, lower_mm)))
+    upper, lower = (f"{value:+.{decimals}f}" if value else "0" for value in (upper_mm, lower_mm))
+    return f"{nominal_mm:.{decimals}f} {upper}/{lower}" if fit is None else f"{nominal_mm:.12g} {fit} ({upper}/{lower})"
+
+
+def _decimals(value: float) -> int:
+    """Decimals of a size in mm, of at most a picometre."""
+    return len(f"{value:.{DIGITS}f}".rstrip("0").partition(".")[2])
 
 
 def coded_limits(link: Link) -> Interval:
@@ -271,17 +303,18 @@ def coded_limits(link: Link) -> Interval:
 
 
 def stated_part(link: Link, by_name: Mapping[str, Link]) -> Part:
-    """The part of a link with deviations; without any it is exactly nominal."""
+    """The part of a link with deviations, as they are written; without any it is exactly nominal."""
     nominal, mean = link.nominal, link.mean_mm
     lower, upper = link.lower_mm or 0.0, link.upper_mm or 0.0
     if link.thermal_growth:
         growth = link.thermal_growth
         per_kelvin = growth.expansion_per_K * by_name[growth.of].nominal
         nominal = per_kelvin * growth.temperature_rise_K
-        lower, upper = sorted((per_kelvin * growth.lower_K, per_kelvin * growth.upper_K))
-    elif link.fit is not None:
-        lower, upper = coded_limits(link)
-    return _part(link, nominal, lower, upper, mean, None)
+        lower, upper = (_rounded(end) for end in sorted((per_kelvin * growth.lower_K, per_kelvin * growth.upper_K)))
+        return _part(link, nominal, lower, upper, mean, origin="temperature")
+    if link.fit is not None:
+        lower, upper = (_rounded(end) for end in coded_limits(link))
+    return _part(link, nominal, lower, upper, mean, fit=link.fit)
 
 
 def stated_parts(links: Sequence[Link]) -> list[Part]:
@@ -290,18 +323,38 @@ def stated_parts(links: Sequence[Link]) -> list[Part]:
     return [stated_part(link, by_name) for link in links if link.is_dimension or link.thermal_growth]
 
 
-def allocated_part(link: Link, tolerance: float, grade: str | None = None) -> Part:
-    """The part of a link with a tolerance, mm, at the link's ``position``."""
+def allocated_part(link: Link, tolerance: float, grade: str | None = None, slope: float | None = None) -> Part:
+    """The part of a link with a tolerance, mm, at the link's ``position``.
+
+    ``slope``: change of the closing link per unit of this link; by default its coefficient.
+    """
     if link.position == "symmetric":
         lower, upper = -tolerance / 2, tolerance / 2
     elif link.position == "unilateral":
-        lower, upper = (-tolerance, 0.0) if link.coefficient > 0 else (0.0, tolerance)
+        slope = link.coefficient if slope is None else slope
+        lower, upper = (-tolerance, 0.0) if slope > 0 else (0.0, tolerance)
     else:
         lower, upper = position_limits(link.nominal, link.position, tolerance)
-    return _part(link, link.nominal, lower, upper, None, grade)
+    return _part(link, link.nominal, _rounded(lower), _rounded(upper), None, grade=grade, origin="allocated")
 
 
-def _part(link: Link, nominal: float, lower: float, upper: float, mean: float | None, grade: str | None) -> Part:
-    lower, upper = round(lower, DIGITS), round(upper, DIGITS)
+def _rounded(size: float) -> float:
+    return round(size, DIGITS)
+
+
+def _part(
+    link: Link,
+    nominal: float,
+    lower: float,
+    upper: float,
+    mean: float | None,
+    *,
+    grade: str | None = None,
+    origin: Origin = "stated",
+    fit: str | None = None,
+) -> Part:
     mean = (upper + lower) / 2 if mean is None else mean
-    return Part(link.name, link.coefficient, nominal, upper, lower, link.distribution, mean, grade, link.capability)
+    law, capability = link.distribution, link.capability
+    return Part(
+        link.name, link.coefficient, nominal, upper, lower, law, mean, grade, capability, origin=origin, fit=fit
+    )

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, quotation, used_links
-from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link, coded_limits
+from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor, quotation, used_links
+from doe.dimension_chain.links import Chain, Link, coded_limits
 from rbdyn.base.faults import MethodError, Strict, read_toml, refuse, validated
 from rbdyn.properties.tolerances import LARGEST, position_limits
 
@@ -26,10 +26,10 @@ def faults(chain: Chain) -> list[str]:
     repeated = [name for name, count in counts.items() if count > 1]
     sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
     sentences += _reference_faults(chain) + _selective_faults(chain)
-    sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
-    # The room left by fixed links is defined only for a chain without other faults.
+    sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient or link.name in used])
+    # Whether the parts can close the chain is defined only for one without other faults.
     try:
-        return sentences or _room_faults(chain)
+        return sentences or _closing_faults(chain)
     except NoValueError as error:
         return [str(error)]
 
@@ -146,38 +146,15 @@ def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:
     return []
 
 
-def _room_faults(chain: Chain) -> list[str]:
-    """Faults of fixed links, or of the narrowest tolerances of cost curves, that exceed the limits."""
-    search, free = Allocation(chain), chain.free
-    bare_widths = {link.name: 0.0 for link in free}
-    if lost := _sentence(partial(search.parts, bare_widths)):
+def _closing_faults(chain: Chain) -> list[str]:
+    """Faults of parts that cannot bring the closing link to its limits, or do not change it."""
+    if chain.is_stated and not any(link.fit is None for link in chain.free):
+        return []
+    search = Allocation(chain)
+    if lost := _sentence(partial(search.parts, {link.name: 0.0 for link in chain.free})):
         return [f'allocate.adjust = "{search.adjusted.name}": {lost}']
-    bare = search.parts(bare_widths)
-    limits, width = chain.closing_link, chain.width_mm
-    if chain.allocate.mode == "yield":
-        share, target = search.sure_yield(bare), chain.allocate.target_yield
-        if share < target:
-            low, high = search.tails(bare)
-            return [
-                f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or widen "
-                f"the limits to more than {_interval(limits, high - low)}"
-            ]
-    else:
-        low, high = interval(search.function, bare, chain.allocate.mode)
-        consumed = high - low
-        if consumed > SLACK and width <= consumed + SLACK:
-            return [
-                f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm; narrow or "
-                f"unfix one, or widen the limits to more than {_interval(limits, consumed)}"
-            ]
-    tight = _sentence(search.linear_rule)
-    return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
-
-
-def _interval(limits: ClosingLink, width: float) -> str:
-    """Text of the limits with the same middle and another width."""
-    middle = (limits.lower_mm + limits.upper_mm) / 2
-    return f"{middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+    idle = _sentence(search.linear_rule)
+    return [f'allocate.method = "{chain.allocate.method}": {idle}'] if idle else []
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:

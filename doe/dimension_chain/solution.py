@@ -1,14 +1,18 @@
 """Solution of a dimension chain: intervals, yields, contributions, allocation and selective assembly in one record."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
+from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, stated_parts
 from doe.dimension_chain.reading import faults
+from doe.dimension_chain.refusal import Miss, Remedy, allocated_reason, keeps_limits, miss_of, remedy_of, stated_reason
 from doe.dimension_chain.yields import (
     COMMON_LAWS,
     Assemblies,
@@ -29,6 +33,12 @@ from rbdyn.base.records import Record, derived, keyed, outside_json
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
 # Figures of an allocated part.
 ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
+
+
+def _size(part: Part) -> dict[str, Any]:
+    """JSON of a part: its figures, the code that states them, where they come from, its grade in words, and its drawing size."""
+    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin")}
+    return figures | {"grade_words": grade_words(part), "text": part.text}
 
 
 class Linearisation(Record):
@@ -60,6 +70,10 @@ class ChainResult(Record):
     - ``cp``, ``cpk``: tolerance over six standard deviations, and distance of the mean from the nearer limit over three; None
       without variation
     - ``cost``: of the allocation, None unless all parts have curves
+    - ``parts``: sizes for the drawing, which all other figures describe: stated ones as they are written, allocated ones on the
+      steps of ``resolution_mm``; ``allocation``: the same, or the nearest that meet the limits where stated ones do not
+    - ``contributions_mm``: what each part takes of the worst case and of six standard deviations of the closing link
+    - ``missed``, ``remedy``: by how much a refused chain misses, and what would meet it; else None
     """
 
     nominal_mm: float = keyed("closing_link", "nominal_mm")
@@ -87,21 +101,28 @@ class ChainResult(Record):
     selective: SelectiveAssembly | None = keyed("selective_assembly")
     samples: int
     seed: int
+    limits_mm: Interval
+    resolution_mm: float
+    sizes: dict[str, Any] = derived(lambda self: {part.name: _size(part) for part in self.parts}, "parts")
+    contributions_mm: dict[str, dict[str, float]]
+    missed: Miss | None
+    remedy: Remedy | None
     allocation: tuple[Part, ...] = outside_json()
+    parts: tuple[Part, ...] = outside_json()
 
     @property
     def refused(self) -> bool:
-        """Whether the stated deviations exceed the limits."""
+        """Whether the parts miss the limits."""
         return self.status.startswith("refused")
 
 
 def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, source: str = "") -> ChainResult:
     """Intervals, yield, contributions and allocation of a chain.
 
-    A chain without deviations gets the allocated ones (status "ok: deviations allocated"). Where stated deviations exceed
-    the limits, by the interval or yield of the allocation mode, the status starts with "refused: " and states the figures
-    and the allocation. Otherwise it is "ok". ``samples`` and ``seed`` are by default those of the chain; ``source`` names the
-    file in messages.
+    A chain without deviations gets the allocated ones (status "ok: deviations allocated"). Where stated deviations, or the
+    narrowest allocated ones, exceed the limits, by the interval or yield of the allocation mode, the status starts with
+    "refused: " and states the figures. Otherwise it is "ok". A chain that only ``selective`` assembly keeps within its limits
+    is "ok" too. ``samples`` and ``seed`` are by default those of the chain; ``source`` names the file in messages.
 
     Raises InputError with all faults of the chain (see `faults`), for fewer than one sample, and where a function has no
     finite value.
@@ -119,13 +140,15 @@ def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, 
 
 def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     chain, function, limits = search.chain, search.function, search.chain.closing_link
-    allocation = search.allocated()
-    has_deviations = all(link.has_deviations for link in chain.free)
-    parts = stated_parts(chain.link) if has_deviations else allocation
+    allocation = None if chain.is_stated else search.allocated()
+    parts = stated_parts(chain.link) if chain.is_stated else allocation or search.narrowest()
     assemblies = draw(function, parts, limits, samples=samples, seed=seed)
+    share = assemblies.yields["as_given"]
     mean, deviation = float(assemblies.values.mean()), float(assemblies.values.std())
     nearer = min(limits.upper_mm - mean, mean - limits.lower_mm)
     varies = deviation > SLACK
+    matched = None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective)
+    verdict = _verdict(search, parts, allocation, share, matched)
     return ChainResult(
         nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
         worst_case_mm=interval(function, parts, "worst_case"),
@@ -133,8 +156,8 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         yields=assemblies.yields,
         standard_errors={law: standard_error(share, samples) for law, share in assemblies.yields.items()},
         contributions=_contributions(function, parts),
-        allocation=tuple(allocation),
-        status=_status(search, parts, allocation, assemblies.yields["as_given"], has_deviations),
+        allocation=tuple(verdict.nearest or parts),
+        status=verdict.status,
         mean_mm=mean,
         standard_deviation_mm=deviation,
         quantiles_mm=dict(zip(QUANTILES, np.quantile(assemblies.values, QUANTILES).tolist(), strict=True)),
@@ -144,11 +167,66 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         cp=chain.width_mm / (6 * deviation) if varies else None,
         cpk=nearer / (3 * deviation) if varies else None,
         linearisation=None if function.linear else _linearisation(function, parts, assemblies),
-        cost=_cost(chain, allocation),
-        selective=None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective),
+        cost=_cost(chain, parts),
+        selective=matched,
         samples=samples,
         seed=seed,
+        parts=tuple(parts),
+        limits_mm=(limits.lower_mm, limits.upper_mm),
+        resolution_mm=chain.allocate.resolution_mm,
+        contributions_mm=_contributions_mm(function, parts),
+        missed=verdict.missed,
+        remedy=verdict.remedy,
     )
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """Status of judged parts; for refused ones also the miss, the remedy and the nearest parts that meet the limits."""
+
+    status: str
+    missed: Miss | None = None
+    remedy: Remedy | None = None
+    nearest: list[Part] | None = None
+
+
+def _verdict(
+    search: Allocation,
+    parts: list[Part],
+    allocation: list[Part] | None,
+    share: float,
+    matched: SelectiveAssembly | None,
+) -> _Verdict:
+    chain = search.chain
+    if allocation is not None:
+        return _Verdict(_allocated_status(chain))
+    if chain.is_stated and _fits(search, parts, share):
+        return _Verdict("ok")
+    if matched is not None and keeps_limits(chain, matched):
+        return _Verdict(f"ok: matched in {matched.classes} classes; random assemblies miss the limits")
+    # Sizes that a code states, such as those of bought rings, are no proposals.
+    nearest = search.allocated() if chain.is_stated and any(link.fit is None for link in chain.free) else None
+    reason = stated_reason(search, parts, share, nearest) if chain.is_stated else allocated_reason(search)
+    return _Verdict(f"refused: {reason}", miss_of(search, parts, share), remedy_of(search, parts, share), nearest)
+
+
+def _allocated_status(chain: Chain) -> str:
+    rule = chain.allocate
+    if rule.method == "iso286" and not rule.grades:
+        return "ok: deviations allocated, in proportion to ISO 286's tolerance units (grades = true narrows them to its grades)"
+    return "ok: deviations allocated"
+
+
+def _contributions_mm(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
+    """What each part takes of the closing link, mm: of its worst case, and of six standard deviations."""
+    slopes = function.sensitivities(middle(parts))
+    return {
+        part.name: {
+            "worst_case_mm": abs(slopes[part.name]) * part.tolerance_mm,
+            "six_sigma_mm": 6 * abs(slopes[part.name]) * sqrt(moments(part, part.distribution)[1]),
+        }
+        for part in parts
+    }
 
 
 def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
@@ -190,27 +268,6 @@ def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
     if len(curves) < len(chain.free) or not all(widths[name] for name in curves):
         return None
     return total_cost(list(curves.values()), [widths[name] for name in curves])
-
-
-def _status(search: Allocation, parts: list[Part], allocation: list[Part], share: float, has_deviations: bool) -> str:
-    if not has_deviations:
-        rule = search.chain.allocate
-        if rule.method == "iso286" and not rule.grades:
-            return "ok: deviations allocated, in proportion to ISO 286's tolerance units (grades = true narrows them to its grades)"
-        return "ok: deviations allocated"
-    if _fits(search, parts, share):
-        return "ok"
-    limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
-    low, high = interval(search.function, parts, mode)
-    free = {link.name for link in search.chain.free}
-    nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if part.name in free)
-    kind = "RSS" if mode == "rss" else "worst-case"
-    reached = f"{share:.4g} of {search.chain.allocate.target_yield:g}" if mode == "yield" else f"{share:.4g}"
-    return (
-        f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm, outside "
-        f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm; {kind} tolerance {high - low:.4f} of {width:.4f} mm, yield "
-        f"{reached}; the nearest that fits is {nearest}"
-    )
 
 
 def _fits(search: Allocation, parts: list[Part], share: float) -> bool:

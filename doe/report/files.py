@@ -63,9 +63,10 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         else archive_table(study, outcome.adaptive),
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": [
-            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin")}}
             for name, chain in outcome.chains.items()
-            for part in chain.allocation
+            for part in chain.parts
+            if part.origin != "temperature"
         ],
     }
     if outcome.reference_values is not None:
@@ -142,6 +143,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "statement": statement(gains),
         "whirl_sentence": outcome.whirl_sentence,
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
+        "missed_chains": outcome.missed_chains,
         "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
         "notes": list(outcome.notes),
         "failures": grouped(outcome.failures),

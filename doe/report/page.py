@@ -1,8 +1,8 @@
 """A whole study as one HTML page that can be mailed, and the same answer and tables as Markdown.
 
 The page fetches nothing, and all but the interactive pictures can be read without scripts and on paper. ``sections`` lists its
-chapters in the order in which they are read; what a record lacks is left out. The scripts, the style sheet and the controls
-are files of ``html``; ``page_data`` holds the numbers for the scripts, and nothing else.
+chapters in the order in which they are read; what a record lacks is left out. The scripts and the controls are
+files of ``html``; ``page_data`` holds the numbers for the scripts, and nothing else.
 """
 
 import json
@@ -10,7 +10,6 @@ import math
 import string
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from html import escape
 from importlib.resources import files
 from pathlib import PurePath
 from typing import Any
@@ -31,9 +30,11 @@ from doe.report.sections.record import (
     responses,
     rounded_down,
 )
-from rbdyn.base import html, markdown
+from rbdyn.base import markdown
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Section, Table, Widget
-from rbdyn.base.words import filled_page, label, quantity, shown
+from rbdyn.base.identity import Identity
+from rbdyn.base.page import identity_section, page
+from rbdyn.base.words import label, quantity, shown
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {
@@ -42,6 +43,10 @@ SCRIPTS = {
     "front": ("front.js",),
     "bearing": ("motion.js",),
 }
+NO_SCRIPTS = (
+    '<noscript><p class="note">Scripts are off: all tables and static pictures are here; only the interactive ones are not.'
+    "</p></noscript>"
+)
 # Letters of packed numbers, each worth its place, in the order of base 64; ``motion.js`` has the same.
 LETTERS = string.ascii_uppercase + string.ascii_lowercase + string.digits + "+/"
 # Of two letters: distinct numbers less one that keeps zero exact and one for rounding.
@@ -58,15 +63,9 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     moving = drop_undefined(dict(motion or {}))
     chapters = sections(record, moving)
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
-    marks = {
-        "TITLE": escape(title(record)),
-        "STYLE": text("report.css"),
-        "CONTENTS": "".join(f'<li><a href="#{section.key}">{escape(section.title)}</a></li>' for section in chapters),
-        "SECTIONS": "\n".join(html.section(section, _widget) for section in chapters),
-        "DATA": _json(page_data(record, moving)),
-        "SCRIPTS": "\n".join(f"<script>\n{script}</script>" for script in _scripts(widgets)),
-    }
-    return filled_page(text("page.html"), marks)
+    data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
+    scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
+    return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS, "\n".join(scripts))
 
 
 def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
@@ -80,6 +79,12 @@ def title(summary: Record) -> str:
     settings = summary.get("asked") or {}
     stem = PurePath(settings.get("study_file") or "clearance study").stem.replace("_", " ")
     return settings.get("title") or stem[:1].upper() + stem[1:]
+
+
+def window_title(summary: Record) -> str:
+    """The title of the study with its bearing and the command."""
+    identity = part(summary, "identity")
+    return f"{title(summary)}: {Identity.from_dict(identity).title}" if identity else title(summary)
 
 
 def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
@@ -249,6 +254,12 @@ def _effect(effect: Record, whose: str) -> str:
     return "" if size is None else f"{size:+.3g}{'*' if effect.get(f'{whose}_significant') else ''}"
 
 
+def identity(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Bearing, operating point, date and hashes of the input files."""
+    stated = part(summary, "identity")
+    return identity_section(Identity.from_dict(stated)) if stated else None
+
+
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Seeds, versions and cost: what it takes to get the same numbers again."""
     captions = (("seeds", "Seeds"), ("versions", "Versions"), ("cost", "Cost, times in seconds"))
@@ -264,6 +275,7 @@ def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
 
 
 CHAPTERS = (
+    identity,
     answer.answer,
     answer.settings,
     design.design,

@@ -275,6 +275,24 @@ class AgendaKeeper:
             self._store.sign(NOTE)
         self._note()
 
+    def state_first(self, measured: Measured) -> Forecast | None:
+        """State what is left before anything runs, by ``measured`` turns of its kind or the pace of an earlier command.
+
+        Returns the forecast, with the time from the start of the command on; None where no pace is known.
+        """
+        with self._lock:
+            pace = self.agenda.measured if self.agenda.measured.number else measured
+            forecast = forecast_of(self.agenda, float(self.agenda.threads), pace) if self.agenda.stages else None
+            if forecast is None or not forecast.runs[1]:
+                return forecast
+            elapsed_s = time.time() - self.agenda.begin
+            self.agenda.prediction_s = forecast.whole_s(elapsed_s)
+            self._stated_s = self.agenda.prediction_s[1]
+            self._note()
+        if self.notice is not None:
+            self.notice(forecast.sentence)
+        return forecast._replace(seconds=self.agenda.prediction_s)
+
     def _take_over(self, earlier: Agenda) -> None:
         self.agenda.measured, self.agenda.crowd = earlier.measured, earlier.crowd
         if earlier.question != self.agenda.question:

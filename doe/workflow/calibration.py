@@ -53,6 +53,7 @@ from doe.workflow.input_sets import (
 from doe.workflow.rig import PULSE_OUTPUTS, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
+from rbdyn.base.forecast import Measured as Paces
 from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import quantity
 from rbdyn.result import SimulationResult
@@ -468,6 +469,15 @@ def calibration_stages(question: Question) -> list[Stage]:
         Stage.of("posterior", TRIED * conditions, work, most=2 * TRIED * conditions),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
+
+
+def pace(question: Question) -> Paces:
+    """Pace of the runs by a probe at the first condition, of an input set as the scene says; none of a run that fails."""
+    case = cases_of(question.case, question.rig)[0]
+    try:
+        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.set))
+    except RunError:
+        return Paces()
 
 
 def _screening_runs(case: Case) -> int:

@@ -40,8 +40,8 @@ LOST = 1.5
 FEWEST_SAMPLES = 20
 # Batches of an orbit at most, periods of the cutoff in each at least, and periods of a record of noise at least.
 MOST_PARTS, PERIODS, STILL_PERIODS = 400, 10, 20
-# Intervals of an even signal are alike within this share.
-EVEN = 0.1
+# Intervals of an even signal are alike within this share, and their mean is that of the sensor's clock within the next.
+EVEN, CLOCK = 0.1, 2e-4
 # Largest share of noise in the mean square of a speed: its effect on the mean is known to first order.
 LOUDEST = 0.25
 # Impact pulses that an error needs, and those in a part of the record at least.
@@ -144,7 +144,7 @@ def _rate(path: Path, time: Array, fewest: int, name: str, frequency: float) -> 
     if not (np.abs(np.diff(time) - interval) < EVEN * interval).all() or not interval >= FINEST:
         raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
     rate = float(1.0 / interval)
-    if rate * (1.0 + 1e-6) < fewest * frequency:
+    if rate * (1.0 + CLOCK) < fewest * frequency:
         raise InputError(
             [
                 f"{path}: {rate:.4g} samples a second are fewer than {fewest} a period of {name} = "

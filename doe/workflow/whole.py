@@ -65,7 +65,6 @@ from doe.workflow.surfaces import PublishedComparison, compare_with_published, f
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.records import Record
-from rbdyn.base.words import html_table, improvement, label, quantity, shown, with_error
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
@@ -236,27 +235,6 @@ class StudyResult:
     notes: tuple[str, ...]
     cost: Mapping[str, float]
 
-    def __repr__(self) -> str:
-        changes = [
-            f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
-            for gain in self.gains["pick"]
-        ]
-        return f"<StudyResult: {', '.join([*changes, *([self.limits_sentence] if self.limits_sentence else [])])}>"
-
-    def _repr_html_(self) -> str:
-        """The table of a notebook: factors and simulated responses of baseline and pick, and the gains of the pick."""
-        places = zip(self.study.factors, self.baseline.point.tolist(), self.pick.point.tolist(), strict=True)
-        rows = [(label(name), shown(base), shown(picked), "") for name, base, picked in places]
-        columns = [
-            column for point in (self.baseline, self.pick) for column in (point.values.tolist(), point.error.tolist())
-        ]
-        gained = {gain.response: improvement(gain.percent, gain.error, gain.goal) for gain in self.gains["pick"]}
-        for name, value, error, pick_value, pick_error in zip(self.study.responses, *columns, strict=True):
-            rows.append(
-                (label(name), with_error(value, error), with_error(pick_value, pick_error), gained.get(name, ""))
-            )
-        return html_table("study: values ± 95 %, simulated", ("", "baseline", "pick", "change"), rows)
-
     @property
     def baseline(self) -> Confirmed:
         """The original design, simulated."""
@@ -277,6 +255,21 @@ class StudyResult:
     def limits(self) -> list[Limit]:
         """The limits at the pick."""
         return limits_of(self.study, self.pick)
+
+    @property
+    def missed_chains(self) -> dict[str, str]:
+        """Why, by name: chains that miss their limits, and chains of a known width that no parts close."""
+        missed = {name: chain.status for name, chain in self.chains.items() if chain.refused}
+        for chain in self.study.file.chain:
+            place = self.study.factors.index(chain.factor)
+            widest = 0.0 if self.tolerances is None else self.tolerances.half_widths[place]
+            if (
+                chain.name not in self.chains
+                and place not in self.study.inactive
+                and (chain.half_width_mm or widest > 0.0)
+            ):
+                missed[chain.name] = "no parts close it, as the notes say"
+        return missed
 
     @property
     def verdict(self) -> Verdict:

@@ -1,6 +1,7 @@
 """The command ``rbdyn``: simulate, map, accuracy and show; other modules have ``ball``, ``new``, ``keys`` and ``manual``."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +9,8 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
+from rbdyn.base.identity import identity_of
+from rbdyn.base.page import write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
@@ -84,11 +87,12 @@ def simulate(
         loaded = type(loaded).from_dict(result.scene)
         from rbdyn.cli import simulation_output
 
-        files = simulation_output.write(loaded, result, folder) if folder else []
+        identity = identity_of("rbdyn simulate", result.scene, [scene])
+        blocks = partial(simulation_output.blocks, result)
+        write = partial(simulation_output.write, loaded, result)
+        files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
         detail = Detail.of(quiet, verbose)
-        command.hand_over(
-            result.as_dict, as_json, lambda: show_blocks(simulation_output.blocks(result), detail), folder, files
-        )
+        command.hand_over(result.as_dict, as_json, lambda: show_blocks(blocks(), detail), folder, files)
 
 
 @app.command(cls=command.refusing(FORMER))
@@ -174,8 +178,12 @@ def slip_map(
         points = folder / study.POINTS if folder else None
         with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
             mapped = study.slip_map(loaded, *axes, workers, progress, points, command.notice(quiet))
-        files = _write_map(mapped, folder) if folder else []
-        command.hand_over(mapped.as_dict, as_json, lambda: show_blocks(map_blocks(mapped)), folder, files)
+        swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
+        identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), [scene], swept=swept)
+        write = partial(_write_map, mapped)
+        blocks = partial(map_blocks, mapped)
+        files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
+        command.hand_over(mapped.as_dict, as_json, lambda: show_blocks(blocks()), folder, files)
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:

@@ -1,6 +1,7 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,8 @@ from rbdyn.base.command import (
     verbose_flag,
 )
 from rbdyn.base.faults import InputError
+from rbdyn.base.identity import identity_of
+from rbdyn.base.page import write_with_report
 from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
@@ -83,8 +86,10 @@ def ball(
         from rbdyn.quasistatic.bearing import equilibrium
 
         result, path = with_runout(loaded, equilibrium(loaded))
-        files = write(result, folder, path) if folder else []
-        hand_over(result.as_dict, as_json, lambda: show(blocks(result), Detail.of(quiet, verbose)), folder, files)
+        identity = identity_of("rbdyn ball", result.scene, [scene])
+        answer, save = partial(blocks, result), partial(write, result)
+        files = write_with_report(folder, identity, answer, partial(save, folder, path)) if folder else []
+        hand_over(result.as_dict, as_json, lambda: show(answer(), Detail.of(quiet, verbose)), folder, files)
     if not result.is_equilibrium:
         if not as_json:
             print(f"no equilibrium: {result.status}", file=sys.stderr)

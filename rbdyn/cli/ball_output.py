@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted
+from rbdyn.base.words import counted, shown
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
 from rbdyn.scene import BallScene
 
@@ -92,14 +92,21 @@ def _row_sentences(row: RowReport) -> list[str]:
         film = ""
         if "central_film_um" in contact:
             film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
-        ellipse = f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} µm"
+        axes = " x ".join(shown(1e3 * contact[f"semi_{axis}_mm"], 3) for axis in ("major", "minor"))
         pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
-        sentences.append(f"{race} race: {pressed} over {ellipse}{film}")
+        sentences.append(f"{race} race: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
     life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
         sentences.append(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
     return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
+
+
+def _edge(contact: dict[str, float]) -> str:
+    """How near the ellipse comes to the shoulder; empty without a contact."""
+    if "edge_angle_deg" not in contact:
+        return ""
+    return f", its edge at {contact['edge_angle_deg']:.3g} deg (shoulder at {contact['shoulder_angle_deg']:.3g})"
 
 
 def _place(place: dict[str, float]) -> str:

@@ -1,8 +1,9 @@
 """Studies of ``rbdyn ball``: sweeps over keys, runout, preload, clearance, wear, race limits; their tables and files."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -11,6 +12,9 @@ import numpy as np
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.command import FAILED, checkpoint_message, hand_over, output_folder, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
+from rbdyn.base.identity import identity_of
+from rbdyn.base.page import write_with_report
+from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted, label, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
@@ -54,8 +58,10 @@ def run_sweep(
     kept_in = folder / "sweep.part" if folder else None
     with checkpoint_message(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
-    files = write_sweep(result, folder) if folder else []
-    hand_over(result.as_dict, as_json, lambda: show(sweep_blocks(result), Detail.of(quiet)), folder, files)
+    identity = identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys)
+    answer, save = partial(sweep_blocks, result), partial(write_sweep, result)
+    files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
+    hand_over(result.as_dict, as_json, lambda: show(answer(), Detail.of(quiet)), folder, files)
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
     return FAILED if result.failures else 0
@@ -223,21 +229,37 @@ def run(
     quiet: bool,
 ) -> int:
     """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
-    folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
+    folder = output_folder(out, "rbdyn ball", source) if out else None
     table: SweepResult | None = None
     if name == "race_limits":
         record = race_limits(scene, value, target_yield, seed)
     else:
         record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
-    if folder:
-        write_json(folder / files[0], record)
-        if table is not None:
-            from rbdyn.plots.ball import sweep_pictures
-
-            table.save(folder / f"{name}.csv")
-            files += [f"{name}.csv", *sweep_pictures(table, folder)]
-    hand_over(lambda: record, as_json, lambda: show(blocks(record, table), Detail.of(quiet)), folder, files)
+    command = f"rbdyn ball --{name.replace('_', '-')}"
+    swept = table.keys if table else {}
+    identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
+    answer, save = partial(blocks, record, table), partial(write_study, name, record, table)
+    files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
+    hand_over(lambda: record, as_json, lambda: show(answer(), Detail.of(quiet)), folder, files)
     return 0
+
+
+def write_study(name: str, record: dict[str, Any], table: SweepResult | None, folder: Path) -> list[str]:
+    """Write the record of a study, its points and their pictures, or the limits of race errors; returns the names of the files."""
+    write_json(folder / f"{name}.json", record)
+    if table is None:
+        save_table(limits_table(record), folder / f"{name}.csv")
+        return [f"{name}.json", f"{name}.csv"]
+    from rbdyn.plots.ball import sweep_pictures
+
+    table.save(folder / f"{name}.csv")
+    return [f"{name}.json", f"{name}.csv", *sweep_pictures(table, folder)]
+
+
+def limits_table(record: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """A row a race: its largest roundness and side-sway [um]."""
+    names = ("roundness_um", "sway_um")
+    return [{"race": race, **{name: record[f"{race}_{name}"] for name in names}} for race in ("inner", "outer")]
 
 
 def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:

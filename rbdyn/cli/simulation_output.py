@@ -38,18 +38,19 @@ def blocks(result: SimulationResult) -> list[Block]:
 
 
 def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, history.csv and pictures; returns the names of the files."""
+    """Write result.json, figures.csv, history.csv and pictures; returns the names of the files."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
     result.save(folder / "result.json")
+    save_table(result.table().reset_index(), folder / "figures.csv", "%.8g")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
     motion = history(scene, turns, notice=None)  # the simulation has stated its pace
     save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
+    return ["result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":

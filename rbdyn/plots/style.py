@@ -3,6 +3,7 @@
 Error against run time: error to the right, time upwards, both logarithmic; lower left is better.
 """
 
+import io
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.vector import add_copy, is_copying
 
 matplotlib.use("Agg")
 
@@ -40,10 +42,18 @@ def plain(axis: Axes) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Fit the labels, write the file, close the figure."""
+    """Fit the labels, write the file, hand a copy to the page that is made, close the figure."""
     figure.tight_layout()
     # A legend outside the axes needs a page fitted to it.
-    figure.savefig(path, dpi=130, bbox_inches="tight" if figure.legends else None)
+    box: Literal["tight"] | None = "tight" if figure.legends else None
+    figure.savefig(path, dpi=130, bbox_inches=box)
+    if is_copying():
+        text = io.StringIO()
+        # No date and no random name, so that equal pictures are equal texts.
+        metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": path.name}):
+            figure.savefig(text, format="svg", bbox_inches=box, metadata=metadata)
+        add_copy(path, text.getvalue())
     plt.close(figure)
 
 

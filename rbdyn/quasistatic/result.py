@@ -6,7 +6,7 @@ steep angles, slip, and a ring that tips. Columns have units in their names.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -61,6 +61,8 @@ STEEPEST = math.radians(80.0)
 OILED_FRICTION = 0.07
 # Makers allow angular contact bearings about this misalignment, deep groove ones up to three times as much [rad].
 TIPPED = 1e-3
+Race = Literal["inner", "outer"]
+RACES: tuple[Race, Race] = ("inner", "outer")
 # Ball load [N] below which a ball counts as unloaded.
 NO_LOAD = 1e-9
 
@@ -116,6 +118,43 @@ def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
     return causes
 
 
+def edge_angles(balls: Array, ratings: Sequence[Rating], race: Race) -> Array:
+    """Angles (n, Z) [rad] at the edge of the contact ellipse that is nearer to the shoulder; -inf without a contact.
+
+    The ellipse lies along the groove: a semi-axis a adds asin(a/(f D)) to the contact angle. Negative angles of a bearing with
+    one shoulder are not counted.
+    """
+    loads = balls[:, :, INNER_LOAD if race == "inner" else OUTER_LOAD]
+    angles = balls[:, :, INNER_ANGLE if race == "inner" else OUTER_ANGLE]
+    grooves = [getattr(rating.drawing, f"{race}_groove_factor") * rating.drawing.ball_diameter for rating in ratings]
+    units = [getattr(rating.model, f"{race}_contact").semi_major for rating in ratings]
+    shouldered = np.array([rating.drawing.contact_angle > 0.0 for rating in ratings])[:, np.newaxis]
+    share = (np.array(units) / np.array(grooves))[:, np.newaxis] * np.cbrt(np.maximum(loads, 0.0))
+    size = np.where(shouldered, angles, np.abs(angles))
+    return np.where((loads > NO_LOAD) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
+
+
+def climbing(balls: Array, ratings: Sequence[Rating], race: Race, row: str) -> Remark:
+    """Remark on contacts whose ellipse climbs over the shoulder of a race."""
+    edges = edge_angles(balls, ratings, race)
+    shoulders = np.array([rating.drawing.shoulder_angle(race) for rating in ratings])
+    beyond, key = edges.max(axis=1) - shoulders, f"{race}_shoulder_height_mm"
+
+    def sentence(k: int) -> str:
+        drawing = ratings[k].drawing
+        azimuth, groove = 360.0 * edges[k].argmax() / edges.shape[1], getattr(drawing, f"{race}_groove_factor")
+        height = groove * drawing.ball_diameter_mm * (1.0 - math.cos(shoulders[k]))
+        kind = "estimated" if getattr(drawing, key) is None else "stated"
+        remedy = f"state {key}" if kind == "estimated" else "make it higher"
+        return (
+            f"the ellipse of the ball at {azimuth:.0f} deg climbs {math.degrees(beyond[k]):.2g} deg over the {kind} "
+            f"{race} shoulder of {height:.3g} mm; {remedy}, or reduce load or clearance"
+        )
+
+    steep = np.abs(balls[:, :, INNER_ANGLE]).max(axis=1) > STEEPEST
+    return Remark(f"{row}{race} shoulder", (beyond > 0.0) & ~steep, sentence, row)
+
+
 def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
     """Largest friction coefficient (n,) that a contact needs for its share of the gyroscopic moment, 2 s M_g/(D Q)."""
     inner, outer = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
@@ -165,7 +204,8 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
             "about its axis; raise the load or reduce the speed"),
     ]
     # fmt: on
-    return [Remark(row + word, where, say, row) for word, where, say in listed]
+    over = [climbing(balls, ratings, race, row) for race in RACES]
+    return [*(Remark(row + word, where, say, row) for word, where, say in listed), *over]
 
 
 def tipping(tilts: Array, scene: BallScene) -> Remark:
@@ -358,8 +398,12 @@ def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reactio
         balls=ball_records(solution.figures),
         max_stress_MPa={race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
         contacts={
-            race: {**contact_record(contacts[race], float(loads[race].max())), **film.get(race, {})}
-            for race in contacts
+            race: {
+                **contact_record(contacts[race], float(loads[race].max())),
+                **_shoulder_record(rating, solution, race),
+                **film.get(race, {}),
+            }
+            for race in RACES
         },
         stiffness=stiffness_record(solution.stiffness),
         life={**life.as_record(*rating.speeds), "method": "ISO/TS 16281"},
@@ -381,6 +425,13 @@ def contact_record(contact: PointContact, load: float) -> dict[str, float]:
         "semi_minor_mm": semi_minor,
         "area_mm2": math.pi * semi_major * semi_minor,
     }
+
+
+def _shoulder_record(rating: Rating, solution: Solution, race: Race) -> dict[str, float]:
+    """Largest angle at the edge of a contact ellipse, if any ball touches, and that of the shoulder [deg]."""
+    edge = float(edge_angles(solution.figures[np.newaxis], [rating], race).max())
+    reached = {"edge_angle_deg": math.degrees(edge)} if math.isfinite(edge) else {}
+    return {**reached, "shoulder_angle_deg": math.degrees(rating.drawing.shoulder_angle(race))}
 
 
 def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 # Largest difference of a stated contact angle from that of a stated clearance.
 AGREED_DEG = 0.2
 
+# Shoulder height of catalogue bearings over the ball's diameter, and how far a steep contact angle stays below its shoulder.
+SHOULDER, BELOW_SHOULDER_DEG = 0.2, 20.0
+
 GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
 
 
@@ -49,6 +52,12 @@ class BallRow(Consistent):
     static_capacity_N: Positive | None = None  # noqa: N815
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
+    inner_shoulder_height_mm: Positive | None = None
+    """Height of the inner ring's shoulder over the bottom of its groove. Default: a fifth of the ball's diameter. Catalogue
+    shoulders of deep groove bearings 6205 and 6208 have 0.21 and 0.19 of it, a spindle bearing of 15 degrees 0.25. For contact
+    angles above some 32 degrees the default reaches 20 degrees beyond them. A note says where a contact climbs over it."""
+    outer_shoulder_height_mm: Positive | None = None
+    """The same height of the outer ring's shoulder, with the same default."""
     bore_mm: Positive | None = None
     """Bore of the inner ring, for the growth of rotating rings."""
     outside_diameter_mm: Positive | None = None
@@ -69,8 +78,18 @@ class BallRow(Consistent):
                 f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
                 f"{self.pitch_diameter_mm:g} mm; make the ball smaller"
             )
+        yield from self._shoulder_faults()
         # The diameters of the races need a valid contact angle.
         yield from self._clearance_faults() or self._ring_faults()
+
+    def _shoulder_faults(self) -> Iterator[str]:
+        for race, factor in zip(("inner", "outer"), self.groove_factors, strict=True):
+            height = getattr(self, f"{race}_shoulder_height_mm")
+            if height is not None and height >= factor * self.ball_diameter_mm:
+                yield (
+                    f"{race}_shoulder_height_mm = {height:g}: not below the groove radius of "
+                    f"{factor * self.ball_diameter_mm:.4g} mm; make it lower"
+                )
 
     def _clearance_faults(self) -> list[str]:
         angle, clearance = self.contact_angle_deg, self.radial_clearance_mm
@@ -117,6 +136,15 @@ class BallRow(Consistent):
     def groove_factors(self) -> tuple[float, float]:
         """Groove factors, inner and outer."""
         return self.inner_groove_factor, self.outer_groove_factor
+
+    def shoulder_angle(self, race: Literal["inner", "outer"]) -> float:
+        """Contact angle at which the groove of a race ends [rad]: cos = 1 - h/(f D), h the height of the shoulder."""
+        height = getattr(self, f"{race}_shoulder_height_mm")
+        factor = getattr(self, f"{race}_groove_factor")
+        if height is not None:
+            return math.acos(1.0 - height / (factor * self.ball_diameter_mm))
+        steep = min(self.contact_angle + math.radians(BELOW_SHOULDER_DEG), 0.5 * math.pi)
+        return max(math.acos(1.0 - SHOULDER / factor), steep)
 
     @property
     def contact_angle(self) -> float:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import doe
 from doe.cli import app
 from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
-from doe.workflow.calibration import find_calibration, read_question
+from doe.workflow.calibration import find_calibration, question_of, read_question
 from doe.workflow.rig import read_rig
 from doe.workflow.signals import cage_speed
 from rbdyn.base.terminal import text
@@ -323,6 +324,20 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     with (tmp_path / "posterior.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 1000 and set(rows[0]) == {each.key for each in question.targets}
+
+    made = record_of(found, question_of(question))
+    (tmp_path / "out").mkdir()
+    write(found, made, tmp_path / "out")
+    answer = doe.calibrate(scene, rig, out=tmp_path / "out")
+    assert (
+        answer.as_dict()
+        == made
+        == json.loads(_run([scene, "--data", rig, "--out", str(tmp_path / "out"), "--json"]).stdout)
+    )
+    assert answer.files == tuple(files_of(made)) and repr(answer).startswith("<CalibrationAnswer: calibrated, ")
+    inputs = answer.table().set_index("input")
+    assert (inputs["low"] < inputs["median"]).all() and inputs["contraction"].between(-1.0, 1.0).all()
+    assert answer.table("cells").shape == (16, 13) and set(answer.table("outputs")["output"]) == set(record["outputs"])
     base = Scene.load(EXAMPLES / "cylindrical_roller.toml")
     assert base.changed({key: float(value) for key, value in rows[0].items()}).cage.mass_g == float(
         rows[0]["cage.mass_g"]
@@ -369,6 +384,12 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     record = json.loads(first.stdout)
     assert {"verdict", "learned", "combinations", "discrepancy", "outputs", "held_out", "posterior"} <= set(record)
     assert set(record["learned"]) <= {"cage.mass_g"} and record["verdict"] != "calibrated"
+    cost, predicted = record["cost"], record["cost"]["predicted"]
+    assert predicted["runs"][0] <= cost["runs"] <= predicted["runs"][1]
+    assert predicted["turns"][0] <= cost["turns"] <= predicted["turns"][1]
+    assert 0.0 < predicted["seconds"][0] < predicted["seconds"][1] and cost["seconds"] > 0.0
+    assert first.stderr.startswith(f"note: {predicted['runs'][0]:.0f} to {predicted['runs'][1]:.0f} runs of ")
+    assert "shaft turns in all took" in text(blocks(record)) and "; predicted were " in text(blocks(record))
     store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
     assert json.loads(_run(command).stdout) == record
     assert (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns == store

@@ -234,6 +234,7 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
             "files": ["summary.json", "answer.txt"],
             "status": "ok",
             "limits_sentence": "",
+            "cost": {"design_s": 1.0, "total_s": 2.0},
             "answer_sha256": digest_of(b"none"),
         }
         sign(record)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import math
 import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from instant_runs import instantly, unillustrated
+from short_studies import short_study
 
 from rbdyn.dynamics.forces.cage import NoGuide
 
@@ -17,7 +21,6 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(
     path.relative_to(EXAMPLES).with_suffix("").as_posix()
     for path in (*EXAMPLES.glob("*.py"), *EXAMPLES.glob("benchmarks/*.py"))
-    if path.stem != "in_a_notebook"
 )
 
 
@@ -50,12 +53,44 @@ def test_unit_script_imports(name):
     assert script(name).__doc__
 
 
-def test_invariant_the_notebook_runs_and_its_rollers_bear_the_shaft():
-    """Invariant: all its cells run; over ten turns the rollers carry the 1300 N of the shaft, but for its own inertia."""
-    cells = script("in_a_notebook")
-    assert cells.carried == pytest.approx(1300.0, rel=0.01)
-    assert cells.scene.cage.mass_g == 50.0 and cells.drawn.cage.mass_g == 45.0
-    assert cells.figure.axes[0].get_ylabel() == "load on the inner race [N]"
+def cells_of(name, settings):
+    """What the code cells of a notebook leave, run in turn; ``settings`` replace those of its cell of parameters."""
+    notebook = json.loads((EXAMPLES / f"{name}.ipynb").read_text(encoding="utf-8"))
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+    left = {}
+    for cell in code:
+        exec(compile("".join(cell["source"]), f"{name}.ipynb, {cell['id']}", "exec"), left)
+        if "parameters" in cell["metadata"].get("tags", ()):
+            assert settings.keys() <= left.keys()
+            left |= settings
+    return left
+
+
+def test_invariant_the_notebook_runs_and_its_rollers_bear_the_shaft(tmp_path, monkeypatch, capsys):
+    """Invariant: all its cells run, on simulations that take no time; over ten turns of a real history the rollers carry the
+    1300 N of the shaft, but for its own inertia; the chosen scene has the picked clearances.
+    """
+    settings = {"SCENE": EXAMPLES / "cylindrical_roller.toml", "STUDY": short_study(tmp_path), "OUT": tmp_path / "out"}
+    instantly(monkeypatch.setattr)
+    unillustrated(monkeypatch.setattr)
+    left = cells_of("clearance_study", settings)
+    assert left["carried"] == pytest.approx(1300.0, rel=0.01)
+    assert left["heavier"].cage.mass_g == 50.0 and left["drawn"].cage.mass_g == 45.0
+    assert left["figure"].axes[0].get_ylabel() == "power loss [W]"
+    assert left["chosen"].cage.pocket_clearance_mm == left["study"]["pick"]["pocket_clearance_mm"]
+    assert capsys.readouterr().out.endswith(" rpm\n") and (tmp_path / "out" / "report.html").exists()
+    plt.close("all")
+
+
+@pytest.mark.slow
+def test_invariant_the_notebook_runs_on_the_simulation_itself(tmp_path):
+    """Invariant: the same with real, short simulations, started in a folder that the notebook does not know."""
+    settings = {"SCENE": EXAMPLES / "cylindrical_roller.toml", "STUDY": short_study(tmp_path), "OUT": tmp_path / "out"}
+    left = cells_of("clearance_study", settings)
+    assert set(left["study"].table("gains")["response"]) == {"impact_force_N", "whirl_deviation_ratio", "power_loss_W"}
+    assert left["result"].impact_force_N.value > 0.0
+    plt.close("all")
 
 
 def test_unit_published_checks_are_whole():

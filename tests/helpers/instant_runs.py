@@ -53,7 +53,9 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
 
     ran: list[int] = []
 
-    def simulate(scene: Scene, workers: int | None, progress: Any, stop: Any, **more: Any) -> SimulationResult:
+    def simulate(
+        scene: Scene, workers: Any = None, progress: Any = None, stop: Any = None, **more: Any
+    ) -> SimulationResult:
         ran.append(scene.numerics.seed)
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
@@ -87,6 +89,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     """The program."""
     from doe.commands.options import keeping_runs
     from doe.commands.study import study as doe_study
+    from doe.library.effort import registered
     from doe.study_file import Study
     from doe.workflow.runs import run_design
     from rbdyn.base.command import guarded, output_folder, print_json
@@ -97,7 +100,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
         doe_study(study, out, workers, as_json=True)
         print(ran, file=sys.stderr)
         return
-    with guarded(as_json=True), keeping_runs(out, study):
+    with guarded(as_json=True), keeping_runs(out), registered(study, out):
         runs = run_design(Study.load(study), output_folder(out, "doe", study), workers, lambda done, total: None)
         print_json({"values": runs.values.tolist(), "ran": ran})
 

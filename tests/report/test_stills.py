@@ -79,7 +79,7 @@ def test_marks_lie_where_their_numbers_are():
 
 
 def test_light_colours_are_those_of_the_style_sheet():
-    sheet = files("doe.report").joinpath("html", "report.css").read_text(encoding="utf-8")
+    sheet = files("rbdyn.base").joinpath("report.css").read_text(encoding="utf-8")
     light = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", sheet.partition("@supports")[0]))
     assert {role: light[role] for role in COLOURS} == COLOURS
 

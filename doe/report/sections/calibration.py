@@ -15,6 +15,7 @@ from doe.workflow.calibration import Calibration
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.forecast import Forecast, duration, span
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.result import read_json, write_json
@@ -85,6 +86,31 @@ def record_of(calibration: Calibration, made_of: str) -> dict[str, Any]:
         "seed": calibration.case.scene.calibrate.seed,
         "notes": list(calibration.notes),
     }  # fmt: skip
+
+
+def cost_of(runs: int, turns: float, seconds: float, predicted: Forecast | None) -> dict[str, Any]:
+    """Runs, shaft turns and wall time [s] until the files are written, and what was predicted before anything ran.
+
+    ``predicted``: least and most of each, with the time of all steps; None where nothing was predicted.
+    """
+    return {
+        "runs": runs,
+        "turns": turns,
+        "seconds": seconds,
+        "predicted": None
+        if predicted is None
+        else {name: [float(end) for end in getattr(predicted, name)] for name in ("runs", "turns", "seconds")},
+    }
+
+
+def _cost_words(cost: dict[str, Any]) -> str:
+    """What the calibration took compared with its prediction."""
+    runs, predicted = counted(cost["runs"], "run"), cost["predicted"]
+    took = f"{runs} of {shown(cost['turns'], 3)} shaft turns in all took {duration(cost['seconds'])}"
+    if predicted is None:
+        return f"{took}."
+    runs, turns = (" to ".join(dict.fromkeys(shown(end, 3) for end in predicted[name])) for name in ("runs", "turns"))
+    return f"{took}; predicted were {runs} runs of {turns} turns, {span(*predicted['seconds'])}."
 
 
 def _outputs(calibration: Calibration) -> dict[str, Any]:
@@ -170,6 +196,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         Paragraph(OFFSET if inputs else ""),
         Bullets([*_prediction_quality(record["held_out"]), *_outliers(record)]),
         Paragraph(_screened(record["screened"])),
+        Paragraph(_cost_words(record["cost"]) if "cost" in record else "", "small"),
         *(Note(note, Detail.LEAST) for note in record["notes"]),
     ]
 

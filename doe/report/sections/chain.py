@@ -1,11 +1,12 @@
 """Dimension chains: the parts to make, their contributions, the share of assemblies within limits, and their record."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from doe.dimension_chain import ChainResult
-from doe.report.sections.record import Record, allocation, dimension, moved, part, record_table
+from doe.report.sections.record import Record, dimension, moved, part, record_table, sizes
 from doe.report.still import COLOURS, FONT, Still, name_marks
 from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
 from rbdyn.base.words import counted, label, with_error
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 # Keys of a chain that have blocks of their own.
 SHOWN_KEYS = {
     "closing_link", "yield", "yield_standard_errors", "exact_yield", "rejected", "contributions", "allocation", "status",
-    "distribution", "linearisation", "cost", "selective_assembly", "samples",
+    "distribution", "linearisation", "cost", "selective_assembly", "samples", "parts", "contributions_mm", "missed", "remedy",
+    "limits_mm", "resolution_mm",
 }  # fmt: skip
 ROW = 34.0  # height of a bar with its margin [pt]
 WRITTEN = 8.0  # share of a bar from which its number fits in it [%]
@@ -35,6 +37,8 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks: list[Block] = []
     for name, chain in (part(summary, "chains") or {}).items():
         blocks.append(Heading(label(name)))
+        if refused(chain):
+            blocks += [*_refusal(chain), _shares_table(name, chain)]
         if shares := chain.get("contributions"):
             caption = "Contribution of each part to the scatter of the closing link."
             blocks.append(Figures([contributions(name, shares).svg], caption))
@@ -45,45 +49,119 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def chain_blocks(name: str, chain: Record) -> list[Block]:
-    """Parts, contributions, closing link and yield of a dimension chain; at full detail also yields and classes."""
+    """Parts, contributions, closing link and yield of a dimension chain; at full detail also yields and classes.
+
+    A refused chain shows its contributions, by how much it misses, and what would meet its limits, at any detail.
+    """
     selective = chain.get("selective_assembly")
     status = str(chain.get("status") or "")
+    detail = Detail.LEAST if refused(chain) else Detail.USUAL
     return [
         _parts_table(name, chain),
-        _shares_table(name, chain),
+        replace(_shares_table(name, chain), detail=detail),
         *_distributions(chain, Detail.ALL),
-        *(Paragraph(sentence, detail=Detail.USUAL) for sentence in _closing(chain)),
-        Paragraph(f"{status[:1].upper()}{status[1:]}." if status else "", detail=Detail.USUAL),
+        *(Paragraph(sentence, detail=detail) for sentence in _closing(chain)),
+        *(_refusal(chain) if refused(chain) else [Paragraph(_sentence(status), detail=Detail.USUAL)]),
         *(_selective(selective) if selective else ()),
     ]
 
 
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
 def _parts_table(name: str, chain: Record) -> Table:
+    """Sizes for the drawing: stated ones as they are written, allocated ones at its resolution."""
+    rows = sizes(chain, "parts") or sizes(chain)
     title = f"Dimension chain {label(name)}"
     if refused(chain):
-        title += ": the nearest dimensions that meet the limits"
+        given = all(row.get("origin") == "stated" for row in rows.values())
+        title += f": {'the stated sizes' if given else 'even the narrowest tolerances'} miss the limits"
     elif chain.get("status") == "ok":
-        title += ": the stated tolerances meet the limits; these are the widest that do"
-    rows = [
-        (label(name), dimension(dimensions), dimensions.get("grade") or "", moved(dimensions))
-        for name, dimensions in allocation(chain).items()
+        title += ": the stated sizes meet the limits"
+    return _sizes_table(title, rows)
+
+
+def _sizes_table(title: str, rows: Mapping[str, Record]) -> Table:
+    cells = [
+        (
+            label(name),
+            dimension(row),
+            row.get("grade_words") or row.get("grade") or "",
+            moved(row),
+            row.get("origin") or "",
+        )
+        for name, row in rows.items()
     ]
-    header = ("part", "dimension [mm]", "grade", "nominal moved [mm]")
-    return Table(title, header, rows, text_columns=(2,)).without_empty_columns()
+    header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations")
+    return Table(title, header, cells, text_columns=(2, 4)).without_empty_columns()
 
 
 def refused(chain: Record) -> bool:
-    """Whether the stated deviations of a chain miss its limits."""
+    """Whether the parts of a chain miss its limits."""
     return str(chain.get("status")).startswith("refused")
 
 
+def _refusal(chain: Record) -> list[Block]:
+    """By how much a chain misses its limits, why, what would meet them, and the nearest sizes that do."""
+    stated, nearest = sizes(chain, "parts"), sizes(chain)
+    differs = any(dimension(row) != dimension(stated[name]) for name, row in nearest.items() if name in stated)
+    return [
+        Paragraph(_miss(chain), "statement"),
+        Paragraph(_sentence(str(chain["status"]))),
+        Paragraph(part(chain, "remedy", "sentence") or ""),
+        _sizes_table("The nearest sizes that meet the limits", nearest if differs else {}),
+    ]
+
+
+def _miss(chain: Record) -> str:
+    """'The chain misses its limits: 0.3300 mm below the lower limit.'"""
+    missed = chain.get("missed") or {}
+    figures = [
+        f"{missed[key]:.4f} mm {words}"
+        for key, words in (
+            ("below_mm", "below the lower limit"),
+            ("above_mm", "above the upper limit"),
+            ("width_mm", "more than their distance"),
+        )
+        if missed.get(key)
+    ]
+    if missed.get("yield_short"):
+        figures.insert(0, f"{missed['yield_short']:.4g} of the assemblies too many are outside")
+    return f"The chain misses its limits: {', '.join(figures)}." if figures else ""
+
+
 def _shares_table(name: str, chain: Record) -> Table:
-    shares = chain.get("contributions") or {}
-    rows = [(label(name), *(_percent(part(shares, name, kind)) for kind, _ in KINDS)) for name in shares]
-    header = ("part", *(words for _, words in KINDS))
-    return Table(
-        f"Contributions to the scatter of the closing link, chain {label(name)}", header, rows, detail=Detail.USUAL
+    """What each part takes of the closing link's scatter: percent, and mm."""
+    shares, widths = chain.get("contributions") or {}, chain.get("contributions_mm") or {}
+    rows = [
+        (
+            label(name),
+            *(_percent(part(shares, name, kind)) for kind, _ in KINDS),
+            *(_size(part(widths, name, kind)) for kind in ("six_sigma_mm", "worst_case_mm")),
+        )
+        for name in shares
+    ]
+    header = ("part", *(words for _, words in KINDS), "six sigma [mm]", "worst case [mm]")
+    title = f"Contributions to the scatter of the closing link, chain {label(name)}"
+    return Table(title, header, rows, _room(chain)).without_empty_columns()
+
+
+def _room(chain: Record) -> str:
+    """'The parts take 0.0350 mm in worst case of the 0.0300 mm between the limits.'"""
+    closing, limits = chain.get("closing_link") or {}, chain.get("limits_mm")
+    if limits is None or not {"worst_case_mm", "rss_mm"} <= set(closing):
+        return ""
+    lower, upper = limits
+    worst, root, room = (high - low for low, high in (closing["worst_case_mm"], closing["rss_mm"], limits))
+    return (
+        f"The parts take {worst:.4f} mm in worst case and {root:.4f} mm by root sum square, of the {room:.4f} mm from "
+        f"{lower:.4f} to {upper:.4f} mm."
     )
+
+
+def _size(value: float | None) -> str:
+    return "" if value is None else f"{value:.4f}"
 
 
 def _percent(value: float | None) -> str:
@@ -97,7 +175,7 @@ def _closing(chain: Record) -> list[str]:
     if {"worst_case_mm", "rss_mm"} <= set(closing):
         (low, high), (least, most) = closing["worst_case_mm"], closing["rss_mm"]
         place = f"{low:.4f} to {high:.4f} mm in worst case, {least:.4f} to {most:.4f} mm by root sum square"
-        start = "With the stated tolerances the" if refused(chain) else "The"
+        start = "With these sizes the" if refused(chain) else "The"
         sentences.append(f"{start} closing link is {place}{_yield(chain)}.")
     if errors := chain.get("linearisation"):
         worst = (

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from doe.dimension_chain.links import size_text
 from doe.pareto.manufacture import Interval, percent
 from rbdyn.base.blocks import Block, Bullets, Note, Paragraph, Table, says
 from rbdyn.base.words import improvement, label, quantity, shown
@@ -103,10 +104,11 @@ def record_table(caption: str, record: Record | None, folded: bool = False) -> T
     return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
 
 
-def allocation(chain: Record) -> dict[str, Any]:
-    """Parts of a dimension chain whose record holds their dimensions."""
-    dimensions = {"nominal_mm", "upper_mm", "lower_mm"}
-    return {name: row for name, row in (chain.get("allocation") or {}).items() if dimensions <= set(row)}
+def sizes(chain: Record, key: str = "allocation") -> dict[str, Any]:
+    """Parts of a dimension chain whose record holds their sizes; growths by temperature stand on no drawing."""
+    figures = {"nominal_mm", "upper_mm", "lower_mm"}
+    rows = (chain.get(key) or {}).items()
+    return {name: row for name, row in rows if figures <= set(row) and row.get("origin") != "temperature"}
 
 
 def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:
@@ -211,14 +213,10 @@ def change(gain: Mapping[str, Any]) -> str:
 
 
 def moved(part: Mapping[str, Any]) -> str:
-    """'+0.0200' of a part whose nominal was moved, else nothing."""
-    return f"{part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
+    """'+0.020' of a part whose nominal was moved, else nothing."""
+    return size_text(0.0, part["moved_mm"], 0.0).split()[1].partition("/")[0] if part.get("moved_mm") else ""
 
 
 def dimension(part: Mapping[str, Any]) -> str:
-    """'9.2900 0/-0.0050' of a part's nominal and deviations."""
-
-    def deviation(value: float) -> str:
-        return "0" if value == 0.0 else f"{value:+.4f}"
-
-    return f"{part['nominal_mm']:.4f} {deviation(part['upper_mm'])}/{deviation(part['lower_mm'])}"
+    """'9.290 0/-0.005' of a part's nominal and deviations, as its drawing states them."""
+    return str(part.get("text") or size_text(part["nominal_mm"], part["upper_mm"], part["lower_mm"]))

@@ -1,0 +1,425 @@
+"""One step of a study alone: ``design``, ``fit``, ``front`` and ``chain``, and their answers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from doe.library.answer import Answer, Rows
+from doe.library.effort import Effort, Follow, path_given, registered, saved, texts_given
+from rbdyn.base.blocks import Block, Detail, Note, Paragraph
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
+from rbdyn.base.words import counted, quantity, with_error
+
+if TYPE_CHECKING:
+    from doe.response_surface import Surface
+    from doe.study_file import Study
+
+
+def with_notes(record: Mapping[str, Any], blocks: Sequence[Block]) -> list[Block]:
+    """The blocks behind the notes of their record."""
+    return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
+
+
+class DesignAnswer(Answer):
+    """The runs of a design and its quality. Tables: "runs" (actual values in the units of the factors), "coded", "terms"."""
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.design import design_blocks
+
+        return with_notes(self.record, design_blocks(self.as_dict()))
+
+    def rows(self) -> Mapping[str, Rows]:
+        runs, evaluation = self.record["runs"], self.record["evaluation"]
+        marks = ("run", "standard", "kind", "block", "seed")
+        power = evaluation["power_percent"]
+        return {
+            "runs": [{**{key: run[key] for key in marks}, **run["factors"]} for run in runs],
+            "coded": [{"run": run["run"], "kind": run["kind"], **run["coded"]} for run in runs],
+            "terms": [
+                {"term": term, "vif": inflation, **{f"power_{key}_percent": power[term][key] for key in power[term]}}
+                for term, inflation in evaluation["vif"].items()
+            ],
+        }
+
+    def brief(self) -> str:
+        factors = ", ".join(self.record["factors"])
+        return f"{self.record['kind'].replace('_', ' ')}, {counted(len(self.record['runs']), 'run')} of {factors}"
+
+
+def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
+    """Design of a study, as ``doe design``: every run, and how well the runs identify the terms of the models.
+
+    - ``path``: STUDY.toml; where its scene is missing only the design itself is checked
+    - ``out``: folder for design.json; by default nothing is written
+
+    Raises InputError with all faults of the study.
+    """
+    from doe.report.sections.design import design_record
+    from doe.study_file import Study
+    from doe.workflow.runs import augment_notes, design_of, evaluation
+    from doe.workflow.whole import check_study
+
+    path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
+    study = Study.load(path)
+    # Without a scene the runs are made elsewhere, and only the design itself is checked.
+    if study.file.scene and study.path_of(study.scene.file).exists():
+        check_study(study)
+    points = design_of(study)
+    notes = augment_notes(study)
+    record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
+    return DesignAnswer(record, folder, saved(folder, path, "design.json", record))
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FitAnswer(Answer):
+    """Response surfaces. Tables: "quality" (a row a response), "anova", "coefficients" (in coded units), "runs" (residuals).
+
+    ``factors``: names in the order of the letters of the terms; ``columns``: those of a table fitted without a study.
+    """
+
+    factors: tuple[str, ...] = ()
+    columns: str = ""
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.fit import fit_blocks
+        from doe.report.sections.record import drop_undefined, readable
+
+        fits = [
+            block
+            for name, fitted in drop_undefined(self.record["responses"]).items()
+            for block in fit_blocks(name, fitted, self.factors)
+        ]
+        return [Paragraph(self.columns), *with_notes(self.record, readable(fits, {}))]
+
+    def rows(self) -> Mapping[str, Rows]:
+        return fit_rows(self.record["responses"])
+
+    def brief(self) -> str:
+        fits = self.record["responses"].items()
+        return ", ".join(f"{quantity(name)[0]} {fit['model']} R² {fit['r2']:.3f}" for name, fit in fits)
+
+
+QUALITY = ("model", "r2", "adjusted_r2", "predicted_r2", "press", "cv_percent", "adequate_precision")
+
+
+def fit_rows(fits: Mapping[str, Any]) -> dict[str, Rows]:
+    """Tables of the fits of ``doe fit --json`` by response."""
+    return {
+        "quality": [{"response": name, **{key: fit[key] for key in QUALITY}} for name, fit in fits.items()],
+        "anova": [{"response": name, **row} for name, fit in fits.items() for row in fit["anova"]],
+        "coefficients": [
+            {
+                "response": name,
+                "term": term,
+                "coefficient": value,
+                "standard_error": fit["standard_errors"][term],
+                **fit["tests"][term],
+                "vif": fit["vif"].get(term),
+                "actual_units": fit["actual_coefficients"][term],
+            }
+            for name, fit in fits.items()
+            for term, value in fit["coefficients"].items()
+        ],
+        "runs": [{"response": name, **run} for name, fit in fits.items() for run in fit["diagnostics"]["runs"]],
+    }
+
+
+def fit(
+    path: Path | str | None = None,
+    data: Path | str | None = None,
+    factors: Sequence[str] = (),
+    responses: Sequence[str] = (),
+    model: str | None = None,
+    out: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+) -> FitAnswer:
+    """Response surfaces with their analysis of variance, as ``doe fit``.
+
+    - ``path``: STUDY.toml; None for a table alone
+    - ``data``: table of runs made elsewhere; without it the runs of the study are simulated
+    - ``factors``, ``responses``: columns of a table alone; ``model``: linear, interaction, pure_quadratic, quadratic (default)
+      or reduced
+    - ``out``: folder for the files and the store of runs; by default nothing is written
+    - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
+    - ``progress(stage, done, total)``: called as runs end
+
+    Raises InputError with all faults of study, table or arguments, RunError where runs fail.
+    """
+    from doe.report.sections.fit import fit_record, fit_tables
+    from doe.workflow.surfaces import unrivalled, with_rivals
+    from rbdyn.base.records import save_table
+
+    table, folder = (
+        None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
+    )
+    study_path = None if path is None else path_given(path, "path")
+    study, notes = _study_or_table(study_path, table, factors, responses, model)
+    with registered(study.path, folder):
+        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        surfaces = with_rivals(surfaces)
+        remarks = [*reading, *notes, *unrivalled(surfaces)]
+        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
+        files = saved(folder, study.path, "fit.json", record)
+        if folder is not None:
+            tables = fit_tables(surfaces)
+            for name, rows in tables.items():
+                save_table(rows, folder / name)
+            files = (*files, *tables)
+    columns = (
+        f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends of "
+        "a factor's range"
+    )
+    return FitAnswer(record, folder, files, None, tuple(study.factors), columns if path is None else "")
+
+
+def _study_or_table(
+    path: Path | None, data: Path | None, factors: Any, responses: Any, model: str | None
+) -> "tuple[Study, tuple[str, ...]]":
+    """The study of the file, or else that of the table with the options that name its columns; and notes.
+
+    Raises InputError.
+    """
+    from doe.study_file import Study
+    from doe.study_file.study import study_of_table
+
+    factors = texts_given(factors, "factors", '["pocket_clearance_mm"]')
+    responses = texts_given(responses, "responses", '["impact_force_N"]')
+    if path is not None:
+        options = {"factor": factors, "response": responses, "model": model}
+        refuse(
+            f"--{option}: {path} states it; leave out one or the other" for option, value in options.items() if value
+        )
+        return Study.load(path), ()
+    if data is None:
+        raise InputError(
+            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
+        )
+    return study_of_table(data, factors, responses, model or "quadratic")
+
+
+def _surfaces(
+    study: "Study", data: Path | None, out: Path | None, effort: Effort
+) -> "tuple[list[Surface], tuple[str, ...]]":
+    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
+
+    Raises InputError, RunError, KeyboardInterrupt.
+    """
+    from doe.workflow.runs import read_runs, run_design
+    from doe.workflow.surfaces import fit_surfaces
+
+    if data is not None:
+        runs = read_runs(study, data)
+        return fit_surfaces(study, runs), runs.notes
+    with effort.folder(out, study.path) as folder:
+        progress = effort.progress("design runs")
+        runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
+        return fit_surfaces(study, runs), ()
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FrontAnswer(Answer):
+    """The Pareto front on the surfaces. Tables: "front" (a row a point, factors and responses), "picks", "gains" of the pick.
+
+    ``asked``: factors and responses of the study.
+    """
+
+    asked: Mapping[str, Any] = field(default_factory=dict)
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.front import front_blocks
+        from doe.report.sections.record import drop_undefined, readable
+
+        clean = drop_undefined({"asked": self.asked, "front": self.as_dict()})
+        return with_notes(self.record, readable(front_blocks(clean), clean))
+
+    def rows(self) -> Mapping[str, Rows]:
+        picks = {"baseline": self.record["baseline"], **self.record["picks"]}
+        gains = self.record["predicted_gains"]
+        return {
+            "front": [point_row(point) for point in self.record["front"]],
+            "picks": [{"point": name, **point_row(point)} for name, point in picks.items()],
+            "gains": [{"response": name, **gain} for name, gain in gains.items()],
+        }
+
+    def brief(self) -> str:
+        gains = self.record["predicted_gains"].items()
+        texts = [f"{quantity(name)[0]} {with_error(gain['percent'], gain['error_percent'])} %" for name, gain in gains]
+        return f"{counted(len(self.record['front']), 'point')}; predicted gains of the pick {', '.join(texts)}"
+
+
+def point_row(point: Mapping[str, Any]) -> dict[str, Any]:
+    """A point of a front as a row: factors, responses, and their 95 % half-widths."""
+    errors = {f"{name}_error": error for name, error in (point.get("errors") or {}).items()}
+    return {**point["factors"], **point["responses"], **errors}
+
+
+def front(
+    path: Path | str,
+    data: Path | str | None = None,
+    out: Path | str | None = None,
+    point: Mapping[str, float] | Sequence[float] | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+) -> FrontAnswer:
+    """Pareto front on the response surfaces of a study, as ``doe front``.
+
+    - ``path``: STUDY.toml; ``data``: table of runs made elsewhere, without which the runs are simulated
+    - ``out``: folder for front.json and the store of runs; by default nothing is written
+    - ``point``: also predict this point: values by factor (the rest at the baseline), or all of them in order, in the units
+      of the factors
+    - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
+    - ``progress(stage, done, total)``: called as runs end
+
+    Raises InputError with all faults of study, table or point, RunError where runs fail.
+    """
+    import numpy as np
+
+    from doe.report.sections.answer import asked_record
+    from doe.report.sections.front import front_record, given_point_record
+    from doe.study_file import Study
+    from doe.workflow.front import check_goals, find_front, with_survival
+
+    path = path_given(path, "path")
+    table, folder = (
+        None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
+    )
+    with registered(path, folder):
+        study = Study.load(path)
+        check_goals(study)
+        values = None if point is None else _point(study, _point_text(point))
+        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        pareto = with_survival(study, surfaces, find_front(study, surfaces))
+        record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
+        if values is not None:
+            record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
+        files = saved(folder, path, "front.json", record)
+    return FrontAnswer(record, folder, files, None, asked_record(study))
+
+
+def _point_text(point: Any) -> str:
+    """The text of ``--point`` for values by factor, or in the order of the factors. Raises InputError for anything else."""
+    if isinstance(point, str):
+        return point
+    if isinstance(point, Mapping):
+        return ",".join(f"{name}={value}" for name, value in point.items())
+    if hasattr(point, "__iter__"):
+        return ",".join(map(str, point))
+    shown = one_line(repr(point), LONGEST_NAME)
+    raise InputError([f"point = {shown}: must be values by factor, such as {{'pocket_clearance_mm': 0.3}}, or a list"])
+
+
+def _point(study: "Study", text: str) -> list[float]:
+    """Factor values of ``--point``. Raises InputError with every fault."""
+    from collections import Counter
+    from math import nan
+
+    from doe.study_file.table import RUN, is_number
+
+    values = study.by_factor(study.baseline)
+    parts = [part.strip() for part in text.split(",")]
+    by_name = any("=" in part for part in parts)
+    if not by_name and len(parts) != len(study.factors):
+        raise InputError([f"--point {text}: give a value for each factor ({', '.join(study.factors)}), or name=value"])
+    pairs = [part.partition("=")[::2] for part in parts] if by_name else list(zip(study.factors, parts, strict=True))
+    stripped = [(name.strip(), number.strip()) for name, number in pairs]
+    counts = Counter(name for name, _ in stripped)
+    faults = [f"--point {name}: given {count} times; give it once" for name, count in counts.items() if count > 1]
+    for name, number in stripped:
+        if name not in values:
+            faults.append(f"--point {name}: no such factor; name one of {', '.join(values)}")
+            continue
+        value = float(number) if is_number(number) else nan
+        if RUN.contains(value):
+            values[name] = value
+        else:
+            faults.append(f"--point {name} = {number}: {RUN.fault(value)}")
+    refuse(faults)
+    return list(values.values())
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ChainAnswer(Answer):
+    """Solved dimension chains. Tables: "parts" (dimensions with tolerances [mm]), "contributions" [%], "closing" [mm].
+
+    ``chains``: JSON of each chain by its name; ``refused``: status of the chains that miss their limits, by name.
+    """
+
+    chains: Mapping[str, Any] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.chain import chain_blocks
+
+        return [block for name, chain in self.chains.items() for block in chain_blocks(name, chain)]
+
+    def rows(self) -> Mapping[str, Rows]:
+        return {
+            "parts": part_rows(self.chains),
+            "contributions": [
+                {"chain": name, "part": part, **shares}
+                for name, chain in self.chains.items()
+                for part, shares in chain["contributions"].items()
+            ],
+            "closing": [{"chain": name, **_closing_row(chain)} for name, chain in self.chains.items()],
+        }
+
+    def brief(self) -> str:
+        return "; ".join(f"{name}: {chain['status']}" for name, chain in self.chains.items())
+
+
+def part_rows(chains: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Dimensions of the parts of chains, by their JSON records."""
+    return [
+        {"chain": name, "part": part, **sizes}
+        for name, chain in chains.items()
+        for part, sizes in chain["allocation"].items()
+        if isinstance(sizes, Mapping)
+    ]
+
+
+def _closing_row(chain: Mapping[str, Any]) -> dict[str, Any]:
+    """Nominal and ends of the closing link [mm], the yield of the parts as stated, and the status."""
+    link = chain["closing_link"]
+    ends = {
+        f"{kind}_{end}_mm": link[f"{kind}_mm"][place]
+        for kind in ("worst_case", "rss")
+        for place, end in enumerate(("low", "high"))
+    }
+    return {
+        "nominal_mm": link["nominal_mm"],
+        **ends,
+        "yield": chain["yield"].get("as_given"),
+        "status": chain["status"],
+    }
+
+
+def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
+    """Solution of a dimension chain, or of several, as ``doe chain``: limits, yield, contributions, tolerances of the parts.
+
+    - ``path``: CHAIN.toml with one chain, or with several in tables named chain; sizes in mm
+    - ``out``: folder for chain.json; by default nothing is written
+
+    A chain that misses its limits is listed in ``refused`` of the answer. Raises InputError with the faults of every chain.
+    """
+    from doe.dimension_chain import is_several, read_chains, solve
+    from doe.report.sections.chain import chains_record
+
+    path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
+    several = is_several(path)
+    results, faults = {}, []
+    for name, chain_table in read_chains(path).items():
+        try:
+            results[name] = solve(chain_table, source=f'{path}: chain "{name}"' if several else str(path))
+        except InputError as error:
+            faults += error.faults
+    refuse(faults)
+    record = chains_record(results) if several else next(iter(results.values())).as_dict()
+    files = saved(folder, path, "chain.json", record)
+    refused = {name: result.status for name, result in results.items() if result.refused}
+    return ChainAnswer(record, folder, files, None, {name: r.as_dict() for name, r in results.items()}, refused)

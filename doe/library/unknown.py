@@ -1,0 +1,232 @@
+"""Unknown inputs of a scene: ``uncertainty`` and ``calibrate``, and their answers."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from doe.library.answer import Answer, Rows
+from doe.library.effort import Effort, Follow, path_given, registered, texts_given
+from rbdyn.base.blocks import Block
+from rbdyn.base.command import output_folder
+from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
+from rbdyn.base.forecast import Notice
+from rbdyn.base.words import counted, quantity, shown
+
+if TYPE_CHECKING:
+    from doe.workflow.uncertainty import Uncertainty
+
+
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
+class UncertaintyAnswer(Answer):
+    """Ranges of a scene's outputs over its unknown inputs. Tables: "ranges", "shares" (of the variance), "inputs", "sets".
+
+    ``uncertainty``: input sets with their runs, in the units of the scene.
+    """
+
+    uncertainty: "Uncertainty"
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.unknown import uncertainty_blocks
+
+        return uncertainty_blocks(self.uncertainty)
+
+    def rows(self) -> Mapping[str, Rows]:
+        outputs, sets = self.record["responses"], self.uncertainty.sets
+        return {
+            "ranges": [
+                {
+                    "output": name,
+                    "nominal": output["value"],
+                    **{key: output["input"][key] for key in ("low", "median", "high")},
+                    **{f"variance_{cause}": share for cause, share in output["variance"].items()},
+                }
+                for name, output in outputs.items()
+            ],
+            "shares": [
+                {"output": name, "input": key, "share": share, "low": low, "high": high}
+                for name, output in outputs.items()
+                for key, (share, low, high) in (output["shapley"] or output["total"] or {}).items()
+            ],
+            "inputs": [
+                {"input": entry["key"], **entry["law"], "source": entry["reason"]} for entry in self.record["inputs"]
+            ],
+            "sets": [
+                {**values, **dict(zip(outputs, figures, strict=True))}
+                for values, figures in zip(sets.inputs, sets.outputs.tolist(), strict=True)
+            ],
+        }
+
+    def brief(self) -> str:
+        ranges = []
+        for name, output in self.record["responses"].items():
+            words, unit = quantity(name)
+            ends = output["input"]
+            ranges.append(f"{words} {shown(ends['low'], 3)} to {shown(ends['high'], 3)} {unit}".rstrip())
+        return f"{', '.join(ranges)} in 90 % of the cases; {counted(self.record['runs'], 'input set')}"
+
+
+def uncertainty(
+    path: Path | str,
+    points: int | None = None,
+    target: float = 0.1,
+    overrides: Sequence[str] = (),
+    out: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+    notice: Notice = None,
+) -> UncertaintyAnswer:
+    """Range of every output of a scene over its unknown inputs, and the share of each input, as ``doe uncertainty``.
+
+    - ``path``: SCENE.toml of a roller bearing; ``overrides`` of its keys, such as ``["cage.mass_g=50"]``
+    - ``points``: input sets to begin with, a power of two from 16 to 512; by default those of the scene
+    - ``target``: standard error of the ends of a range, as a fraction of its width
+    - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
+    - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+
+    Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
+    """
+    from doe.report.sections.unknown import uncertainty_record, write_uncertainty
+    from doe.running.runner import ANSWER
+    from doe.workflow.status import content_digest, runs_digest
+    from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
+    from rbdyn.dynamics.target import valid_target
+
+    path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
+    folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
+    effort = Effort(workers, scheduler, retry, progress, notice)
+    refuse(_points_faults(points))
+    accuracy = valid_target(target)
+    with registered(path, folder):
+        inputs, runs = content_digest(path), runs_digest(path, assignments)
+        output_folder(folder, "doe", path)
+        with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
+            agenda.plan(uncertainty_stages(path, assignments, points))
+            with effort.simulations(folder, path, agenda) as simulations:
+                result = find_uncertainty(path, assignments, simulations, points, accuracy)
+            agenda.enter(ANSWER)
+            files = write_uncertainty(result, folder)
+            agenda.finish(files)
+    return UncertaintyAnswer(uncertainty_record(result), folder, tuple(files), agenda.agenda, uncertainty=result)
+
+
+FEWEST_SETS, MOST_SETS = 16, 512
+
+
+def _points_faults(points: Any) -> list[str]:
+    """Faults of the number of input sets."""
+    if points is None:
+        return []
+    if isinstance(points, bool) or not isinstance(points, int) or not FEWEST_SETS <= points <= MOST_SETS:
+        value = one_line(repr(points), LONGEST_NAME)
+        return [f"points = {value}: must be a power of two from {FEWEST_SETS} to {MOST_SETS}"]
+    return no_power_of_two("--points ", points)
+
+
+class CalibrationAnswer(Answer):
+    """What measurements on a rig say about the unknown inputs. Tables: "inputs", "outputs", "cells" (measured, predicted)."""
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.calibration import blocks
+
+        return blocks(self.as_dict())
+
+    def rows(self) -> Mapping[str, Rows]:
+        learned = self.record["learned"]
+        return {
+            "inputs": [
+                {"input": key, "contraction": learned[key], **_input_row(row)}
+                for key, row in self.record["inputs"].items()
+            ],
+            "outputs": [
+                {"output": name, **{key: row[key] for key in ("explained", "allowed", "evidence", "resolution")}}
+                for name, row in self.record["outputs"].items()
+            ],
+            "cells": [
+                {
+                    **{key: cell[key] for key in ("row", "output", "measured", "sd", "held", "as_the_scene_says")},
+                    **_ends("before", cell["before"]),
+                    **_ends("after", cell["after"]),
+                    "residual": cell["residual"],
+                }
+                for cell in self.record["cells"]
+            ],
+        }
+
+    def brief(self) -> str:
+        reasons = "; ".join(self.record["reasons"])
+        runs = counted(self.record["runs"], "run")
+        return f"{self.record['verdict']}{': ' if reasons else ''}{one_line(reasons, 4 * LONGEST_NAME)}, {runs}"
+
+
+def _input_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Densest 90 % of an input with its median and its range before, or the shares of its choices."""
+    if "shares" in row:
+        return {f"share_{value}": share for value, share in row["shares"].items()} | {"seen": row["seen"]}
+    before_low, before_high = row["before"]
+    ends = {key: row[key] for key in ("low", "median", "high")}
+    return {**ends, "before_low": before_low, "before_high": before_high, "seen": row["seen"]}
+
+
+def _ends(name: str, quantiles: Sequence[float] | None) -> dict[str, float | None]:
+    """5, 50 and 95 % of the predictions."""
+    return dict(zip((f"{name}_low", f"{name}_median", f"{name}_high"), quantiles or (None,) * 3, strict=True))
+
+
+def calibrate(
+    path: Path | str,
+    data: Path | str,
+    free: Sequence[str] = (),
+    overrides: Sequence[str] = (),
+    out: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+    notice: Notice = None,
+) -> CalibrationAnswer:
+    """Unknown inputs of a scene from measurements on a rig, and whether it may be called calibrated, as ``doe calibrate``.
+
+    - ``path``: SCENE.toml of a roller bearing; ``overrides`` of its keys, such as ``["cage.mass_g=50"]``
+    - ``data``: RIG.csv, a row for each condition: scene keys, outputs in the units of their names, their ``_sd``
+    - ``free``: keys to identify, by default all unknown inputs
+    - ``out``: folder of the files and the store of runs, by default SCENE_calibration; a finished answer is read from there
+    - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
+      and the answer
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+
+    Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
+    """
+    from doe.report.sections.calibration import cost_of, files_of, record_of, stored, write
+    from doe.running.runner import ANSWER
+    from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
+    from doe.workflow.status import content_digest
+
+    path, table = path_given(path, "path"), path_given(data, "data")
+    folder = Path(f"{path.stem}_calibration") if out is None else path_given(out, "out")
+    free, assignments = (
+        texts_given(given, name, '["cage.mass_g"]') for given, name in ((free, "free"), (overrides, "overrides"))
+    )
+    effort = Effort(workers, scheduler, retry, progress, notice)
+    with registered(path, folder):
+        question = read_question(path, table, free, assignments)
+        identity = question_of(question)
+        output_folder(folder, "doe", path)
+        if not retry and (record := stored(folder, identity)) is not None:
+            return CalibrationAnswer(record, folder, tuple(files_of(record)))
+        inputs = content_digest(path)
+        with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
+            agenda.plan(calibration_stages(question))
+            predicted = None if scheduler else agenda.state_first(pace(question))
+            with effort.simulations(folder, path, agenda) as simulations:
+                result = find_calibration(question, simulations)
+                turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
+            agenda.enter(ANSWER)
+            record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
+            write(result, record, folder)
+            agenda.finish(files_of(record))
+    return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)

@@ -1,0 +1,79 @@
+"""A report as one HTML page that can be mailed: it fetches nothing and can be read without scripts and on paper.
+
+``page`` fills the skeleton ``page.html`` with the style sheet ``report.css``. ``result_page`` is the page of a command that has a
+result and pictures: the identity first, then the blocks of the terminal.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+from rbdyn.base import html
+from rbdyn.base.blocks import Block, Figures, Section
+from rbdyn.base.identity import Identity, identity_table
+from rbdyn.base.vector import vector_copies
+from rbdyn.base.words import filled_page
+from rbdyn.base.workbook import NAME, write_workbook
+
+REPORT = "report.html"
+
+
+def write_with_report(
+    folder: Path, identity: Identity, blocks: Callable[[], Sequence[Block]], write: Callable[[], Sequence[str]]
+) -> list[str]:
+    """Let ``write`` write the files of a command, then report.html with its pictures and tables.xlsx of its tables.
+
+    blocks : makes the blocks of the terminal
+    write : writes the files and returns their names, which are returned with the two further ones. Raises OSError.
+    """
+    with vector_copies() as pictures:
+        names = list(write())
+    (folder / REPORT).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
+    write_workbook(folder, [name for name in names if name.endswith(".csv")], identity)
+    return [*names, REPORT, NAME]
+
+
+def page(
+    title: str,
+    heading: str,
+    sections: Iterable[Section],
+    widget: Callable[[str], str] = lambda name: "",
+    notice: str = "",
+    scripts: str = "",
+) -> str:
+    """A whole page.
+
+    title, heading : name of the window, and the first heading
+    widget : writes the place of a named interactive picture
+    notice, scripts : HTML before the sections, and after them
+    """
+    chapters = list(sections)
+    marks = {
+        "TITLE": escape(title),
+        "HEADING": escape(heading),
+        "STYLE": _text("report.css"),
+        "CONTENTS": "".join(f'<li><a href="#{part.key}">{escape(part.title)}</a></li>' for part in chapters),
+        "NOTICE": notice,
+        "SECTIONS": "\n".join(html.section(part, widget) for part in chapters),
+        "SCRIPTS": scripts,
+    }
+    return filled_page(_text("page.html"), marks)
+
+
+def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
+    """Page of a result: its identity, its blocks at every detail, its pictures (SVG by name)."""
+    drawn = [Figures([picture], name) for name, picture in pictures.items()]
+    parts = [identity_section(identity), Section("result", "Result", blocks), Section("pictures", "Pictures", drawn)]
+    return page(identity.title, identity.title, [part for part in parts if part.blocks])
+
+
+def identity_section(identity: Identity) -> Section:
+    """First section of a page: bearing, operating point, date, version, hashes of the input files."""
+    return Section("identity", "Bearing, operating point, inputs", [replace(identity_table(identity), caption="")])
+
+
+def _text(name: str) -> str:
+    """A file of the page."""
+    return files("rbdyn.base").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,130 @@
+"""Tables of a folder as one workbook: a sheet with the identity of the result, then a sheet for each CSV file.
+
+A table of more than ``MOST_CELLS``, such as a motion in time, stays in its CSV file, as the first sheet says: openpyxl takes
+11 us a cell. Equal tables of one date give equal bytes. openpyxl is imported only when a workbook is written.
+"""
+
+import csv
+import io
+import re
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.base.identity import Identity, identity_table
+from rbdyn.base.records import NUMBER
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
+
+NAME = "tables.xlsx"
+FIRST = "identity"
+# Characters of a sheet's name, and those that no spreadsheet accepts in it.
+LONGEST_SHEET, ILLEGAL = 31, re.compile(r"[\\/*?:\[\]\x00-\x1f]")
+# Characters that no cell can hold.
+CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+# Numbers that a cell cannot hold.
+NOT_FINITE = {"nan": None, "inf": "inf", "-inf": "-inf"}
+MOST_CELLS = 50_000
+WIDEST_COLUMN, ENTRIES_LEFT_FREE = 40, 2
+CHANGED = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*")
+
+
+def write_workbook(folder: Path, names: Iterable[str], identity: Identity) -> None:
+    """Write tables.xlsx of the CSV files of a folder; columns of numbers are numbers. Raises OSError."""
+    from openpyxl import Workbook
+
+    day = datetime.fromisoformat(identity.date)
+    book = Workbook(write_only=True)
+    book.properties.title, book.properties.creator, book.properties.created = identity.title, "rbdyn", day
+    tables = {name: _rows(folder / name) for name in names}
+    long = {name: f"{len(rows) - 1} rows, in this file only" for name, rows in tables.items() if _is_long(rows)}
+    _sheet(book, FIRST, [("property", "value"), *identity_table(identity).rows, *long.items()])
+    sheets = [FIRST]
+    for name in (name for name in tables if name not in long):
+        sheets.append(sheet_name(Path(name).stem, sheets))
+        _sheet(book, sheets[-1], _typed(tables[name]))
+    written = io.BytesIO()
+    book.save(written)
+    (folder / NAME).write_bytes(_dated(written, day))
+
+
+def _rows(path: Path) -> list[list[str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.reader(file))
+
+
+def _is_long(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether a table is too long for a workbook."""
+    return sum(map(len, rows)) > MOST_CELLS
+
+
+def sheet_name(name: str, taken: Sequence[str]) -> str:
+    """A legal name for a sheet that no other of the workbook has; capitals do not count."""
+    legal = ILLEGAL.sub("_", name).strip("'") or "table"
+    lower, short, number = {other.lower() for other in taken}, legal[:LONGEST_SHEET], 1
+    while short.lower() in lower:
+        number += 1
+        short = f"{legal[: LONGEST_SHEET - len(str(number)) - 1]}_{number}"
+    return short
+
+
+def _typed(rows: Sequence[Sequence[str]]) -> Iterator[Sequence[Any]]:
+    """The rows of a table under its header, the cells of columns of numbers as numbers."""
+    if not rows:
+        return
+    header, *body = rows
+    numeric = [
+        all(not cell or cell in NOT_FINITE or NUMBER.fullmatch(cell) for cell in column)
+        for column in zip(*body, strict=True)
+    ]
+    yield header
+    for row in body:
+        yield [_number(cell) if number else cell for cell, number in zip(row, numeric, strict=True)]
+
+
+def _number(cell: str) -> float | int | str | None:
+    if not cell or cell in NOT_FINITE:
+        return NOT_FINITE.get(cell)
+    return int(cell) if cell.lstrip("+-").isdigit() and len(cell) < 16 else float(cell)
+
+
+def _sheet(book: "Workbook", name: str, rows: Iterable[Sequence[Any]]) -> None:
+    """A sheet whose header is bold and stays in view."""
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Font
+    from openpyxl.utils import get_column_letter
+
+    sheet = book.create_sheet(name)
+    rows = iter(rows)
+    header = [str(cell) for cell in next(rows, ())]
+    sheet.freeze_panes = "A2"
+    for place, words in enumerate(header, 1):
+        width = WIDEST_COLUMN if name == FIRST else min(len(words) + ENTRIES_LEFT_FREE, WIDEST_COLUMN)
+        sheet.column_dimensions[get_column_letter(place)].width = width
+    cells = [WriteOnlyCell(sheet, _text(words)) for words in header]
+    for cell in cells:
+        cell.font = Font(bold=True)
+    sheet.append(cells)
+    for row in rows:
+        sheet.append([_text(cell) if isinstance(cell, str) else cell for cell in row])
+
+
+def _text(cell: str) -> str | None:
+    """The text of a cell, which no spreadsheet takes for a formula."""
+    text = CONTROL.sub(" ", cell)
+    return f"'{text}" if text.startswith("=") else text or None
+
+
+def _dated(book: io.BytesIO, day: datetime) -> bytes:
+    """The workbook with one date in place of the clock, so that equal tables are equal bytes."""
+    copy = io.BytesIO()
+    with zipfile.ZipFile(book) as source, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as target:
+        for entry in source.infolist():
+            content = CHANGED.sub(rb"\g<1>" + day.strftime("%Y-%m-%dT%H:%M:%SZ").encode(), source.read(entry))
+            stamp = zipfile.ZipInfo(entry.filename, (day.year, day.month, day.day, 0, 0, 0))
+            stamp.compress_type = zipfile.ZIP_DEFLATED
+            target.writestr(stamp, content)
+    return copy.getvalue()
