@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from doe.study_file import Study
 
 
-def _noted(record: Mapping[str, Any], blocks: Sequence[Block]) -> list[Block]:
+def with_notes(record: Mapping[str, Any], blocks: Sequence[Block]) -> list[Block]:
     """The blocks behind the notes of their record."""
     return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
 
@@ -27,7 +27,7 @@ class DesignAnswer(Answer):
     def blocks(self) -> list[Block]:
         from doe.report.sections.design import design_blocks
 
-        return _noted(self.record, design_blocks(self.as_dict()))
+        return with_notes(self.record, design_blocks(self.as_dict()))
 
     def rows(self) -> Mapping[str, Rows]:
         runs, evaluation = self.record["runs"], self.record["evaluation"]
@@ -90,7 +90,7 @@ class FitAnswer(Answer):
             for name, fitted in drop_undefined(self.record["responses"]).items()
             for block in fit_blocks(name, fitted, self.factors)
         ]
-        return [Paragraph(self.columns), *_noted(self.record, readable(fits, {}))]
+        return [Paragraph(self.columns), *with_notes(self.record, readable(fits, {}))]
 
     def rows(self) -> Mapping[str, Rows]:
         return fit_rows(self.record["responses"])
@@ -234,7 +234,7 @@ class FrontAnswer(Answer):
         from doe.report.sections.record import drop_undefined, readable
 
         clean = drop_undefined({"asked": self.asked, "front": self.as_dict()})
-        return _noted(self.record, readable(front_blocks(clean), clean))
+        return with_notes(self.record, readable(front_blocks(clean), clean))
 
     def rows(self) -> Mapping[str, Rows]:
         picks = {"baseline": self.record["baseline"], **self.record["picks"]}
