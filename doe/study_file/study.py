@@ -30,6 +30,7 @@ from doe.study_file.sections import (
     Tolerances,
 )
 from doe.study_file.table import COUNT, DATE, LABELS, Column, Sheet, listed, quoted, read_sheet, table_of
+from doe.study_file.workbook import split_path
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
@@ -387,7 +388,8 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
         "factor": [{"name": name, "centre": centre, "step": step} for name, centre, step in scales],
         "response": [{"name": name, "model": model} for name in responses],
     }
-    return Study(path, validated(StudyFile, data, str(path))), tuple(notes)
+    # The file stands for the study where its folder of results is identified.
+    return Study(split_path(path)[0], validated(StudyFile, data, str(path))), tuple(notes)
 
 
 def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -104,11 +104,16 @@ class Column:
         Cells whose text in lower case is in ``unknown`` are NaN, without a fault.
         """
         values = np.array([float(text) if is_number(text) else math.nan for text in self.plain])
-        faults = []
+        faults, doubts = list[str](), Counter[str]()
         for row in limits.broken(values):
-            if self.texts[row].lower() not in unknown:
-                slip = self.doubt(row) or _slip(self.texts[row])
-                faults.append(self.fault(row, slip or limits.fault(values[row])))
+            if self.texts[row].lower() in unknown:
+                continue
+            doubt = self.doubt(row)
+            kind = doubt.partition(" ")[0]
+            doubts[kind] += 1
+            # One such cell shows how all of them are written.
+            if not doubt or doubts[kind] == 1:
+                faults.append(self.fault(row, doubt or _slip(self.texts[row]) or limits.fault(values[row])))
         return values, faults
 
 

@@ -18,6 +18,7 @@ from rbdyn.base.faults import InputError, not_utf_8, read_bytes, refuse
 from rbdyn.base.words import counted
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 # Excel's own line on the separator of a file.
 HINT = re.compile(r"\s*sep=([,;\t])\r?\n", re.IGNORECASE)
 # Characters of no text: a file with them is something else.
@@ -69,11 +70,12 @@ def _table_file(
     if not header:
         raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
     marks = marks_of((field.strip() for row in body for field in row), default)
-    _refuse_units(path, body)
+    _refuse_words(path, header, body)
     # Commas between fields are usual with decimal points; other files say which mark their numbers have.
     points = ["decimal points"] if default is None and marks.decimal == POINT else []
     signs = [*([separator] if separator else []), *points, *marks.words]
-    words = [*([f"with {' and '.join(signs)}"] if signs else []), *([origin] if origin else [])]
+    together = " and ".join([*([", ".join(signs[:-1])] if signs[1:] else []), *signs[-1:]])
+    words = [*([f"with {together}"] if signs else []), *([origin] if origin else [])]
     return TableFile(header, body, marks, f"read {' '.join(words)}" if words else "", numbers[1:])
 
 
@@ -84,6 +86,8 @@ def _decoded(path: Path, data: bytes) -> tuple[str, str]:
             return data.decode("utf-16"), "in UTF-16"
         except UnicodeDecodeError:
             raise InputError([f"{path}: cannot be read as UTF-16; save the file as UTF-8"]) from None
+    if data[:1000].count(0) > len(data[:1000]) // 4:
+        raise InputError([f"{path}: is no text in UTF-8; save the file as UTF-8"])
     try:
         return data.decode("utf-8-sig"), ""
     except UnicodeDecodeError as error:
@@ -166,7 +170,7 @@ def _tidy(path: Path, rows: list[list[str]]) -> list[list[str]]:
     rows = [row[: max(width, length)] for row, length in zip(rows, lengths, strict=True)]
     refuse(
         f"{path}: row {number} has {counted(len(row), 'field')} and the header {width}; give it a field for each column, "
-        "in their order"
+        f"in their order{SEMICOLONS if len(row) > width else ''}"
         for number, row in enumerate(rows)
         if len(row) != width
     )
@@ -181,15 +185,20 @@ def _filled_length(row: list[str]) -> int:
     return length
 
 
-def _refuse_units(path: Path, body: list[list[str]]) -> None:
-    """Raises InputError for a first row of words over columns of numbers, which are their units."""
+def _refuse_words(path: Path, header: list[str], body: list[list[str]]) -> None:
+    """Raises InputError for a first row of words over columns of numbers: their units, or their names below a title."""
     if len(body) < 2:
         return
-    words = [place for place, field in enumerate(body[0]) if field.strip()]
-    units = [field.strip() for field in body[0] if field.strip()]
-    below = ([row[place].strip() for row in body[1:]] for place in words)
+    places = [place for place, field in enumerate(body[0]) if field.strip()]
+    words = [body[0][place].strip() for place in places]
+    below = ([row[place].strip() for row in body[1:]] for place in places)
     numbers = [any(texts) and all(not text or is_like_number(text) for text in texts) for texts in below]
-    if len(words) > 1 and not any(map(is_like_number, units)) and all(numbers):
+    if len(words) < 2 or any(map(is_like_number, words)) or not all(numbers):
+        return
+    if sum(bool(name.strip()) for name in header) < len(words):
         raise InputError(
-            [f"{path}: row 1 has words where the others have numbers, such as {units[0]!r}; remove that row of units"]
+            [f"{path}: names columns such as {words[0]!r} below another row; remove what is above the names"]
         )
+    raise InputError(
+        [f"{path}: row 1 has words where the others have numbers, such as {words[0]!r}; remove that row of units"]
+    )

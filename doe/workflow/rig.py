@@ -96,7 +96,7 @@ def read_rig(path: Path) -> Rig:
         rows.append(row)
         notes += [note] if note else []
     refuse(faults)
-    gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs}
+    gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
     rig = Rig(path, rows, keys, outputs, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))
     if len(rig.conditions) > MOST_CONDITIONS:
         raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])

@@ -203,6 +203,30 @@ def test_a_row_takes_its_cage_speed_from_a_signal(tmp_path: Path) -> None:
     assert len(rig.conditions) == 3
 
 
+def test_a_rig_of_german_excel_with_gaps_is_read_with_notes_on_both(tmp_path: Path) -> None:
+    """Semicolons and decimal commas in the table and in its signal; a row without one output serves the other."""
+    lines = [f"{0.01 * place:.2f};{9400 + place % 3},5".replace(".", ",") for place in range(60)]
+    _signal(tmp_path, "speed.csv", ["t_s;cage_speed_rpm", *lines])
+    header = f"{HEADER},signal_file,signal_kind".replace(",", ";")
+    rows = [
+        "12000;40,5;1;40;1;;",
+        "18000;;;100;2,5;;",
+        "24000;80;2;180;3;;",
+        "18000;60;1;99;2;speed.csv;cage_speed",
+        ";" * 6,
+    ]
+    _files(tmp_path, header=header, rows=rows)
+    path = tmp_path / "rig.csv"
+    rig = read_rig(path)
+    assert [row.values.get("impact_force_N") for row in rig.rows] == [40.5, None, 80.0, 60.0]
+    assert rig.rows[1].sds == {"power_loss_W": 2.5}
+    assert rig.rows[3].values["cage_speed_rpm"] == pytest.approx(9401.5, abs=0.1)
+    assert rig.notes == (
+        f"{path}: read with semicolons and decimal commas",
+        f"{path}: impact_force_N has no value in row 2; it does without that row, which serves the others",
+    )
+
+
 class _Result:
     """A result of a simulation that never ran."""
 
