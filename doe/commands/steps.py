@@ -27,7 +27,13 @@ def design(
 
         answer, detail = design(path, out), Detail.of(quiet, verbose)
         record = answer.as_dict()
-        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(answer.blocks(), detail))
+        hand_over(
+            lambda: record,
+            as_json,
+            lambda: print_csv(record) if as_csv else show(answer.blocks(), detail),
+            None if as_csv else answer.folder,
+            answer.files,
+        )
 
 
 def fit(
@@ -63,7 +69,8 @@ def fit(
 
         with bars(quiet or as_json, workers) as progress:
             answer = fit(path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
+        detail = Detail.of(quiet, verbose)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
 
 
 Point = Annotated[
@@ -94,7 +101,8 @@ def front(
 
         with bars(quiet or as_json, workers) as progress:
             answer = front(path, data, out, point, workers, scheduler, retry, progress)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
+        detail = Detail.of(quiet, verbose)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
 
 
 def chain(
@@ -111,7 +119,8 @@ def chain(
         from doe.library.steps import chain
 
         answer = chain(path, out)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), Detail.of(quiet, verbose)))
+        detail = Detail.of(quiet, verbose)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
         several = "chains" in answer
         for name, status in answer.refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)

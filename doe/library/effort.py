@@ -1,7 +1,7 @@
 """How the functions of ``doe`` run: arguments checked, threads or a cluster, progress, and the folder that keeps the runs."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +16,11 @@ from rbdyn.result import write_json
 
 if TYPE_CHECKING:
     from doe.clearance import Simulations
+    from doe.library.answer import Answer
+    from rbdyn.base.identity import Identity
 
+# Rows of tables by the name of their CSV file.
+Tables = Mapping[str, Sequence[Mapping[str, Any]]]
 # ``progress(stage, done, total)``: called as the runs of a stage end.
 Follow = Callable[[str, int, int], None] | None
 
@@ -116,9 +120,32 @@ def registered(source: Path, folder: Path | None) -> Iterator[None]:
         yield
 
 
-def saved(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> tuple[str, ...]:
-    """Write the JSON record of the file ``source`` into a folder, if there is one; names of the files."""
+def saved(
+    out: Path | None,
+    source: Path,
+    name: str,
+    answer: "Answer",
+    tables: Callable[[], Tables],
+    identity: "Callable[[], Identity]",
+) -> tuple[str, ...]:
+    """Write the answer of a step on the file ``source`` into a folder, if there is one; names of the files.
+
+    These are its JSON record ``name``, its ``tables`` as CSV, report.html of its blocks and tables.xlsx. In the folder of a
+    finished study the last two begin with the name of the step, so that the study keeps its own.
+    """
     if out is None:
         return ()
-    write_json(output_folder(out, "doe", source) / name, record)
-    return (name,)
+    from rbdyn.base.page import write_with_report
+    from rbdyn.base.records import save_table
+
+    folder = output_folder(out, "doe", source)
+
+    def write() -> list[str]:
+        write_json(folder / name, answer.as_dict())
+        rows_by_file = tables()
+        for table, rows in rows_by_file.items():
+            save_table(rows, folder / table)
+        return [name, *rows_by_file]
+
+    prefix = f"{Path(name).stem}_" if (folder / "summary.json").exists() else ""
+    return tuple(write_with_report(folder, identity(), answer.blocks, write, prefix))

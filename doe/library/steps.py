@@ -1,7 +1,8 @@
 """One step of a study alone: ``design``, ``fit``, ``front`` and ``chain``, and their answers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,7 +56,8 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
 
     Raises InputError with all faults of the study.
     """
-    from doe.report.sections.design import design_record
+    from doe.report.identity import study_identity
+    from doe.report.sections.design import design_record, design_tables
     from doe.study_file import Study
     from doe.workflow.runs import augment_notes, design_of, evaluation
     from doe.workflow.whole import check_study
@@ -68,7 +70,8 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
     points = design_of(study)
     notes = augment_notes(study)
     record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
-    return DesignAnswer(record, folder, saved(folder, path, "design.json", record))
+    answer, identity = DesignAnswer(record, folder), partial(study_identity, "doe design", study)
+    return replace(answer, files=saved(folder, path, "design.json", answer, partial(design_tables, record), identity))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -149,9 +152,9 @@ def fit(
 
     Raises InputError with all faults of study, table or arguments, RunError where runs fail.
     """
+    from doe.report.identity import study_identity
     from doe.report.sections.fit import fit_record, fit_tables
     from doe.workflow.surfaces import unrivalled, with_rivals
-    from rbdyn.base.records import save_table
 
     table, folder = (
         None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
@@ -163,17 +166,15 @@ def fit(
         surfaces = with_rivals(surfaces)
         remarks = [*reading, *notes, *unrivalled(surfaces)]
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
-        files = saved(folder, study.path, "fit.json", record)
-        if folder is not None:
-            tables = fit_tables(surfaces)
-            for name, rows in tables.items():
-                save_table(rows, folder / name)
-            files = (*files, *tables)
-    columns = (
-        f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends of "
-        "a factor's range"
-    )
-    return FitAnswer(record, folder, files, None, tuple(study.factors), columns if path is None else "")
+        columns = (
+            f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
+            "of a factor's range"
+        )
+        answer = FitAnswer(record, folder, factors=tuple(study.factors), columns=columns if path is None else "")
+        identity = partial(study_identity, "doe fit", study, table)
+        return replace(
+            answer, files=saved(folder, study.path, "fit.json", answer, partial(fit_tables, surfaces), identity)
+        )
 
 
 def _study_or_table(
@@ -280,8 +281,9 @@ def front(
     """
     import numpy as np
 
+    from doe.report.identity import study_identity
     from doe.report.sections.answer import asked_record
-    from doe.report.sections.front import front_record, given_point_record
+    from doe.report.sections.front import front_record, front_tables, given_point_record
     from doe.study_file import Study
     from doe.workflow.front import check_goals, find_front, with_survival
 
@@ -298,8 +300,11 @@ def front(
         record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
-        files = saved(folder, path, "front.json", record)
-    return FrontAnswer(record, folder, files, None, asked_record(study))
+        answer, identity = (
+            FrontAnswer(record, folder, asked=asked_record(study)),
+            partial(study_identity, "doe front", study, table),
+        )
+        return replace(answer, files=saved(folder, path, "front.json", answer, partial(front_tables, record), identity))
 
 
 def _point_text(point: Any) -> str:
@@ -408,7 +413,8 @@ def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
     A chain that misses its limits is listed in ``refused`` of the answer. Raises InputError with the faults of every chain.
     """
     from doe.dimension_chain import is_several, read_chains, solve
-    from doe.report.sections.chain import chains_record
+    from doe.report.sections.chain import chain_tables, chains_record
+    from rbdyn.base.identity import identity_of
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
     several = is_several(path)
@@ -420,6 +426,7 @@ def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
             faults += error.faults
     refuse(faults)
     record = chains_record(results) if several else next(iter(results.values())).as_dict()
-    files = saved(folder, path, "chain.json", record)
     refused = {name: result.status for name, result in results.items() if result.refused}
-    return ChainAnswer(record, folder, files, None, {name: r.as_dict() for name, r in results.items()}, refused)
+    answer = ChainAnswer(record, folder, chains={name: r.as_dict() for name, r in results.items()}, refused=refused)
+    identity = partial(identity_of, "doe chain", {}, [path])
+    return replace(answer, files=saved(folder, path, "chain.json", answer, partial(chain_tables, results), identity))

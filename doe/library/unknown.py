@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,10 +91,12 @@ def uncertainty(
 
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
+    from doe.report.identity import scene_identity
     from doe.report.sections.unknown import uncertainty_record, write_uncertainty
     from doe.running.runner import ANSWER
     from doe.workflow.status import content_digest, runs_digest
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
+    from rbdyn.base.page import write_with_report
     from rbdyn.dynamics.target import valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
@@ -109,9 +112,11 @@ def uncertainty(
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_uncertainty(path, assignments, simulations, points, accuracy)
             agenda.enter(ANSWER)
-            files = write_uncertainty(result, folder)
+            answer = UncertaintyAnswer(uncertainty_record(result), folder, (), agenda.agenda, uncertainty=result)
+            identity = scene_identity("doe uncertainty", path, assignments)
+            files = write_with_report(folder, identity, answer.blocks, partial(write_uncertainty, result, folder))
             agenda.finish(files)
-    return UncertaintyAnswer(uncertainty_record(result), folder, tuple(files), agenda.agenda, uncertainty=result)
+    return replace(answer, files=tuple(files))
 
 
 FEWEST_SETS, MOST_SETS = 16, 512
@@ -201,10 +206,12 @@ def calibrate(
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
+    from doe.report.identity import scene_identity
     from doe.report.sections.calibration import cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
     from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
     from doe.workflow.status import content_digest
+    from rbdyn.base.page import write_with_report
 
     path, table = path_given(path, "path"), path_given(data, "data")
     folder = Path(f"{path.stem}_calibration") if out is None else path_given(out, "out")
@@ -227,6 +234,8 @@ def calibrate(
                 turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
-            write(result, record, folder)
+            answer = CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)
+            scene = scene_identity("doe calibrate", path, assignments, table)
+            write_with_report(folder, scene, answer.blocks, partial(write, result, record, folder))
             agenda.finish(files_of(record))
     return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)

@@ -78,10 +78,16 @@ def unillustrated(patch: Any) -> None:
     from doe import clearance
     from doe.report.still import Still
 
+    def save(figure: Figure, place: Any, **options: Any) -> None:
+        if isinstance(place, str | Path):
+            Path(place).write_bytes(b"")
+        else:
+            place.write("<svg/>")
+
     patch(clearance, "histories", lambda *rest: {})
     patch(clearance, "draw_motion", lambda *rest: [])
     patch(Figure, "tight_layout", lambda figure, **options: None)
-    patch(Figure, "savefig", lambda figure, path, **options: Path(path).write_bytes(b""))
+    patch(Figure, "savefig", save)
     patch(Still, "svg", lambda still: "<svg/>")
 
 
