@@ -28,5 +28,9 @@ def kinds() -> "dict[str, type[BaseModel]]":
     """These, the tables of a scene that ``doe`` reads, and the tables of measurements, whose keys are columns."""
     from doe.workflow.rig_columns import RigTable, SceneTables, SignalFile
 
-    measured = {"measurements on a rig, column": RigTable, "signal file, column": SignalFile}
-    return {**files(), "unknown inputs and calibration of a scene": SceneTables, **measured}
+    measured: dict[str, type[BaseModel]] = {
+        "measurements on a rig, column": RigTable,
+        "signal file, column": SignalFile,
+    }
+    scene: dict[str, type[BaseModel]] = {"unknown inputs and calibration of a scene": SceneTables}
+    return {**files(), **scene, **measured}
