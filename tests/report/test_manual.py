@@ -248,7 +248,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
     ):
         folder = tmp_path / "_".join((name, *(str(word).strip("-") for word in call[1:2])))
         assert command(name, *call, "--out", folder).returncode == 0
-        tables = [path for path in folder.glob("*.csv") if path.name != "runout.csv"]
+        tables = list(folder.glob("*.csv"))
         assert tables or "--race-limits" in call
         for path in tables:
             assert undescribed(floors, path, figure=figures) == [], path.name
