@@ -295,16 +295,17 @@ class Allocation:
 
         while self.chain.allocate.spend_slack:
             open_ones = [name for name, step in steps.items() if 0 <= step < len(ladders[name]) - 1]
-            wider = [name for name in open_ones if self._fits_rounded(*choice({**steps, name: steps[name] + 1}))]
+            wider = [name for name in open_ones if self._fits_exactly(*choice({**steps, name: steps[name] + 1}))]
             if not wider:
                 break
             best = max(wider, key=lambda name: self._worth(free[name], ladders[name], steps[name]))
             steps[best] += 1
         return choice(steps)
 
-    def _fits_rounded(self, tolerances: Tolerances, grades: Grades) -> bool:
+    def _fits_exactly(self, tolerances: Tolerances, grades: Grades) -> bool:
+        """Whether tolerances fit before the drawing rounds them, so that grades do not depend on its resolution."""
         try:
-            return any(self.fits(parts) for parts in self.rounded_parts(tolerances, grades))
+            return self.fits(self.parts(tolerances, grades))
         except MethodError:
             return False
 

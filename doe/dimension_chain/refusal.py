@@ -65,7 +65,7 @@ def stated_reason(search: Allocation, parts: Sequence[Part], share: float, neare
     return (
         f"the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm, outside {limits.lower_mm:.4f} to "
         f"{limits.upper_mm:.4f} mm; {kind} tolerance {high - low:.4f} of {width:.4f} mm, yield {reached}; "
-        + (f"the nearest that fits is {sizes}" if sizes else "no tolerances of the other links fit")
+        + (f"the nearest that fits is {sizes}" if sizes else "no sizes that are free to change fit")
     )
 
 
