@@ -100,7 +100,7 @@ def calibrate(
                 agenda.enter(ANSWER)
                 record = record_of(result, identity)
                 scene = scene_identity("doe calibrate", path, overrides or (), data)
-                write_with_report(folder, scene, partial(blocks, record), partial(write, result, record, folder))
+                write(result, record, folder, scene)
                 agenda.finish(files_of(record))
                 noted = agenda
         finished_record = record
