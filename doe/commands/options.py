@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
     from doe.running.runner import AgendaKeeper, Progress
     from doe.study_file import Study
+    from rbdyn.base.blocks import Block
+    from rbdyn.base.identity import Identity
 
 
+# Rows of tables by the name of their CSV file.
+Tables = Mapping[str, Sequence[Mapping[str, Any]]]
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
 Data = Annotated[Path | None, valued("TABLE.csv", "Table of runs made elsewhere.", "runs are simulated")]
 Scheduler = Annotated[
@@ -47,12 +51,36 @@ Verbose = Annotated[
 ]
 
 
-def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> None:
-    """Write the JSON record of the file ``source`` into the folder of ``--out``, if there is one."""
-    if out is not None:
-        from rbdyn.result import write_json
+def save(
+    out: Path | None,
+    source: Path,
+    name: str,
+    record: dict[str, Any],
+    tables: Callable[[], Tables],
+    identity: "Callable[[], Identity]",
+    blocks: "Callable[[], Sequence[Block]]",
+) -> list[str]:
+    """Write a step of the file ``source`` into the folder of ``--out``, if there is one; returns the names of the files.
 
-        write_json(output_folder(out, "doe", source) / name, record)
+    These are its JSON record ``name``, its ``tables`` as CSV, report.html of its ``blocks`` and tables.xlsx. In the folder of a
+    finished study the last two begin with the name of the step, so that the study keeps its own.
+    """
+    if out is None:
+        return []
+    from rbdyn.base.page import write_with_report
+    from rbdyn.base.records import save_table
+    from rbdyn.result import write_json
+
+    folder = output_folder(out, "doe", source)
+
+    def write() -> list[str]:
+        write_json(folder / name, record)
+        for table, rows in tables().items():
+            save_table(rows, folder / table)
+        return [name, *tables()]
+
+    prefix = f"{Path(name).stem}_" if (folder / "summary.json").exists() else ""
+    return write_with_report(folder, identity(), blocks, write, prefix)
 
 
 @contextmanager

@@ -1,8 +1,9 @@
 """One step of a study alone: ``doe design``, ``doe fit``, ``doe front`` and ``doe chain``."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +17,7 @@ from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
     from doe.study_file import Study
+    from rbdyn.base.identity import Identity
 
 
 def design(
@@ -28,7 +30,8 @@ def design(
 ) -> None:
     """Print the design: every run, and how well the runs identify the terms of the models."""
     with guarded(as_json):
-        from doe.report.sections.design import design_blocks, design_record, print_csv
+        from doe.report.identity import study_identity
+        from doe.report.sections.design import design_blocks, design_record, design_tables, print_csv
         from doe.study_file import Study
         from doe.workflow.runs import design_of, evaluation
         from doe.workflow.whole import check_study
@@ -39,9 +42,23 @@ def design(
             check_study(loaded)
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
-        save(out, path, "design.json", record)
+        tables, answer = partial(design_tables, record), partial(design_blocks, record)
+        files = save(out, path, "design.json", record, tables, partial(study_identity, "doe design", loaded), answer)
         detail = Detail.of(quiet, verbose)
-        hand_over(lambda: record, as_json, lambda: print_csv(record) if as_csv else show(design_blocks(record), detail))
+        hand_over(
+            lambda: record,
+            as_json,
+            lambda: print_csv(record) if as_csv else show(answer(), detail),
+            None if as_csv else out,
+            files,
+        )
+
+
+def _show(identity: "Callable[[], Identity]", answer: Callable[[], Sequence[Block]], detail: Detail) -> None:
+    """Print the bearing, or else the input files, with point and date, then the answer."""
+    from rbdyn.base.identity import identity_line
+
+    show([identity_line(identity(), Detail.USUAL), *answer()], detail)
 
 
 def fit(
@@ -75,6 +92,7 @@ def fit(
     with guarded(as_json), ExitStack() as contexts:
         loaded, notes = _study_or_table(path, data, {"factor": factor, "response": response, "model": model})
         contexts.enter_context(keeping_runs(out, loaded.path))
+        from doe.report.identity import study_identity
         from doe.report.sections.fit import fit_record, fit_tables
         from doe.workflow.surfaces import unrivalled, with_rivals
 
@@ -82,15 +100,12 @@ def fit(
         surfaces = with_rivals(surfaces)
         remarks = [*notes, *unrivalled(surfaces)]
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
-        save(out, loaded.path, "fit.json", record)
-        if out is not None:
-            from rbdyn.base.records import save_table
-
-            for name, rows in fit_tables(surfaces).items():
-                save_table(rows, out / name)
-        hand_over(
-            lambda: record, as_json, lambda: show(_fit_answer(record, loaded, data, path), Detail.of(quiet, verbose))
+        answer, identity = (
+            partial(_fit_answer, record, loaded, data, path),
+            partial(study_identity, "doe fit", loaded, data),
         )
+        files = save(out, loaded.path, "fit.json", record, partial(fit_tables, surfaces), identity, answer)
+        hand_over(lambda: record, as_json, lambda: _show(identity, answer, Detail.of(quiet, verbose)), out, files)
 
 
 def _fit_answer(record: dict[str, Any], study: "Study", data: Path | None, path: Path | None) -> list[Block]:
@@ -157,8 +172,9 @@ def front(
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out, path):
+        from doe.report.identity import study_identity
         from doe.report.sections.answer import asked_record
-        from doe.report.sections.front import front_record, given_point_record
+        from doe.report.sections.front import front_record, front_tables, given_point_record
         from doe.study_file import Study
         from doe.workflow.front import check_goals, find_front, with_survival
 
@@ -173,9 +189,10 @@ def front(
             import numpy as np
 
             record["point"] = given_point_record(loaded, surfaces, pareto, np.array(values))
-        save(out, path, "front.json", record)
-        summary = {"asked": asked_record(loaded), "front": record}
-        hand_over(lambda: record, as_json, lambda: show(_front_answer(summary), Detail.of(quiet, verbose)))
+        answer = partial(_front_answer, {"asked": asked_record(loaded), "front": record})
+        identity = partial(study_identity, "doe front", loaded, data)
+        files = save(out, path, "front.json", record, partial(front_tables, record), identity, answer)
+        hand_over(lambda: record, as_json, lambda: _show(identity, answer, Detail.of(quiet, verbose)), out, files)
 
 
 def _front_answer(summary: dict[str, Any]) -> list[Block]:
@@ -228,7 +245,8 @@ def chain(
     """Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits is refused."""
     with guarded(as_json):
         from doe.dimension_chain import is_several, read_chains, solve
-        from doe.report.sections.chain import chain_blocks, chains_record
+        from doe.report.sections.chain import chain_blocks, chain_tables, chains_record
+        from rbdyn.base.identity import identity_of
 
         several = is_several(path)
         results, faults = {}, []
@@ -239,13 +257,13 @@ def chain(
                 faults += error.faults
         refuse(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
-        save(out, path, "chain.json", record)
 
-        def answer() -> None:
-            for name, result in results.items():
-                show(chain_blocks(name, result.as_dict()), Detail.of(quiet, verbose))
+        def answer() -> list[Block]:
+            return [block for name, result in results.items() for block in chain_blocks(name, result.as_dict())]
 
-        hand_over(lambda: record, as_json, answer)
+        identity = partial(identity_of, "doe chain", {}, [path])
+        files = save(out, path, "chain.json", record, partial(chain_tables, results), identity, answer)
+        hand_over(lambda: record, as_json, lambda: _show(identity, answer, Detail.of(quiet, verbose)), out, files)
         refused = {name: result.status for name, result in results.items() if result.refused}
         for name, status in refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)

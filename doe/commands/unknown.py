@@ -1,5 +1,6 @@
 """Unknown inputs of a scene: ``doe uncertainty`` and ``doe calibrate``."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,8 @@ from doe.commands.options import Quiet, Retry, Scheduler, keeping_runs, noted_ag
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import Json, Set, Workers, folder_option, guarded, hand_over, output_folder, valued
 from rbdyn.base.faults import no_power_of_two, refuse
+from rbdyn.base.identity import identity_line
+from rbdyn.base.page import write_with_report
 from rbdyn.base.terminal import show
 
 
@@ -33,6 +36,7 @@ def uncertainty(
     """List the unknown inputs of a scene, the range of every output over them, and the share of each input."""
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
+        from doe.report.identity import scene_identity
         from doe.report.sections.unknown import uncertainty_blocks, uncertainty_record, write_uncertainty
         from doe.running.runner import ANSWER
         from doe.workflow.status import content_digest, runs_digest
@@ -48,12 +52,14 @@ def uncertainty(
             with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
                 result = find_uncertainty(path, overrides or (), simulations, points, accuracy)
             agenda.enter(ANSWER)
-            files = write_uncertainty(result, folder)
+            answer = partial(uncertainty_blocks, result)
+            identity = scene_identity("doe uncertainty", path, overrides or ())
+            files = write_with_report(folder, identity, answer, partial(write_uncertainty, result, folder))
             agenda.finish(files)
         hand_over(
             lambda: uncertainty_record(result),
             as_json,
-            lambda: show(uncertainty_blocks(result), Detail.of(quiet)),
+            lambda: show([identity_line(identity), *answer()], Detail.of(quiet)),
             folder,
             files,
         )
@@ -82,6 +88,7 @@ def calibrate(
     """Identify the unknown inputs of a scene from measurements on a rig, and state whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
+        from doe.report.identity import scene_identity
         from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
         from doe.running.runner import ANSWER
         from doe.workflow.calibration import calibration_stages, find_calibration, question_of, read_question
@@ -89,6 +96,7 @@ def calibrate(
 
         question = read_question(path, data, free or (), overrides or ())
         identity = question_of(question)
+        scene = scene_identity("doe calibrate", path, overrides or (), data)
         output_folder(folder, "doe", path)
         record, noted = None if retry else stored(folder, identity), None
         if record is None:
@@ -99,14 +107,14 @@ def calibrate(
                     result = find_calibration(question, simulations)
                 agenda.enter(ANSWER)
                 record = record_of(result, identity)
-                write(result, record, folder)
+                write_with_report(folder, scene, partial(blocks, record), partial(write, result, record, folder))
                 agenda.finish(files_of(record))
                 noted = agenda
         finished_record = record
         hand_over(
             lambda: finished_record,
             as_json,
-            lambda: show(blocks(finished_record), Detail.of(quiet)),
+            lambda: show([identity_line(scene), *blocks(finished_record)], Detail.of(quiet)),
             folder,
             files_of(finished_record),
         )

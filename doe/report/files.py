@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from doe import clearance
-from doe.dimension_chain.solution import ALLOCATED
+from doe.report.identity import study_identity
 from doe.report.page import html_report, markdown_report, notes, reference
 from doe.report.sections.answer import (
     asked_record,
@@ -15,11 +15,12 @@ from doe.report.sections.answer import (
     gains_record,
     judged_limits_record,
 )
-from doe.report.sections.chain import chains
+from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
-from doe.report.sections.front import front_record, predicted_record
+from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
+from doe.report.sections.robust import robust_tables
 from doe.report.sections.search import (
     adaptive_record,
     archive_table,
@@ -38,9 +39,11 @@ from doe.workflow.runs import RUNS_TABLE, evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail
-from rbdyn.base.identity import identity_of
+from rbdyn.base.identity import Identity
 from rbdyn.base.records import finite, save_table
 from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.workbook import NAME as WORKBOOK
+from rbdyn.base.workbook import write_workbook
 from rbdyn.result import versions, write_json
 
 FORMAT = "doe.study/1"
@@ -60,16 +63,14 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     tables = {
         RUNS_TABLE: _runs_table(record),
         **fit_tables(outcome.surfaces),
-        "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]]
+        "front.csv": front_tables(record["front"])["front.csv"]
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
         "confirmation.csv": _confirmation_table(outcome, record),
-        "part_dimensions.csv": [
-            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
-            for name, chain in outcome.chains.items()
-            for part in chain.allocation
-        ],
+        "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
+    if outcome.robust is not None:
+        tables |= robust_tables(record["robust"])
     if outcome.reference_values is not None:
         tables["beside_reference.csv"] = _reference_table(outcome)
     for name, rows in tables.items():
@@ -95,7 +96,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    record["files"] = [*texts, "summary.json", *tables, *pictures]
+    write_workbook(folder / WORKBOOK, [folder / name for name in tables], Identity.from_dict(record["identity"]))
+    record["files"] = [*texts, "summary.json", *tables, WORKBOOK, *pictures]
     record["answer_sha256"] = digest_of((folder / "answer.txt").read_bytes())
     sign(record)
     write_json(folder / "summary.json", record)
@@ -126,17 +128,15 @@ def blocks(record: dict[str, Any]) -> list[Block]:
 def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
-    settings = settings_record(study)
-    files = [study.path, study.path_of(study.scene.file)]
     record: dict[str, Any] = {
         "format": FORMAT,
-        "identity": identity_of("doe study", settings["scene"], files).as_dict(),
+        "identity": study_identity("doe study", study).as_dict(),
         "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
         "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
-        "asked": settings,
+        "asked": settings_record(study),
         "design": study_design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),

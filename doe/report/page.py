@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import PurePath
 from typing import Any
 
-from doe.report.sections import answer, bearing, chain, design, fit, front
+from doe.report.sections import answer, bearing, chain, design, fit, front, robust
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import bounds, complete, fronts, picks
@@ -283,6 +283,7 @@ CHAPTERS = (
     fit.diagnostics,
     front.front,
     answer.confirmation,
+    robust.unknown,
     chain.chains,
     bearing.power,
     bearing.motion,

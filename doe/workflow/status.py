@@ -86,13 +86,16 @@ CODE = ("rbdyn.dynamics.simulate", "doe.workflow.whole", "doe.report.files")
 
 def inputs_digest(study: Study, adaptive: bool = False, robust: bool = False) -> str:
     """Digest of all that the files of a study depend on: the study, the files it names, the options and the code."""
-    file_names = [study.scene.file, *(chain.file for chain in study.file.chain)]
-    file_names += [] if study.file.reference is None else [study.file.reference.file]
-    file_names += [study.file.design.augment, *_samples(study)]
     options = json.dumps([adaptive, robust, versions()], sort_keys=True)
     texts = study.path.name, study.file.model_dump_json(), options, source_digest(*CODE)
-    files = (_content(study.path_of(name)) for name in file_names if name is not None)
-    return digest_of(b"".join([*(text.encode() for text in texts), *files]))
+    return digest_of(b"".join([*(text.encode() for text in texts), *map(_content, named_files(study))]))
+
+
+def named_files(study: Study) -> list[Path]:
+    """Files that the study names: scene, chains, published table, runs to augment, samples of unknown inputs."""
+    names = [study.scene.file, *(chain.file for chain in study.file.chain)]
+    names += [] if study.file.reference is None else [study.file.reference.file]
+    return [study.path_of(name) for name in (*names, study.file.design.augment, *_samples(study)) if name is not None]
 
 
 def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:

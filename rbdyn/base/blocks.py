@@ -61,7 +61,8 @@ class Bullets:
 class Table:
     """A table whose first column names the row; a ``folded`` one opens on demand, a ``sortable`` one sorts by any column.
 
-    ``text_columns``: further columns that hold text rather than numbers.
+    ``text_columns``: further columns that hold text rather than numbers. ``file``: table in the same folder with all rows, which
+    a text names in place of a long table.
     """
 
     caption: str
@@ -72,6 +73,7 @@ class Table:
     text_columns: Sequence[int] = ()
     sortable: bool = False
     detail: Detail = Detail.LEAST
+    file: str = ""
 
     def without_empty_columns(self) -> Self:
         """The same table without its empty columns."""

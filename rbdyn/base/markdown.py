@@ -2,9 +2,12 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from rbdyn.base.blocks import WARNING, Block, Bullets, Heading, Note, Paragraph, Section, Table, Tiles, says
 
+# Rows of a table that a text has whole, and the page that has all of a longer one.
+LONG, WHOLE = 12, "report.html"
 # Characters to escape: marks of Markdown anywhere, underscores at the edge of a word, links.
 SPECIAL = re.compile(r"[\\`*|]|(?<![^\W_])_|_(?![^\W_])|(?<=\])[(\[:]|^(?:[#>+-]|\d+\.)(?=\s)")
 HTML = {"&": "&amp;", "<": "&lt;"}
@@ -53,8 +56,16 @@ def _render(block: Block) -> str:
 
 
 def _table(table: Table) -> str:
+    """A table; of a long one the first rows and where all are, of a long folded one only the latter."""
     words = {0, *table.text_columns}
     lines = [f"**{plain(table.caption)}**", ""] if table.caption else []
+    count = len(table.rows)
+    if count > LONG:
+        place = plain(table.file or WHOLE)
+        if table.folded:
+            return "\n".join([*lines, f"{count} rows, in {place}."])
+        rest = f"The first {LONG} of {count} rows; all are in {place}."
+        table = replace(table, rows=table.rows[:LONG], note=". ".join(filter(None, (table.note.rstrip("."), rest))))
     lines.append(_row(table.header))
     lines.append("|" + "|".join(" :-- " if place in words else " --: " for place in range(len(table.header))) + "|")
     lines += [_row(row) for row in table.rows]

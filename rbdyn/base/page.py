@@ -11,28 +11,36 @@ from importlib.resources import files
 from pathlib import Path
 
 from rbdyn.base import html
-from rbdyn.base.blocks import Block, Figures, Section
+from rbdyn.base.blocks import Block, Figures, Section, Table
 from rbdyn.base.identity import Identity, identity_table
 from rbdyn.base.vector import vector_copies
 from rbdyn.base.words import filled_page
 from rbdyn.base.workbook import NAME, write_workbook
 
 REPORT = "report.html"
+# Rows from which a table is folded.
+LONG = 40
 
 
 def write_with_report(
-    folder: Path, identity: Identity, blocks: Callable[[], Sequence[Block]], write: Callable[[], Sequence[str]]
+    folder: Path,
+    identity: Identity,
+    blocks: Callable[[], Sequence[Block]],
+    write: Callable[[], Sequence[str]],
+    prefix: str = "",
 ) -> list[str]:
     """Let ``write`` write the files of a command, then report.html with its pictures and tables.xlsx of its tables.
 
     blocks : makes the blocks of the terminal
-    write : writes the files and returns their names, which are returned with the two further ones. Raises OSError.
+    write : writes the files and returns their names, which are returned with the two further ones
+    prefix : before these two names, where the folder has others that must stay. Raises OSError.
     """
     with vector_copies() as pictures:
         names = list(write())
-    (folder / REPORT).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
-    write_workbook(folder, [name for name in names if name.endswith(".csv")], identity)
-    return [*names, REPORT, NAME]
+    report, workbook = f"{prefix}{REPORT}", f"{prefix}{NAME}"
+    (folder / report).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
+    write_workbook(folder / workbook, [folder / name for name in names if name.endswith(".csv")], identity)
+    return [*names, report, workbook]
 
 
 def page(
@@ -63,10 +71,18 @@ def page(
 
 
 def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
-    """Page of a result: its identity, its blocks at every detail, its pictures (SVG by name)."""
+    """Page of a result: its identity, its blocks at every detail with long tables folded, its pictures (SVG by name)."""
+    blocks = [_folded(block) for block in blocks]
     drawn = [Figures([picture], name) for name, picture in pictures.items()]
     parts = [identity_section(identity), Section("result", "Result", blocks), Section("pictures", "Pictures", drawn)]
     return page(identity.title, identity.title, [part for part in parts if part.blocks])
+
+
+def _folded(block: Block) -> Block:
+    """A long table folded below its caption; any other block as it is."""
+    if isinstance(block, Table) and block.caption and len(block.rows) > LONG:
+        return replace(block, folded=True)
+    return block
 
 
 def identity_section(identity: Identity) -> Section:

@@ -32,14 +32,14 @@ WIDEST_COLUMN, ENTRIES_LEFT_FREE = 40, 2
 CHANGED = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*")
 
 
-def write_workbook(folder: Path, names: Iterable[str], identity: Identity) -> None:
-    """Write tables.xlsx of the CSV files of a folder; columns of numbers are numbers. Raises OSError."""
+def write_workbook(path: Path, files: Iterable[Path], identity: Identity) -> None:
+    """Write the workbook of CSV files; columns of numbers are numbers. Raises OSError."""
     from openpyxl import Workbook
 
     day = datetime.fromisoformat(identity.date)
     book = Workbook(write_only=True)
     book.properties.title, book.properties.creator, book.properties.created = identity.title, "rbdyn", day
-    tables = {name: _rows(folder / name) for name in names}
+    tables = {file.name: _rows(file) for file in files}
     long = {name: f"{len(rows) - 1} rows, in this file only" for name, rows in tables.items() if _is_long(rows)}
     _sheet(book, FIRST, [("property", "value"), *identity_table(identity).rows, *long.items()])
     sheets = [FIRST]
@@ -48,7 +48,7 @@ def write_workbook(folder: Path, names: Iterable[str], identity: Identity) -> No
         _sheet(book, sheets[-1], _typed(tables[name]))
     written = io.BytesIO()
     book.save(written)
-    (folder / NAME).write_bytes(_dated(written, day))
+    path.write_bytes(_dated(written, day))
 
 
 def _rows(path: Path) -> list[list[str]]:

@@ -69,6 +69,8 @@ def test_command_line_writes_results_and_pictures(command, tmp_path):
     assert written == {
         "result.json",
         "balls.csv",
+        "report.html",
+        "tables.xlsx",
         "loads.png",
         "angles.png",
         "section.png",
@@ -120,7 +122,8 @@ def test_command_line_studies_write_tables_and_pictures(tmp_path):
     )
     assert done.exit_code == 0, done.stderr
     pictures = {"angles.png", "pressure_and_life.png", "stiffness.png", "azimuth.png"}
-    assert {path.name for path in tmp_path.iterdir()} == {"preload.json", "preload.csv", "made_by.json"} | pictures
+    tables = {"preload.json", "preload.csv", "report.html", "tables.xlsx", "made_by.json"}
+    assert {path.name for path in tmp_path.iterdir()} == tables | pictures
     record, table = json.loads((tmp_path / "preload.json").read_text()), pd.read_csv(tmp_path / "preload.csv")
     assert [point["value"] for point in record["points"]] == table["preload_N"].tolist() == [0.0, 100.0, 200.0]
     assert [point["outer_stress_MPa"] for point in record["points"]] == pytest.approx(

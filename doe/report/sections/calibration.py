@@ -15,14 +15,17 @@ from doe.workflow.calibration import Calibration
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.page import REPORT
+from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
+from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
-CORNER, COMPARED = "corner.png", "measured.png"
+CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
 ENDS = (0.05, 0.5, 0.95)
 TAUS = (0.5, 0.05, 0.95)
 OFFSET = "A constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs."
@@ -236,8 +239,9 @@ def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
     return ranges[0], ranges[1], shown(row["median"])
 
 
-def write(calibration: Calibration, record: dict[str, Any], folder: Path) -> None:
-    """calibration.json, the posterior sample with its verdict, and the pictures."""
+def write(calibration: Calibration, record: dict[str, Any], folder: Path) -> list[str]:
+    """calibration.json, measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
+    save_table(map(_measured_row, record["cells"]), folder / MEASURED)
     draw_compared(record, folder / COMPARED)
     if calibration.match.sampled is not None:
         write_sample(calibration.sample, folder / SAMPLE)
@@ -248,6 +252,19 @@ def write(calibration: Calibration, record: dict[str, Any], folder: Path) -> Non
     # Last, as it marks the folder as complete.
     sign(record)
     write_json(folder / RECORD, record)
+    return own_files(record)
+
+
+def _measured_row(cell: Mapping[str, Any]) -> dict[str, Any]:
+    """A measured value with its predictions before and after the calibration, as a row of a table."""
+    alone = {key: value for key, value in cell.items() if key not in ("before", "after")}
+    ends = ("5_percent", "median", "95_percent")
+    predictions = {
+        f"{when}_{end}": value
+        for when in ("before", "after")
+        for end, value in zip(ends, cell[when] or (), strict=False)
+    }
+    return alone | predictions
 
 
 def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -256,9 +273,14 @@ def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(row.values() for row in rows)))
 
 
+def own_files(record: dict[str, Any]) -> list[str]:
+    """Names of the files of a calibration, without the page and the workbook of these."""
+    return [RECORD, MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
+
+
 def files_of(record: dict[str, Any]) -> list[str]:
     """Names of the files of a calibration."""
-    return [RECORD, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
+    return [*own_files(record), REPORT, WORKBOOK]
 
 
 def stored(folder: Path, made_of: str) -> dict[str, Any] | None:
@@ -295,7 +317,8 @@ def draw_corner(calibration: Calibration, record: dict[str, Any], path: Path) ->
             axis.hist(columns[across], bins=_along(key, *ranges[across], 21), color=BLUE, alpha=0.6)
             axis.set_yticks([])
         else:
-            axis.plot(columns[across], columns[down], ".", color=BLUE, markersize=1.5, alpha=0.35)
+            style = {"markersize": 1.5, "alpha": 0.35, "rasterized": True}
+            axis.plot(columns[across], columns[down], ".", color=BLUE, **style)
             ticks = _along(other, *ranges[down], 3)
             axis.set(yscale=_scale(other), ylim=ranges[down])
             axis.set_yticks(ticks, [f"{tick:.2g}" for tick in ticks])

@@ -5,6 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from doe.dimension_chain import ChainResult
+from doe.dimension_chain.solution import ALLOCATED
 from doe.report.sections.record import Record, allocation, dimension, moved, part, record_table
 from doe.report.still import COLOURS, FONT, Still, name_marks
 from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
@@ -215,6 +216,22 @@ def _contributions(names: Sequence[str], sizes: Sequence[tuple[str, Sequence[flo
     entries = [f"{number}: {name}" for number, name in enumerate(names, 1)]
     axis.legend(bars, entries, loc="upper left", bbox_to_anchor=(0.0, 0.0), borderaxespad=0.4, borderpad=0.0,
                 handlelength=1.1, handleheight=1.1, labelspacing=0.5, fontsize=FONT)  # fmt: skip
+
+
+def chain_tables(results: Mapping[str, ChainResult]) -> dict[str, list[dict[str, Any]]]:
+    """Rows of part_dimensions.csv, the parts of all chains, and of contributions.csv, their shares in the scatter."""
+    return {
+        "part_dimensions.csv": [
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
+            for name, chain in results.items()
+            for part in chain.allocation
+        ],
+        "contributions.csv": [
+            {"chain": name, "part": part, **shares}
+            for name, chain in results.items()
+            for part, shares in chain.contributions.items()
+        ],
+    }
 
 
 def chains_record(results: Mapping[str, ChainResult]) -> dict[str, Any]:

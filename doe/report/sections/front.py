@@ -56,6 +56,11 @@ def front_blocks(summary: Record) -> list[Block]:
     return [every, *(section.blocks if section else ())]
 
 
+def front_tables(record: Record) -> dict[str, list[dict[str, Any]]]:
+    """Rows of front.csv: the points of the front."""
+    return {"front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]]}
+
+
 def fronts(summary: Record) -> list[Front]:
     """The front on the surfaces and those compared with it, each sorted by the first response and thinned."""
     names = [response["name"] for response in responses(summary)]

@@ -16,6 +16,7 @@ from doe.unknown.propagation import CONFIDENCE, Share
 from doe.workflow.robust import Decider, Robust, RobustFront
 from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 from rbdyn.scene.unknown import is_number
@@ -131,7 +132,7 @@ def _share(share: Share | None) -> str:
 
 
 def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> list[str]:
-    """uncertainty.json, input_sets.csv and uncertainty.png; returns their names."""
+    """uncertainty.json, input_sets.csv, ranges.csv, shares.csv and uncertainty.png; returns their names."""
     write_json(folder / "uncertainty.json", uncertainty_record(uncertainty))
     keys = [entry.key for entry in uncertainty.inputs]
     with (folder / "input_sets.csv").open("w", newline="", encoding="utf-8") as file:
@@ -139,8 +140,41 @@ def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> list[str]:
         table.writerow(map(text_of, [*keys, *uncertainty.outputs]))
         for values, outputs in zip(uncertainty.sets.inputs, uncertainty.sets.outputs.tolist(), strict=True):
             table.writerow(map(text_of, [*(values[key] for key in keys), *outputs]))
+    save_table(_range_rows(uncertainty), folder / "ranges.csv")
+    save_table(_share_rows(uncertainty), folder / "shares.csv")
     draw_uncertainty(uncertainty, folder / "uncertainty.png")
-    return ["uncertainty.json", "input_sets.csv", "uncertainty.png"]
+    return ["uncertainty.json", "input_sets.csv", "ranges.csv", "shares.csv", "uncertainty.png"]
+
+
+def _range_rows(uncertainty: Uncertainty) -> list[dict[str, Any]]:
+    """A row an output: its value as the scene says, its range over the inputs, its variance by cause [%]."""
+    return [
+        {
+            "output": name,
+            "value": output.nominal.value,
+            "error": output.nominal.stated_error,
+            "low_5_percent": output.spread.low,
+            "median": output.spread.median,
+            "high_95_percent": output.spread.high,
+            **{f"{cause}_percent": 100.0 * share for cause, share in output.spread.variance.items()},
+        }
+        for name, output in uncertainty.outputs.items()
+    ]
+
+
+def _share_rows(uncertainty: Uncertainty) -> list[dict[str, Any]]:
+    """A row an output and input: the input's share of the variance [%] with its interval."""
+    return [
+        {
+            "output": name,
+            "input": key,
+            "share_percent": 100.0 * share.value,
+            "low_percent": 100.0 * share.low,
+            "high_percent": 100.0 * share.high,
+        }
+        for name, output in uncertainty.outputs.items()
+        for key, share in _by_key(output).items()
+    ]
 
 
 def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
