@@ -30,7 +30,7 @@ def design(
         hand_over(
             lambda: record,
             as_json,
-            lambda: print_csv(record) if as_csv else show(answer.blocks(), detail),
+            lambda: print_csv(record) if as_csv else show(answer.screen(), detail),
             None if as_csv else answer.folder,
             answer.files,
         )
@@ -70,7 +70,7 @@ def fit(
         with bars(quiet or as_json, workers) as progress:
             answer = fit(path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress)
         detail = Detail.of(quiet, verbose)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 
 
 Point = Annotated[
@@ -102,7 +102,7 @@ def front(
         with bars(quiet or as_json, workers) as progress:
             answer = front(path, data, out, point, workers, scheduler, retry, progress)
         detail = Detail.of(quiet, verbose)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 
 
 def chain(
@@ -120,7 +120,7 @@ def chain(
 
         answer = chain(path, out)
         detail = Detail.of(quiet, verbose)
-        hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
+        hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
         several = "chains" in answer
         for name, status in answer.refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)

@@ -88,5 +88,5 @@ def calibrate(
 def _hand_over(answer: "Answer", as_json: bool, quiet: bool) -> None:
     """Print the answer with the names of its files, and its time compared with the prediction."""
     detail = Detail.of(quiet)
-    hand_over(answer.as_dict, as_json, lambda: show(answer.blocks(), detail), answer.folder, answer.files)
+    hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
     print_predicted(answer.agenda, as_json)

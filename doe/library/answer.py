@@ -4,7 +4,7 @@ import copy
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from doe.running.runner import Agenda
 from rbdyn.base import html, terminal
 from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, says
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.identity import Identity, identity_line
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -30,16 +31,22 @@ class Answer(Mapping[str, Any]):
     - ``print(answer)``: the text of the command; a notebook shows the same tree of blocks, later chapters folded
     - ``folder`` and ``files``: where the function wrote its files, None and none without ``out``
     - ``agenda``: stages and times of the runs, None where none were planned
+    - ``identity``: bearing, operating point, date and input files; None where the blocks begin with them
     """
 
     record: Mapping[str, Any]
     folder: Path | None = None
     files: tuple[str, ...] = ()
     agenda: Agenda | None = None
+    identity: Identity | None = field(default=None, kw_only=True)
 
     def blocks(self) -> list[Block]:
         """The answer as the command prints it, one tree that every rendering shares."""
         raise NotImplementedError
+
+    def screen(self) -> list[Block]:
+        """The answer on a terminal, which begins with bearing, point and date, or else the input files."""
+        return [*([] if self.identity is None else [identity_line(self.identity, Detail.USUAL)]), *self.blocks()]
 
     def sections(self) -> list[Section]:
         """Chapters of a notebook's page, the first of which is open."""
@@ -91,7 +98,7 @@ class Answer(Mapping[str, Any]):
 
     def __str__(self) -> str:
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-        return terminal.text(self.blocks(), Detail.USUAL, width).rstrip("\n")
+        return terminal.text(self.screen(), Detail.USUAL, width).rstrip("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.brief()}>"

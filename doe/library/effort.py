@@ -17,7 +17,6 @@ from rbdyn.result import write_json
 if TYPE_CHECKING:
     from doe.clearance import Simulations
     from doe.library.answer import Answer
-    from rbdyn.base.identity import Identity
 
 # Rows of tables by the name of their CSV file.
 Tables = Mapping[str, Sequence[Mapping[str, Any]]]
@@ -120,20 +119,13 @@ def registered(source: Path, folder: Path | None) -> Iterator[None]:
         yield
 
 
-def saved(
-    out: Path | None,
-    source: Path,
-    name: str,
-    answer: "Answer",
-    tables: Callable[[], Tables],
-    identity: "Callable[[], Identity]",
-) -> tuple[str, ...]:
+def saved(out: Path | None, source: Path, name: str, answer: "Answer", tables: Callable[[], Tables]) -> tuple[str, ...]:
     """Write the answer of a step on the file ``source`` into a folder, if there is one; names of the files.
 
     These are its JSON record ``name``, its ``tables`` as CSV, report.html of its blocks and tables.xlsx. In the folder of a
     finished study the last two begin with the name of the step, so that the study keeps its own.
     """
-    if out is None:
+    if out is None or answer.identity is None:
         return ()
     from rbdyn.base.page import write_with_report
     from rbdyn.base.records import save_table
@@ -148,4 +140,4 @@ def saved(
         return [name, *rows_by_file]
 
     prefix = f"{Path(name).stem}_" if (folder / "summary.json").exists() else ""
-    return tuple(write_with_report(folder, identity(), answer.blocks, write, prefix))
+    return tuple(write_with_report(folder, answer.identity, answer.blocks, write, prefix))

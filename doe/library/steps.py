@@ -70,8 +70,8 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
     points = design_of(study)
     notes = augment_notes(study)
     record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
-    answer, identity = DesignAnswer(record, folder), partial(study_identity, "doe design", study)
-    return replace(answer, files=saved(folder, path, "design.json", answer, partial(design_tables, record), identity))
+    answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
+    return replace(answer, files=saved(folder, path, "design.json", answer, partial(design_tables, record)))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -170,11 +170,14 @@ def fit(
             f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
             "of a factor's range"
         )
-        answer = FitAnswer(record, folder, factors=tuple(study.factors), columns=columns if path is None else "")
-        identity = partial(study_identity, "doe fit", study, table)
-        return replace(
-            answer, files=saved(folder, study.path, "fit.json", answer, partial(fit_tables, surfaces), identity)
+        answer = FitAnswer(
+            record,
+            folder,
+            factors=tuple(study.factors),
+            columns=columns if path is None else "",
+            identity=study_identity("doe fit", study, table),
         )
+        return replace(answer, files=saved(folder, study.path, "fit.json", answer, partial(fit_tables, surfaces)))
 
 
 def _study_or_table(
@@ -300,11 +303,9 @@ def front(
         record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
-        answer, identity = (
-            FrontAnswer(record, folder, asked=asked_record(study)),
-            partial(study_identity, "doe front", study, table),
-        )
-        return replace(answer, files=saved(folder, path, "front.json", answer, partial(front_tables, record), identity))
+        identity = study_identity("doe front", study, table)
+        answer = FrontAnswer(record, folder, asked=asked_record(study), identity=identity)
+        return replace(answer, files=saved(folder, path, "front.json", answer, partial(front_tables, record)))
 
 
 def _point_text(point: Any) -> str:
@@ -427,6 +428,6 @@ def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
     refuse(faults)
     record = chains_record(results) if several else next(iter(results.values())).as_dict()
     refused = {name: result.status for name, result in results.items() if result.refused}
-    answer = ChainAnswer(record, folder, chains={name: r.as_dict() for name, r in results.items()}, refused=refused)
-    identity = partial(identity_of, "doe chain", {}, [path])
-    return replace(answer, files=saved(folder, path, "chain.json", answer, partial(chain_tables, results), identity))
+    solutions, identity = {name: r.as_dict() for name, r in results.items()}, identity_of("doe chain", {}, [path])
+    answer = ChainAnswer(record, folder, chains=solutions, refused=refused, identity=identity)
+    return replace(answer, files=saved(folder, path, "chain.json", answer, partial(chain_tables, results)))

@@ -112,8 +112,10 @@ def uncertainty(
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_uncertainty(path, assignments, simulations, points, accuracy)
             agenda.enter(ANSWER)
-            answer = UncertaintyAnswer(uncertainty_record(result), folder, (), agenda.agenda, uncertainty=result)
             identity = scene_identity("doe uncertainty", path, assignments)
+            answer = UncertaintyAnswer(
+                uncertainty_record(result), folder, (), agenda.agenda, identity=identity, uncertainty=result
+            )
             files = write_with_report(folder, identity, answer.blocks, partial(write_uncertainty, result, folder))
             agenda.finish(files)
     return replace(answer, files=tuple(files))
@@ -220,10 +222,10 @@ def calibrate(
     effort = Effort(workers, scheduler, retry, progress, notice)
     with registered(path, folder):
         question = read_question(path, table, free, assignments)
-        identity = question_of(question)
+        identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
         output_folder(folder, "doe", path)
         if not retry and (record := stored(folder, identity)) is not None:
-            return CalibrationAnswer(record, folder, tuple(files_of(record)))
+            return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
@@ -233,6 +235,6 @@ def calibrate(
                 turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
-            write(result, record, folder, scene_identity("doe calibrate", path, assignments, table))
+            write(result, record, folder, scene)
             agenda.finish(files_of(record))
-    return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)
+    return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda, identity=scene)

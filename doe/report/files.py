@@ -130,7 +130,6 @@ def blocks(record: dict[str, Any]) -> list[Block]:
 def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
-    settings = settings_record(study)
     record: dict[str, Any] = {
         "format": FORMAT,
         "identity": study_identity("doe study", study).as_dict(),
@@ -139,7 +138,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
-        "asked": settings,
+        "asked": settings_record(study),
         "design": study_design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),

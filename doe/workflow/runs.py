@@ -1,9 +1,11 @@
 """Design and runs of a study: points and their evaluation, the region of the design, and runs from simulations or a table."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from operator import itemgetter
 from pathlib import Path
+from statistics import fmean
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -329,7 +331,7 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
             f"{sentence(failures)}"
         )
     sound = [result for result in results if not isinstance(result, Failure)]
-    notes = _distinct_notes((note for result in sound for note in result.notes), len(sound))
+    notes = _distinct_notes([result.notes for result in sound])
     if failures:
         notes.append(
             f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
@@ -341,12 +343,17 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
     )
 
 
-def _distinct_notes(notes: Iterable[str], runs: int) -> list[str]:
-    """Notes of ``runs`` runs; of notes that differ in their numbers only the first is kept, with the number of its runs."""
-    same = ((group, len(set(group)) == 1) for group in alike(notes, str))
+def _distinct_notes(notes: Sequence[Sequence[str]]) -> list[str]:
+    """Notes of all runs in the order of their mean place in a run, the most important first.
+
+    Of notes that differ in their numbers only the first is kept, with the number of its runs.
+    """
+    placed = [(place, note) for of_run in notes for place, note in enumerate(of_run)]
+    groups = sorted(alike(placed, itemgetter(1)), key=lambda group: fmean(place for place, _ in group))
+    texts = [[note for _, note in group] for group in groups]
     return [
-        group[0] if single else f"{group[0]} (in {len(group)} of {runs} runs; figures of the first)"
-        for group, single in same
+        group[0] if len(set(group)) == 1 else f"{group[0]} (in {len(group)} of {len(notes)} runs; figures of the first)"
+        for group in texts
     ]
 
 

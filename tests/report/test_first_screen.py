@@ -22,6 +22,7 @@ from doe.workflow.confirmation import LOSS, NOISE, REAL, Choice, Confirmed
 from doe.workflow.front import find_front
 from doe.workflow.pick import choices
 from doe.workflow.rivals import Forecast, rivals_sentences
+from doe.workflow.runs import _distinct_notes
 from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
@@ -214,3 +215,18 @@ def test_balls_have_their_figures_before_the_table_of_all_balls():
     shown = CliRunner().invoke(app, ["ball", str(ROOT / "examples" / "angular_contact_ball.toml")]).stdout
     assert shown.startswith("angular contact ball bearing, ")
     assert shown.index("life L10r") < shown.index("stiffness: ") < shown.index("azimuth")
+
+
+def test_notes_of_runs_stand_in_the_order_of_their_mean_place():
+    """Unit: what comes first where it occurs stays first, though the first run lacks it; numbers make no difference."""
+    runs = [
+        ("whirl: 0.8 um", "left out: 13 W"),
+        ("drifted", "whirl: 0.7 um", "left out: 14 W"),
+        ("whirl: 0.8 um", "left out: 13 W"),
+    ]
+    notes = _distinct_notes(runs)
+    assert notes == [
+        "drifted",
+        "whirl: 0.8 um (in 3 of 3 runs; figures of the first)",
+        "left out: 13 W (in 3 of 3 runs; figures of the first)",
+    ]
