@@ -211,7 +211,6 @@ def calibrate(
     from doe.running.runner import ANSWER
     from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
     from doe.workflow.status import content_digest
-    from rbdyn.base.page import write_with_report
 
     path, table = path_given(path, "path"), path_given(data, "data")
     folder = Path(f"{path.stem}_calibration") if out is None else path_given(out, "out")
@@ -234,8 +233,6 @@ def calibrate(
                 turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
-            answer = CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)
-            scene = scene_identity("doe calibrate", path, assignments, table)
-            write_with_report(folder, scene, answer.blocks, partial(write, result, record, folder))
+            write(result, record, folder, scene_identity("doe calibrate", path, assignments, table))
             agenda.finish(files_of(record))
     return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda)

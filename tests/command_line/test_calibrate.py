@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import doe
 from doe.cli import app
+from doe.report.identity import scene_identity
 from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
 from doe.workflow.calibration import find_calibration, question_of, read_question
 from doe.workflow.rig import read_rig
@@ -318,7 +319,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     shown = text(blocks(record))
     assert shown.startswith("calibrated") and "identified combination lubricant.oil_fraction^1" in shown
 
-    write(found, record, tmp_path)
+    write(found, record, tmp_path, scene_identity("doe calibrate", Path(scene), ()))
     assert all((tmp_path / name).stat().st_size > 0 for name in files_of(record))
     assert stored(tmp_path, "made of this") == record and stored(tmp_path, "made of that") is None
     with (tmp_path / "posterior.csv").open(encoding="utf-8") as file:
@@ -327,7 +328,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
 
     made = record_of(found, question_of(question))
     (tmp_path / "out").mkdir()
-    write(found, made, tmp_path / "out")
+    write(found, made, tmp_path / "out", scene_identity("doe calibrate", Path(scene), ()))
     answer = doe.calibrate(scene, rig, out=tmp_path / "out")
     assert (
         answer.as_dict()

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.image import imread
 from short_studies import SHORT, rows, short_study, silent, stored
@@ -48,7 +49,11 @@ def test_every_file_is_written(finished):
     assert {"report.html", "report.md"} <= set(files)
     assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
     assert sum(name.startswith("surface_") for name in files) == 3
-    for name in files:
+    sheets = pd.read_excel(folder / "tables.xlsx", sheet_name=None)
+    assert list(sheets) == ["identity", *(name.removesuffix(".csv") for name in files if name.endswith(".csv"))]
+    runs = pd.read_csv(folder / "design_runs.csv")
+    pd.testing.assert_frame_equal(sheets["design_runs"], runs, check_dtype=False, rtol=1e-12)
+    for name in (name for name in files if not name.endswith(".xlsx")):
         if name.endswith(".png"):
             colours = (255.0 * imread(folder / name)[..., :3]).astype(int) @ [1 << 16, 1 << 8, 1]
             assert np.unique(colours).size > 50, f"{name} is nearly empty"

@@ -3,6 +3,7 @@
 import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.forecast import Forecast, duration, span
-from rbdyn.base.page import REPORT
+from rbdyn.base.identity import Identity
+from rbdyn.base.page import REPORT, write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
@@ -266,8 +268,16 @@ def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
     return ranges[0], ranges[1], shown(row["median"])
 
 
-def write(calibration: Calibration, record: dict[str, Any], folder: Path) -> list[str]:
-    """calibration.json, measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
+def write(calibration: Calibration, record: dict[str, Any], folder: Path, identity: Identity) -> None:
+    """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
+    write_with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record, folder))
+    # Last, as it marks the folder as complete.
+    sign(record)
+    write_json(folder / RECORD, record)
+
+
+def _write_parts(calibration: Calibration, record: dict[str, Any], folder: Path) -> list[str]:
+    """measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
     save_table(map(_measured_row, record["cells"]), folder / MEASURED)
     draw_compared(record, folder / COMPARED)
     if calibration.match.sampled is not None:
@@ -276,10 +286,7 @@ def write(calibration: Calibration, record: dict[str, Any], folder: Path) -> lis
         sha256 = digest_of((folder / SAMPLE).read_bytes())
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **origin})
         draw_corner(calibration, record, folder / CORNER)
-    # Last, as it marks the folder as complete.
-    sign(record)
-    write_json(folder / RECORD, record)
-    return own_files(record)
+    return _parts(record)
 
 
 def _measured_row(cell: Mapping[str, Any]) -> dict[str, Any]:
@@ -300,14 +307,13 @@ def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(row.values() for row in rows)))
 
 
-def own_files(record: dict[str, Any]) -> list[str]:
-    """Names of the files of a calibration, without the page and the workbook of these."""
-    return [RECORD, MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
+def _parts(record: dict[str, Any]) -> list[str]:
+    return [MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
 
 
 def files_of(record: dict[str, Any]) -> list[str]:
     """Names of the files of a calibration."""
-    return [*own_files(record), REPORT, WORKBOOK]
+    return [RECORD, *_parts(record), REPORT, WORKBOOK]
 
 
 def stored(folder: Path, made_of: str) -> dict[str, Any] | None:
