@@ -328,7 +328,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
 
     made = record_of(found, question_of(question))
     (tmp_path / "out").mkdir()
-    write(found, made, tmp_path / "out")
+    write(found, made, tmp_path / "out", scene_identity("doe calibrate", Path(scene), ()))
     answer = doe.calibrate(scene, rig, out=tmp_path / "out")
     assert (
         answer.as_dict()
