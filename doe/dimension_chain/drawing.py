@@ -90,11 +90,20 @@ def class_within(part: Part, shaft: bool) -> str:
 
 
 def places(part: Part, resolution: float) -> list[Part]:
-    """The part with its nominal on the steps next to it, the nearer first; as it is where nothing is rounded."""
+    """The part with its nominal on the steps next to it, the nearer first; as it is where nothing is rounded.
+
+    A stated nominal within a step comes first of all: a move that only the rounding asks for is none.
+    """
     if not resolution:
         return [part]
     steps = {steps_below(part.nominal_mm, resolution), steps_above(part.nominal_mm, resolution)}
     nominals = sorted((on_step(step, resolution) for step in steps), key=lambda size: abs(size - part.nominal_mm))
+    stated = round(part.nominal_mm - part.moved_mm, DIGITS)
+    if (
+        abs(part.moved_mm) < resolution * (1.0 + NEAR)
+        and on_step(steps_below(stated, resolution), resolution) == stated
+    ):
+        nominals = [stated, *(nominal for nominal in nominals if nominal != stated)]
     return [at_nominal(part, nominal) for nominal in nominals]
 
 

@@ -215,7 +215,7 @@ class PickTolerances:
         """'guide clearance ± 0.018 mm (IT8)' of factors."""
         widths = dict(zip(self.factors, self.half_widths.tolist(), strict=True))
         return ", ".join(
-            f"{quantity(name)[0]} ± {rounded_down(widths[name])} mm ({self.grades[name].name})" for name in names
+            f"{quantity(name)[0]} within ± {rounded_down(widths[name])} mm ({self.grades[name].name})" for name in names
         )
 
 

@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.words import with_error
 
 ROOT = Path(__file__).parents[2]
 TERM = re.compile(r" ([+-]) ")
@@ -129,7 +130,7 @@ def main() -> int:
                 continue
         for row in rows:
             verdict = "STALE" if row.stale else "holds"
-            print(f"{verdict}  {row.quoted:>9g}  now {row.value:>9.5g} ± {row.allowed:.2g}  {row.page}: {row.words}")
+            print(f"{verdict}  {row.quoted:>9g}  now {with_error(row.value, row.allowed)}  {row.page}: {row.words}")
             stale = stale or row.stale
     return int(stale)
 

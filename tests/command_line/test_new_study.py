@@ -99,8 +99,10 @@ def test_command_line_chains_resolve_to_the_clearances(scene, names, tmp_path):
         grades = {part.grade for part in solved.allocation if part.grade}
         assert len(grades) == 1 and f"# {grades.pop()} (ISO 286-1): " in text
         assert solved.status.startswith("ok") and solved.worst_case_mm[0] >= table["closing_link"]["lower_mm"] - 1e-9
-        # Half micrometres of nominals and deviations move a nominal by a step of the drawing at most.
-        assert all(abs(part.moved_mm) <= 0.001 + 1e-9 for part in solved.allocation)
+        # A nominal is moved only where half a micrometre of it is on no step of the drawing.
+        stated = {link["name"]: link["nominal_mm"] for link in chain["link"]}
+        halves = any(abs(nominal * 1e3 - round(nominal * 1e3)) > 1e-6 for nominal in stated.values())
+        assert all(abs(part.moved_mm) <= (0.001 if halves else 0.0) + 1e-9 for part in solved.allocation)
     if "guide" in names:
         land = next(link for chain in study["chain"] for link in chain["link"] if link["name"] == "guide_land")
         assert land["nominal_mm"] == pytest.approx(drawn.land_diameter_mm, abs=5e-4)

@@ -159,7 +159,7 @@ def test_unit_a_refused_chain_shows_who_takes_what_and_that_a_yield_meets_it():
     for words in (
         'Write mode = "yield" under allocate',
         "Contributions",
-        "The chain misses its limits: ",
+        "misses its limits: ",
         "0.0310 mm in worst case",
     ):
         assert words in shown, words

@@ -93,7 +93,7 @@ def test_every_rule_picks_among_those_that_dominate_the_baseline():
     picks, among = pick_all(LINE, Goals.of(["min", "min"]), np.array([0.8, 0.5]))
     assert set(picks) == set(RULES)
     assert all(0.5 <= LINE[row, 0] <= 0.8 for row in picks.values())
-    assert "31 of 101" in among
+    assert "31 (of 101)" in among
     found = front(bowls(2), LOWER, UPPER, baseline=[0.7, 0.4, 0.1], pick="weights", **SMALL)
     assert found.pick == found.picks["weights"] and "by the weights" in found.pick_reason
 

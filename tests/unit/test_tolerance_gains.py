@@ -127,7 +127,9 @@ def test_unit_warning_names_the_gain_and_the_width_without_it(planes):
     assert record["without_limiting_gain"]["gain"] == LOSS
     assert record["without_limiting_gain"]["half_width"] == pytest.approx(without.half_widths[0])
     assert record["without_limiting_gain"]["grade"] == without.grades["radial_clearance_mm"].name
-    assert found.warning.startswith("The gain of power loss demands parts finer than IT4: radial clearance ± 0.0")
+    assert found.warning.startswith(
+        "The gain of power loss demands parts finer than IT4: radial clearance within ± 0.0"
+    )
     assert (
         f"({record['grade']})" in found.warning
         and "Without the gain of power loss the tolerance would be" in found.warning

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
 
-from doe.report.sections.chain import refused, yield_words
+from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
 from doe.report.sections.record import (
     SENSES,
     Factor,
@@ -154,20 +154,17 @@ def _edge(summary: Record) -> str:
 
 
 def _parts_to_make(summary: Record) -> list[Block]:
-    """Parts of every dimension chain, and whether these meet their limits; all else is in a section of its own."""
+    """Parts of every dimension chain, and what a refused one takes and needs; all else is in a section of its own."""
     chains = part(summary, "chains") or {}
     rows = [
-        (label(name), label(chain_name), dimension(size), size.get("grade") or "", moved(size))
+        (label(name), label(chain_name), dimension(size), grade_cell(size), moved(size))
         for chain_name, chain in chains.items()
-        for name, size in sizes(chain).items()
+        for name, size in (sizes(chain, "parts") or sizes(chain)).items()
     ]
     header = ("part", "chain", "dimension [mm]", "grade", "moved [mm]")
-    misses = [
-        f"Chain {label(name)} misses its limits: {chain['status']}." for name, chain in chains.items() if refused(chain)
-    ]
     shares = (f"{label(name)}: {words}" for name, chain in chains.items() if (words := yield_words(chain)))
     table = Table("Parts to make", header, rows, "; ".join(shares), text_columns=(1, 3))
-    return [table, *(Paragraph(text, "warning") for text in misses)]
+    return [table, *(block for name, chain in chains.items() for block in refusal_blocks(name, chain))]
 
 
 def _clearances(summary: Record) -> list[Block]:

@@ -38,8 +38,6 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section:
     blocks: list[Block] = []
     for name, chain in (part(summary, "chains") or {}).items():
         blocks.append(Heading(label(name)))
-        if refused(chain):
-            blocks += [*_refusal(chain), _shares_table(name, chain)]
         if shares := chain.get("contributions"):
             caption = "Contribution of each part to the scatter of the closing link."
             blocks.append(Figures([contributions(name, shares).svg], caption))
@@ -62,9 +60,14 @@ def chain_blocks(name: str, chain: Record) -> list[Block]:
         replace(_shares_table(name, chain), detail=detail),
         *_distributions(chain, Detail.ALL),
         *(Paragraph(sentence, detail=detail) for sentence in _closing(chain)),
-        *(_refusal(chain) if refused(chain) else [Paragraph(_sentence(status), detail=Detail.USUAL)]),
+        *(_refusal(name, chain) if refused(chain) else [Paragraph(_sentence(status), detail=Detail.USUAL)]),
         *(_selective(selective) if selective else ()),
     ]
+
+
+def refusal_blocks(name: str, chain: Record) -> list[Block]:
+    """What each part of a refused chain takes, by how much it misses, and what would meet its limits; nothing for others."""
+    return [_shares_table(name, chain), *_refusal(name, chain)] if refused(chain) else []
 
 
 def _sentence(text: str) -> str:
@@ -85,13 +88,14 @@ def _parts_table(name: str, chain: Record) -> Table:
 
 def _sizes_table(title: str, rows: Mapping[str, Record]) -> Table:
     cells = [
-        (label(name), dimension(row), _grade(row), moved(row), row.get("origin") or "") for name, row in rows.items()
+        (label(name), dimension(row), grade_cell(row), moved(row), row.get("origin") or "")
+        for name, row in rows.items()
     ]
     header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations")
     return Table(title, header, cells, text_columns=(2, 4)).without_empty_columns()
 
 
-def _grade(row: Record) -> str:
+def grade_cell(row: Record) -> str:
     """'IT7, m6 within' of a part: its grade, and of a seat the class of ISO 286 within its limits."""
     within = f"{row['iso_class']} within" if row.get("iso_class") else ""
     return ", ".join(word for word in (row.get("grade_words") or row.get("grade"), within) if word)
@@ -102,24 +106,24 @@ def refused(chain: Record) -> bool:
     return str(chain.get("status")).startswith("refused")
 
 
-def _refusal(chain: Record) -> list[Block]:
+def _refusal(name: str, chain: Record) -> list[Block]:
     """By how much a chain misses its limits, why, what would meet them, and the nearest sizes that do."""
     stated, nearest = sizes(chain, "parts"), sizes(chain)
     figures = ("nominal_mm", "upper_mm", "lower_mm")
     differs = any(row[key] != stated[name][key] for name, row in nearest.items() if name in stated for key in figures)
     return [
-        Paragraph(_miss(chain), "warning"),
+        Paragraph(_miss(name, chain), "warning"),
         Paragraph(_sentence(str(chain["status"]))),
         Paragraph(part(chain, "remedy", "sentence") or ""),
         _sizes_table("The nearest sizes that meet the limits", nearest if differs else {}),
     ]
 
 
-def _miss(chain: Record) -> str:
-    """'The chain misses its limits: 0.3300 mm below the lower limit.'"""
+def _miss(name: str, chain: Record) -> str:
+    """'Chain pocket misses its limits: 0.3300 mm below the lower limit.'"""
     missed = chain.get("missed") or {}
     if missed.get("yield_short"):
-        return f"The chain misses its yield: {missed['yield_short']:.4g} of the assemblies too many are outside its limits."
+        return f"Chain {label(name)} misses its yield: {missed['yield_short']:.4g} of the assemblies too many are outside its limits."
     figures = [
         f"{missed[key]:.4f} mm {words}"
         for key, words in (
@@ -129,7 +133,7 @@ def _miss(chain: Record) -> str:
         )
         if missed.get(key)
     ]
-    return f"The chain misses its limits: {', '.join(figures)}." if figures else ""
+    return f"Chain {label(name)} misses its limits: {', '.join(figures) or chain['status']}."
 
 
 def _shares_table(name: str, chain: Record) -> Table:

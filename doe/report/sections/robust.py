@@ -5,7 +5,7 @@ from typing import Any
 
 from doe.report.sections.record import SENSES, Record, of_hundred, part
 from rbdyn.base.blocks import Block, Bullets, Paragraph, Section, Table
-from rbdyn.base.words import counted, quantity, shown
+from rbdyn.base.words import counted, quantity, shown, with_error
 
 INPUTS, DECIDES = "unknown_inputs.csv", "decides.csv"
 # Words of the laws of inputs.
@@ -111,7 +111,7 @@ def law_words(law: Mapping[str, Any]) -> str:
     times = f" times {law['times']}" if law.get("times") else ""
     kind = LAWS.get(str(law.get("law")), str(law.get("law") or ""))
     if law.get("mean") is not None:
-        return f"{shown(law['mean'])} ± {shown(law.get('sd'))} (1 sd){times} ({kind})"
+        return f"{with_error(law['mean'], law.get('sd'))} (1 sd){times} ({kind})"
     if law.get("low") is not None and law.get("high") is not None:
         return f"{shown(law['low'])} to {shown(law['high'])}{times} ({kind})"
     if law.get("law") == "choices":
