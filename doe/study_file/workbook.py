@@ -7,7 +7,6 @@ import re
 import warnings
 import zipfile
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -74,9 +73,12 @@ def _check_parts(path: Path) -> None:
         raise InputError([f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password"])
     if start != ARCHIVE:
         raise InputError([f"{path}: is no Excel workbook; give a table of text a name that ends in .csv"])
-    size = 0
-    with suppress(zipfile.BadZipFile, OSError, ValueError), zipfile.ZipFile(path) as archive:
-        size = sum(part.file_size for part in archive.infolist())
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+    # A damaged directory of parts can raise anything, too.
+    except Exception:
+        raise _damaged(path) from None
     if size > LARGEST_PARTS:
         raise InputError([f"{path}: unpacks to more than {LARGEST_PARTS / 1e6:g} MB; check that it is the right file"])
 
