@@ -88,12 +88,13 @@ class Table:
 
 @dataclass(frozen=True)
 class Tile:
-    """One prominent figure: its name, value and unit, and further figures of that unit by name."""
+    """One prominent figure: its name, value and unit, further figures of that unit by name, and remarks without a unit."""
 
     name: str
     value: str
     unit: str
     further: Sequence[tuple[str, str]]
+    remarks: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
@@ -108,14 +109,15 @@ class Tiles:
     @property
     def table(self) -> Table:
         """The same figures as a table, one row each."""
-        names = list(dict.fromkeys(name for tile in self.tiles for name, _ in tile.further))
+        cells = [dict([*tile.further, *tile.remarks]) for tile in self.tiles]
+        names = list(dict.fromkeys(name for row in cells for name in row))
         rows = [
             [
                 f"{tile.name} [{tile.unit}]" if tile.unit else tile.name,
                 tile.value,
-                *(dict(tile.further).get(name, "") for name in names),
+                *(row.get(name, "") for name in names),
             ]
-            for tile in self.tiles
+            for tile, row in zip(self.tiles, cells, strict=True)
         ]
         return Table(self.caption, ("", self.value, *names), rows, detail=self.detail)
 

@@ -73,9 +73,9 @@ def _tiles(block: Tiles) -> str:
 
 def _tile(tile: Tile) -> str:
     unit = f' <span class="unit">{escape(tile.unit)}</span>' if tile.unit else ""
-    further = "".join(
-        f'<span class="beneath">{escape(f"{name} {value} {tile.unit}".rstrip())}</span>' for name, value in tile.further
-    )
+    lines = [f"{name} {value} {tile.unit}".rstrip() for name, value in tile.further]
+    lines += [f"{name} {value}" for name, value in tile.remarks]
+    further = "".join(f'<span class="beneath">{escape(line)}</span>' for line in lines)
     return f'<div class="tile"><dt>{escape(tile.name)}</dt><dd><strong>{escape(tile.value)}{unit}</strong>{further}</dd></div>'
 
 

@@ -213,14 +213,14 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     tolerance = tolerance_of(summary, factor)
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
-        "grade of the parts": part(summary, "tolerances", factor.name, "grade") or "",
         "baseline": factor.text(before.get(factor.name)),
         "in operation": factor.text(running.get("pick")),
         "baseline in operation": factor.text(running.get("baseline")),
     }
-    return Tile(
-        factor.words, factor.text(pick[factor.name]), factor.unit, [entry for entry in further.items() if entry[1]]
-    )
+    entries = [entry for entry in further.items() if entry[1]]
+    grade = part(summary, "tolerances", factor.name, "grade")
+    remarks = [("grade of the parts", grade)] if grade else []
+    return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, entries, remarks)
 
 
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
