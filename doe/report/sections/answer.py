@@ -242,9 +242,8 @@ def gains_statement(summary: Record) -> str:
 def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
-    # The error of the baseline is in that of the change.
     rows = [
-        (label(name), _value(before.get(name)).partition(" ± ")[0], _value(after.get(name)), _signed(gain))
+        (label(name), _value(before.get(name)), _value(after.get(name)), _signed(gain))
         for name, gain in gains.items()
     ]
     header = ("response", "baseline", "pick", "change")
