@@ -243,8 +243,7 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
     rows = [
-        (label(name), _value(before.get(name)), _value(after.get(name)), _signed(gain))
-        for name, gain in gains.items()
+        (label(name), _value(before.get(name)), _value(after.get(name)), _signed(gain)) for name, gain in gains.items()
     ]
     header = ("response", "baseline", "pick", "change")
     return Table("Changes confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
