@@ -108,6 +108,10 @@ class SimulationResult(Brief, SavedRecord):
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
       play, None where nothing guides the cage
+    - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
+    - ``thermal``: the balance: "status" ("steady", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+      first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
+      documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
       None unless numerics.pulse_threshold_N is stated
     """
@@ -142,6 +146,8 @@ class SimulationResult(Brief, SavedRecord):
     pulse_rate_hz: Quantity | None = None
     pulse_height_N: Quantity | None = None  # noqa: N815
     pulse_impulse_N_s: Quantity | None = None  # noqa: N815
+    temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
+    thermal: dict[str, Any] | None = None
 
     @property
     def jitters(self) -> bool:

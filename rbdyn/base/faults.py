@@ -13,9 +13,18 @@ from datetime import date, time
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Generic, Self, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 
 def _not_vanishing(value: float) -> float:
@@ -154,6 +163,20 @@ class Consistent(Strict):
     @model_validator(mode="after")
     def _without_faults(self) -> Self:
         return or_refuse(self, self.faults())
+
+
+class Sparse(Consistent):
+    """A table that leaves out of its saved form those keys of ``UNSAVED`` that have the value there.
+
+    A table that gains such a key is saved as before, so results that are stored under it stay valid.
+    """
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {}
+
+    @model_serializer(mode="wrap")
+    def _without_unsaved(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        saved: dict[str, Any] = handler(self)
+        return {key: value for key, value in saved.items() if key not in self.UNSAVED or value != self.UNSAVED[key]}
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:

@@ -79,6 +79,18 @@ def simulate(
 
         return reach(scene, target, partial(simulate, notice=notice), workers, progress, stop, notice)
     stop = Stop(outer=stop)
+    run = partial(_ensemble, workers=workers, stop=stop)
+    if scene.thermal is not None:
+        from rbdyn.dynamics.temperatures import with_temperatures
+
+        return with_temperatures(scene, run, _gather, progress, notice)
+    return _gather(scene, *run(scene, progress, notice))
+
+
+def _ensemble(
+    scene: Scene, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
+) -> tuple[Ensemble, dict[str, float]]:
+    """Replicates of a scene, and the time [s] that they took and were stated to take."""
     bearing = roller_bearing(scene)
     compile_s = 0.0
     method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
@@ -90,10 +102,9 @@ def simulate(
     turns = numerics.warm_up_turns + (whole_windows(scene) if scene.extends else numerics.turns)
     growth = numerics.extend_limit if scene.extends else 1.0
     pace = Pace(scene, notice, numerics.replicates, turns, threads_of(workers), growth, numerics.companions)
-
     ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)})
+    return ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)}
 
 
 def _prediction(pace: Pace) -> dict[str, float]:
