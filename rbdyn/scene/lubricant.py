@@ -230,11 +230,6 @@ def fraction_faults(oil: Lubricant, pitch_mm: float, inner_rpm: float, outer_rpm
     """The fault of a stated oil fraction next to a flow that gives another."""
     flow = oil.oil_flow_l_min
     if flow is None:
-        if oil.oil_fraction_factor != 1.0:
-            yield (
-                f"lubricant.oil_fraction_factor = {oil.oil_fraction_factor:g}: has no effect without lubricant.oil_flow_l_min; leave "
-                "it out"
-            )
         return
     of_flow = fraction_of_flow(flow, pitch_mm, inner_rpm - outer_rpm, oil.oil_fraction_factor)
     if oil.oil_fraction != of_flow:
