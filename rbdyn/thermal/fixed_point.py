@@ -9,7 +9,7 @@ C dT/dt = G (M(T) - T), so a fixed point is stable where every eigenvalue of dM/
 gain of the loop: negative where friction falls with viscosity, positive where a ring that warms takes clearance away.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -89,15 +89,15 @@ def newton_step(slopes: Array, deviation: Array) -> Array:
 
 
 def steady_state(
-    balance: Balance, start: Array, slopes: Array, cold: Array, states: Sequence[State] = (), tolerance: float = TOLERANCE
+    balance: Balance, start: Array, slopes_at: Callable[[State], Array], cold: Array, tolerance: float = TOLERANCE
 ) -> Search:
-    """Search for steady temperatures from ``start`` [C] with estimated ``slopes`` (n, n).
+    """Search for steady temperatures from ``start`` [C]; ``slopes_at`` estimates dM/dT (n, n) at the first state.
 
-    ``cold``: temperatures before any heat, towards which an impossible start moves. ``states``: visited before, the last of them
-    next to the start. ``tolerance`` [K]. Raises InputError where the bearing is impossible even when cold.
+    ``cold``: temperatures before any heat, towards which an impossible start moves. ``tolerance`` [K]. Raises InputError where
+    the bearing is impossible even when cold.
     """
-    visited, fault = [*states], ""
-    visited.append(_possible_start(balance, start, cold))
+    visited, fault = [_possible_start(balance, start, cold)], ""
+    slopes = slopes_at(visited[0])
     while True:
         state = visited[-1]
         deviation = state.deviation
