@@ -239,6 +239,7 @@ BOUNDARY_FRICTION, FILM_FRICTION = 0.12, 0.02
 # ISO 15312: heat flow density at 50 K above the surroundings, up to a seat of 50 000 mm^2; above it falls with the power
 # -0.34 of the seat (from memory) [W/mm^2], [mm^2].
 HEAT_FLOW, LARGE_SEAT, LARGE_SEAT_EXPONENT = 0.016, 5e4, -0.34
+SEAT_RISE = 50.0  # [K]
 
 
 class FrictionMoments(NamedTuple):
@@ -306,5 +307,14 @@ def iso_15312_heat(sizes: Envelope) -> float:
 
     The conditions of the reference speed: 0.05 C0, 12 mm^2/s at 70 C, a bath to the middle of the lowest roller.
     """
-    seat = math.pi * sizes.width * (sizes.bore + sizes.outside)
+    return _heat_of_seat(math.pi * sizes.width * (sizes.bore + sizes.outside))
+
+
+def seat_heat(seat: float) -> float:
+    """Heat flow of ISO 15312 through a seat [m^2] that is ``SEAT_RISE`` warmer than the surroundings [W]."""
+    return _heat_of_seat(1e6 * seat)
+
+
+def _heat_of_seat(seat: float) -> float:
+    """Heat flow [W] through a seat [mm^2]."""
     return HEAT_FLOW * seat * max(seat / LARGE_SEAT, 1.0) ** LARGE_SEAT_EXPONENT
