@@ -14,7 +14,7 @@ sets with the heat linear in the temperatures.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, LOSSES, POCKET_FILM, POWERS, ROLLING
-from rbdyn.dynamics.parameters.heat import Network, network_of
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING
+from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
@@ -32,7 +32,7 @@ from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, inlet_temperature
 from rbdyn.thermal.fixed_point import TOLERANCE, State, gain, learned, steady_state
-from rbdyn.thermal.input_ranges import Ranges, input_ranges
+from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
 from rbdyn.thermal.network import NODES, carried_off, matrix
 
 # Replicates of a short run, and its counted turns as a share of those of the scene.
@@ -68,7 +68,9 @@ def temperature_figures(state: Array, network: Network, slopes: Array) -> list[F
     """
     response = np.linalg.inv(np.eye(len(state)) - slopes)
     constants = state + response @ (network.offset - state)
-    return [_weighted(weights, constant) for weights, constant in zip(response @ network.weights, constants, strict=True)]
+    return [
+        _weighted(weights, constant) for weights, constant in zip(response @ network.weights, constants, strict=True)
+    ]
 
 
 def _weighted(weights: Array, constant: float) -> Figure:
@@ -125,7 +127,9 @@ class Balance:
         self.wall_s += clock["wall_s"]
         self.runs += [*ensemble.runs, *ensemble.companions]
         flat = np.zeros((len(NODES), len(NODES)))
-        figures = [quantity(figure, ensemble.runs, [], 0.0, 0.0) for figure in temperature_figures(temperatures, network, flat)]
+        figures = [
+            quantity(figure, ensemble.runs, [], 0.0, 0.0) for figure in temperature_figures(temperatures, network, flat)
+        ]
         image = np.array([figure.value for figure in figures])
         noise = np.array([figure.statistical_error or 0.0 for figure in figures])
         return State(temperatures, image, noise, Trial(hot, network, ensemble, clock))
@@ -183,7 +187,7 @@ def with_temperatures(
     balance = Balance(scene, simulate)
     first = np.full(len(NODES), scene.lubricant.temperature_C)
     search = steady_state(balance.at, first, viscous_slopes, balance.cold)
-    status, reason, slopes, visited = search.status, search.reason, search.slopes, len(search.states)
+    status, reason, slopes = search.status, search.reason, search.slopes
     if status == "steady":
         slopes = measured_slopes(balance, search.last, slopes)
         if gain(slopes) >= 1.0:
@@ -212,14 +216,18 @@ def _result(
     values = {node: figure.value for node, figure in temperatures.items()}
     if steady and (excess := _over_ceilings(scene, values)):
         status, reason = "too hot", excess
-    result = gather(trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s})
+    result = gather(
+        trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s}
+    )
     network = trial.network
     heat = powers_of(trial.ensemble.runs) @ network.shares + network.windage
     sized = network.conductances, network.boundaries
     ranges = None
     if steady:
         slopes_of_heat = matrix(network.conductances) @ slopes
-        ranges = input_ranges(scene, *sized, corrected(state, slopes), heat + slopes_of_heat @ step, slopes_of_heat)
+        ranges = input_ranges(
+            _unknown_factors(scene), *sized, corrected(state, slopes), heat + slopes_of_heat @ step, slopes_of_heat
+        )
     record = {
         "status": status,
         **({"reason": reason} if reason else {}),
@@ -243,9 +251,17 @@ def _result(
     )
 
 
+def _unknown_factors(scene: Scene) -> dict[str, Array]:
+    """Unknown inputs of the scene's heat balance, as of ``factors_of``."""
+    thermal, uncertain = scene.thermal, scene.uncertain
+    assert thermal is not None
+    estimated = [] if uncertain is None else uncertain.estimated
+    return factors_of(thermal, scene.lubricant.oil_flow_l_min is not None, estimated)
+
+
 def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict[str, Quantity]:
     """Temperatures of the nodes with their errors; those of the state itself where none is steady."""
-    ensemble, scene = trial.ensemble, trial.hot
+    ensemble = trial.ensemble
     moving = drifting(ensemble.runs)
     step = LAST_STEP * np.abs(corrected(state, slopes) - state.temperatures)
     figures = {}
@@ -253,8 +269,10 @@ def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict
         slow = slow_change(figure, figure, ensemble.runs, ensemble.since, moving=moving)
         node = quantity(figure, ensemble.runs, ensemble.companions, ensemble.plan.share, slow)
         numerical = math.hypot(node.numerical_error or 0.0, float(step[place]))
-        figures[NODES[place]] = replace(node, numerical_error=numerical) if steady else replace(
-            node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None
+        figures[NODES[place]] = (
+            replace(node, numerical_error=numerical)
+            if steady
+            else replace(node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None)
         )
     return figures
 
@@ -279,6 +297,4 @@ def _notes(hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple
         notes.append(
             f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
         )
-    if hot.lubricant.oil_flow_l_min is not None:
-        notes += fraction_notes(hot)
-    return tuple(notes)
+    return (*notes, *flow_notes(hot))

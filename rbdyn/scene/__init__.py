@@ -41,7 +41,14 @@ from rbdyn.scene.laws import (
     Numerics,
     with_bar_stiffness_of_cage,
 )
-from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, fraction_faults, with_fraction_of_flow, with_traction_of_oil
+from rbdyn.scene.lubricant import (
+    RHEOLOGY_OILS,
+    Lubricant,
+    Traction,
+    fraction_faults,
+    with_fraction_of_flow,
+    with_traction_of_oil,
+)
 from rbdyn.scene.notes import catalogue_notes, unit_notes
 from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
@@ -117,8 +124,8 @@ class Scene(SceneFile):
             name: table.model_dump(exclude_unset=True) if isinstance(table, BaseModel) else table
             for name, table in data.items()
         }
-        tables = with_first_guess(with_fraction_of_flow(with_traction_of_oil(tables)))
-        return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(tables))
+        warm = with_first_guess(with_fraction_of_flow(with_traction_of_oil(tables)))
+        return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(warm))
 
     def faults(self) -> list[str]:
         """Contradictions of the scene, each with a slip of the unit that may be its cause."""
@@ -127,7 +134,9 @@ class Scene(SceneFile):
         faults += self._overload_faults()
         faults += thermal_faults(self.thermal, self.lubricant, self.mounting, self.bearing.designation)
         if self.thermal is not None and self.operation.schedule is not None:
-            faults.append("operation.schedule: [thermal] balances the heat of a steady speed and load; leave out one of them")
+            faults.append(
+                "operation.schedule: [thermal] balances the heat of a steady speed and load; leave out one of them"
+            )
         if not faults and (seizures := list(self._seizures())):
             temperature_notes = [note for note in self.unit_notes if note.startswith("mounting.")]
             return ["; ".join([seizure, *temperature_notes]) for seizure in seizures]

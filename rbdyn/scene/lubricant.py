@@ -219,10 +219,10 @@ def with_fraction_of_flow(scene: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def fraction_of_flow(flow_l_min: float, pitch_mm: float, speed_rpm: float, factor: float) -> float:
     """Oil fraction of a flow; the largest at rest."""
-    from rbdyn.thermal.oil_fraction import LARGEST_FRACTION, oil_fraction
+    from rbdyn.thermal.oil_fraction import LARGEST, oil_fraction
 
     if speed_rpm == 0.0:
-        return LARGEST_FRACTION
+        return LARGEST
     return oil_fraction(flow_l_min / 60e3, abs(speed_rpm) * RPM, 1e-3 * pitch_mm, factor)
 
 

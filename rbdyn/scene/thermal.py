@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from rbdyn.base.faults import Consistent, NonNegative, Positive, Share
+from rbdyn.base.faults import NonNegative, Positive, Share, Strict
 from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
     from rbdyn.scene import Scene
-    from rbdyn.scene.ball import BallScene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
 COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
@@ -31,7 +30,7 @@ OIL_CEILINGS = {"mineral": 120.0, "naphthenic": 120.0, "PAO": 150.0, "PAG": 150.
 CAGE_CEILINGS = {"peek": 150.0, "phenolic_cotton": 120.0}
 
 
-class Thermal(Consistent):
+class Thermal(Strict):
     """Heat balance of the bearing, which computes its temperatures: oil, outer ring with housing, inner ring with shaft, and
     rolling elements with cage have one temperature each.
 
@@ -134,7 +133,11 @@ def with_first_guess(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     A stated viscosity holds at a stated temperature, so no guess stands for that.
     """
     thermal, oil = tables.get("thermal"), tables.get("lubricant")
-    if not isinstance(thermal, Mapping) or not isinstance(oil, Mapping) or {"temperature_C", "viscosity_mPas"} & set(oil):
+    if (
+        not isinstance(thermal, Mapping)
+        or not isinstance(oil, Mapping)
+        or {"temperature_C", "viscosity_mPas"} & set(oil)
+    ):
         return tables
     inlet = oil.get("oil_inlet_temperature_C")
     flows = "oil_flow_l_min" in oil and isinstance(inlet, int | float)

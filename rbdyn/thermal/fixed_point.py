@@ -84,7 +84,7 @@ def newton_step(slopes: Array, deviation: Array) -> Array:
     """
     step = deviation
     if gain(slopes) < NEARLY_UNSTABLE:
-        step = np.linalg.solve(np.eye(len(deviation)) - slopes, deviation)
+        step = np.asarray(np.linalg.solve(np.eye(len(deviation)) - slopes, deviation), float)
     return np.asarray(step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12)))
 
 
@@ -106,7 +106,9 @@ def steady_state(
         if len(visited) >= MOST_STATES and fault:
             return Search("seizure", tuple(visited), slopes, fault)
         if len(visited) >= MOST_STATES:
-            reason = f"{len(visited)} states did not settle; the last misses its balance by {np.abs(deviation).max():.2g} K"
+            reason = (
+                f"{len(visited)} states did not settle; the last misses its balance by {np.abs(deviation).max():.2g} K"
+            )
             return Search("no steady state", tuple(visited), slopes, reason)
         step = newton_step(slopes, deviation)
         if (state.temperatures + step).max() > HOTTEST:

@@ -6,7 +6,7 @@ estimated, as for ``doe uncertainty``, which also varies all other inputs, by si
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,8 +16,7 @@ from rbdyn.thermal.fixed_point import HOTTEST
 from rbdyn.thermal.network import NODES, Boundaries, Conductances, matrix, source
 
 if TYPE_CHECKING:
-    from rbdyn.scene import Scene
-    from rbdyn.scene.ball import BallScene
+    from rbdyn.scene.thermal import Thermal
 
 # Keys of [thermal] that scale conductances, and the conductances that each scales.
 SCALED = {
@@ -47,7 +46,7 @@ class Ranges(NamedTuple):
 
 
 def input_ranges(
-    scene: "Scene | BallScene",
+    factors: Mapping[str, Array],
     conductances: Conductances,
     boundaries: Boundaries,
     temperatures: Array,
@@ -56,17 +55,20 @@ def input_ranges(
 ) -> Ranges:
     """Ranges of the temperatures about a steady state, 5 to 95 % of input sets.
 
-    ``temperatures`` (4,) [C] and ``heat`` (4,) [W] of the state; ``heat_slopes`` dQ/dT (4, 4) [W/K]. Sets whose temperatures run
+    ``factors``: as of ``factors_of``. ``temperatures`` (4,) [C] and ``heat`` (4,) [W] of the state; ``heat_slopes`` dQ/dT (4, 4) [W/K]. Sets whose temperatures run
     away, or beyond what any oil bears, count as without a steady state and as the hottest.
     """
-    factors = _factors(scene)
-    held_heat = heat - heat_slopes @ temperatures
+    constant_heat = heat - heat_slopes @ temperatures
     rows = []
     for row in range(SETS if factors else 1):
         varied = _scaled(conductances, {key: values[row] for key, values in factors.items()})
         whole = matrix(varied) - heat_slopes
         stable = np.linalg.eigvals(np.linalg.solve(matrix(varied), heat_slopes)).real.max() < 1.0
-        solution = np.linalg.solve(whole, held_heat + source(varied, boundaries)) if stable else np.full(len(NODES), HOTTEST)
+        solution = (
+            np.linalg.solve(whole, constant_heat + source(varied, boundaries))
+            if stable
+            else np.full(len(NODES), HOTTEST)
+        )
         rows.append(np.minimum(solution, HOTTEST))
     table = np.array(rows)
     unsteady = float(np.mean(table.max(axis=1) >= HOTTEST))
@@ -81,25 +83,24 @@ def _scaled(conductances: Conductances, ratios: Mapping[str, float]) -> Conducta
     return conductances._replace(**{name: ratio * getattr(conductances, name) for name, ratio in names.items()})
 
 
-def _factors(scene: "Scene | BallScene") -> dict[str, Array]:
-    """Ratio of each unknown input to its value in the scene, (SETS,), by its key in [thermal]."""
+def factors_of(thermal: "Thermal", flows: bool, estimated: Collection[str]) -> dict[str, Array]:
+    """Ratio of each unknown input to its value in the scene, (SETS,), by its key in [thermal].
+
+    ``flows``: whether oil flows to the bearing; ``estimated``: keys of a scene whose stated values are estimates.
+    """
     from scipy.stats import qmc
 
     from rbdyn.scene.uncertain import documented
 
-    thermal, flow = scene.thermal, scene.lubricant.oil_flow_l_min if scene.lubricant else None
-    assert thermal is not None
-    estimated = [] if scene.uncertain is None else scene.uncertain.estimated
-    stated = {f"thermal.{key}" for key in scene._tables.get("thermal", {})} - set(estimated)
+    exact = {f"thermal.{key}" for key in thermal.model_fields_set} - set(estimated)
     laws = {
         key: entry
         for entry in documented()
         for key in (entry.key.removeprefix("thermal."),)
-        if entry.key.startswith("thermal.") and key in SCALED and entry.key not in stated
+        if entry.key.startswith("thermal.") and key in SCALED and entry.key not in exact and getattr(thermal, key) > 0.0
     }
-    if flow is None:
+    if not flows:
         laws.pop("oil_share", None)
-    laws = {key: entry for key, entry in laws.items() if getattr(thermal, key) > 0.0}
     if not laws:
         return {}
     sample = qmc.Sobol(len(laws), seed=SEED).random_base2(int(math.log2(SETS)))

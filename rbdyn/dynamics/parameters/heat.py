@@ -13,9 +13,20 @@ from rbdyn.dynamics.parameters.validity import spin_windage
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 from rbdyn.scene.thermal import Thermal, inlet_temperature
-from rbdyn.thermal.conductances import CageSize, oil_flow, race_contact, seats, surface_coefficient, surfaces
+from rbdyn.thermal.conductances import (
+    CageSize,
+    cavity_volume,
+    oil_flow,
+    race_contact,
+    seats,
+    surface_coefficient,
+    surfaces,
+)
 from rbdyn.thermal.heat import TERMS, Effusivities, shares
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, matrix, source
+from rbdyn.thermal.oil_fraction import fraction_notes, residence
+
+LITRE_A_MINUTE = 1e-3 / 60.0  # [m^3/s]
 
 
 class Network(NamedTuple):
@@ -34,12 +45,12 @@ class Network(NamedTuple):
     def offset(self) -> Array:
         """Temperatures [C] of the nodes without the powers of the simulation, (4,)."""
         heat = self.windage + source(self.conductances, self.boundaries)
-        return np.linalg.solve(matrix(self.conductances), heat)
+        return np.asarray(np.linalg.solve(matrix(self.conductances), heat))
 
     @property
     def weights(self) -> Array:
         """Rise of each node by each power [K/W], (4, powers)."""
-        return np.linalg.solve(matrix(self.conductances), self.shares.T)
+        return np.asarray(np.linalg.solve(matrix(self.conductances), self.shares.T))
 
 
 def network_of(hot: Scene, thermal: Thermal) -> Network:
@@ -94,7 +105,17 @@ def _conductances(hot: Scene, thermal: Thermal) -> Conductances:
     )
 
 
-LITRE_A_MINUTE = 1e-3 / 60.0  # [m^3/s]
+def flow_notes(hot: Scene) -> tuple[str, ...]:
+    """Notes where the oil fraction that follows from a flow is a guess; none without a flow."""
+    flow, geometry = hot.lubricant.oil_flow_l_min, hot.geometry
+    if flow is None or hot.mounting is None:
+        return ()
+    inner, outer = hot.operation.speeds
+    volume = geometry.roller_mass / hot.material("roller").density
+    cage = hot.cage.mass / hot.material("cage").density
+    cavity = cavity_volume(geometry.raceways, ring_width(hot), hot.bearing.rollers, volume, cage)
+    stay = residence(hot.lubricant.oil_fraction, cavity, flow * LITRE_A_MINUTE, geometry.motion.cage_speed)
+    return fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)
 
 
 def _power_shares(hot: Scene) -> Array:
