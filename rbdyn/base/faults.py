@@ -173,10 +173,15 @@ class Sparse(Consistent):
 
     UNSAVED: ClassVar[Mapping[str, Any]] = {}
 
+    def unsaved(self) -> Mapping[str, Any]:
+        """Keys that the table does not save where they have these values."""
+        return self.UNSAVED
+
     @model_serializer(mode="wrap")
     def _without_unsaved(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         saved: dict[str, Any] = handler(self)
-        return {key: value for key, value in saved.items() if key not in self.UNSAVED or value != self.UNSAVED[key]}
+        unsaved = self.unsaved()
+        return {key: value for key, value in saved.items() if key not in unsaved or value != unsaved[key]}
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:

@@ -84,8 +84,10 @@ def simulate(
 
         with command.progress_bar("simulating", quiet or as_json, workers) as progress:
             result = run_scene(loaded, workers, progress, target=aim, notice=command.notice(quiet))
-        loaded = type(loaded).from_dict(result.scene)
         from rbdyn.cli import simulation_output
+        from rbdyn.scene.thermal import simulated_scene
+
+        loaded = simulated_scene(result)
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
         blocks = partial(simulation_output.blocks, result)
@@ -95,6 +97,8 @@ def simulate(
         command.hand_over(
             result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), folder, files
         )
+    if result.status != "ok":
+        raise typer.Exit(command.FAILED)
 
 
 @app.command(cls=command.refusing(FORMER))

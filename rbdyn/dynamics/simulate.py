@@ -87,6 +87,18 @@ def simulate(
     return _gather(scene, *run(scene, progress, notice))
 
 
+def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None) -> Scene:
+    """The scene at its steady temperatures where it has [thermal], else the scene itself.
+
+    Raises RunError where it has none, and InputError where it is impossible even at the temperature of its surroundings.
+    """
+    if scene.thermal is None:
+        return scene
+    from rbdyn.dynamics import temperatures
+
+    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=Stop(outer=stop)))
+
+
 def _ensemble(
     scene: Scene, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
 ) -> tuple[Ensemble, dict[str, float]]:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING
@@ -114,6 +114,11 @@ class Balance:
         self.runs: list[Replicate] = []
 
     @property
+    def turns(self) -> float:
+        """Shaft turns of all runs."""
+        return sum(float(run.durations.sum()) for run in self.runs) / self.scene.turn_s
+
+    @property
     def cold(self) -> Array:
         """Temperatures before any heat [C]."""
         return np.full(len(NODES), inlet_temperature(self.thermal, self.scene.lubricant))
@@ -177,32 +182,62 @@ def corrected(state: State, slopes: Array) -> Array:
     return np.asarray(state.temperatures + np.linalg.solve(np.eye(len(NODES)) - slopes, state.deviation))
 
 
-def with_temperatures(
-    scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None, notice: Notice = None
-) -> SimulationResult:
-    """The result of a scene with [thermal], at its steady temperatures or at the last possible ones.
+class Verdict(NamedTuple):
+    """What short runs say: status and reason of the search, slopes dM/dT, states visited, and where to run at length [C]."""
+
+    status: str
+    reason: str
+    slopes: Array
+    path: list[State]
+    temperatures: Array
+
+    @property
+    def steady(self) -> bool:
+        """Whether there is a steady state."""
+        return self.status == "steady"
+
+
+def verdict_of(balance: Balance) -> Verdict:
+    """Search by short runs, and the gain of the loop where it ends.
 
     Raises InputError where the bearing is impossible even at the temperature of its surroundings, RunError, KeyboardInterrupt.
     """
-    balance = Balance(scene, simulate)
-    first = np.full(len(NODES), scene.lubricant.temperature_C)
+    first = np.full(len(NODES), balance.scene.lubricant.temperature_C)
     search = steady_state(balance.at, first, viscous_slopes, balance.cold)
-    status, reason, slopes = search.status, search.reason, search.slopes
-    if status == "steady":
-        slopes = measured_slopes(balance, search.last, slopes)
-        if gain(slopes) >= 1.0:
-            status = "no steady state"
-            reason = f"the gain of the loop is {gain(slopes):.2g}, so heat grows faster with temperature than it is carried off"
-    state, steady = search.last, status == "steady"
-    path = [*search.states]
-    for _ in range(MOST_WHOLE_RUNS if steady else 1):
-        temperatures = corrected(state, slopes) if steady else state.temperatures
+    path, last = [*search.states], search.last
+    if search.status != "steady":
+        return Verdict(search.status, search.reason, search.slopes, path, last.temperatures)
+    slopes = measured_slopes(balance, last, search.slopes)
+    if gain(slopes) >= 1.0:
+        reason = (
+            f"the gain of the loop is {gain(slopes):.2g}, so heat grows faster with temperature than it is carried off"
+        )
+        return Verdict("no steady state", reason, slopes, path, last.temperatures)
+    return Verdict("steady", "", slopes, path, corrected(last, slopes))
+
+
+def with_temperatures(
+    scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None, notice: Notice = None
+) -> SimulationResult:
+    """The result of a scene with [thermal], at its steady temperatures or at the last possible ones. Raises as ``verdict_of``."""
+    balance = Balance(scene, simulate)
+    verdict = verdict_of(balance)
+    path, temperatures = verdict.path, verdict.temperatures
+    for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
         state = balance.at(temperatures, True, progress, notice)
         path.append(state)
-        step = np.abs(corrected(state, slopes) - temperatures)
-        if np.all(step <= np.maximum(TOLERANCE, state.noise)):
+        temperatures = corrected(state, verdict.slopes)
+        if np.all(np.abs(temperatures - state.temperatures) <= np.maximum(TOLERANCE, state.noise)):
             break
-    return _result(balance, path, slopes, status, reason, gather)
+    return _result(balance, path, verdict.slopes, verdict.status, verdict.reason, gather)
+
+
+def steady_scene(scene: Scene, simulate: Simulate) -> Scene:
+    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none."""
+    verdict = verdict_of(Balance(scene, simulate))
+    if not verdict.steady:
+        raise RunError(f"temperatures: {verdict.status}: {verdict.reason}")
+    return at_temperatures(scene, Temperatures(*verdict.temperatures.tolist()))
 
 
 def _result(
@@ -246,7 +281,7 @@ def _result(
         temperatures_C=temperatures,
         thermal=record,
         scene=scene.model_dump(mode="json"),
-        cost={**result.cost, **work_done(balance.runs), "states": len(path)},
+        cost={**result.cost, **work_done(balance.runs), "balance_turns": balance.turns, "states": len(path)},
         notes=(*_notes(trial.hot, status, reason, ranges), *result.notes),
     )
 

@@ -99,6 +99,11 @@ class Lubricant(Sparse):
     together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
     roller_roughness, race_roughness = SI("um"), SI("um")
 
+    def unsaved(self) -> Mapping[str, Any]:
+        """Also the oil fraction that follows from a flow, because it would contradict another speed."""
+        follows = {} if self.oil_flow_l_min is None else {"oil_fraction": self.oil_fraction}
+        return {**self.UNSAVED, **follows}
+
     def faults(self) -> Iterator[str]:
         """Whether the oil is stated once: by name, by grade with base oil and index, or by a data sheet."""
         sheet = self.oil == "data_sheet"

@@ -213,3 +213,13 @@ def at_temperatures(scene: "Scene", temperatures: Temperatures) -> "Scene":
         tables["lubricant"]["viscosity_mPas"] = 1e3 * scene.lubricant.at(oil).viscosity
     tables["mounting"] |= part_temperatures(thermal, temperatures)
     return scene.from_dict(tables, f"the bearing at {oil:.4g} C")
+
+
+def simulated_scene(result: "SimulationResult", source: str = "scene") -> "Scene":
+    """The scene that a result ran, with [thermal] at the temperatures of its last state; messages name the ``source``."""
+    from rbdyn.scene import Scene
+
+    scene = Scene.from_dict(result.scene, source)
+    if result.thermal is None:
+        return scene
+    return at_temperatures(scene, Temperatures(**result.thermal["path_C"][-1]))
