@@ -129,3 +129,12 @@ def test_literature_reference_speeds():
     """Literature: SKF's friction heats a dozen NU bearings to 70 C at 0.5 to 2 times the catalogue's reference speeds."""
     ratios = [reference_speeds.row(f"NU {size}").ratio for size in reference_speeds.SIZES]
     assert len(ratios) == 12 and all(0.5 <= ratio <= 2.0 for ratio in ratios)
+
+
+def test_unit_table_of_reference_speeds(capsys, monkeypatch):
+    """Unit: the script prints a line for each size, and how many lie within its stated error."""
+    monkeypatch.setattr("sys.argv", ["reference_speeds.py", "--only", "204,320"])
+    reference_speeds.main()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("|")[1].strip() for line in lines[2:4]] == ["NU 204", "NU 320"]
+    assert lines[-1].endswith("2 of 2 within the stated factor of 2.")
