@@ -145,12 +145,14 @@ UNITS = {
     "s": "time", "Nm": "moment", "N_s_m": "damping", "m_s2": "gravity", "g": "mass", "g_mm": "unbalance", "kg_mm2": "inertia",
     "kg_m3": "density", "MPa": "eyring_stress", "1_GPa": "pressure_coefficient", "mPas": "viscosity", "C_mm2_s": "viscosities",
     "mm_um": "profile_table", "per_K": "expansion", "1e_6_K": "thermal_expansion", "percent": "smallest_difference",
+    "W_mK": "conductivity", "J_kgK": "heat_capacity",
 }  # fmt: skip
 SHOWN = {
     "percent": "%", "l_min": "L/min",
     "um": "µm", "C": "°C", "m_s": "m/s", "s_m": "s/m", "hz": "Hz", "N_m": "N/m", "turns": "shaft turns", "per_turn": "per shaft turn",
     "Nm": "N m", "N_s_m": "N s/m", "m_s2": "m/s²", "g_mm": "g mm", "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "1_GPa": "1/GPa", "mPas": "mPa s",
     "C_mm2_s": "°C, mm²/s", "mm_um": "mm, µm", "per_K": "1/K", "1e_6_K": "1e-6/K",
+    "W_mK": "W/(m K)", "J_kgK": "J/(kg K)",
 }  # fmt: skip
 
 
