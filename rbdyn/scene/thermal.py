@@ -15,6 +15,7 @@ from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
+    from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
