@@ -47,8 +47,8 @@ class Thermal(Strict):
     ambient_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C)] = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
     surface_factor: Positive = 1.0
-    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil. Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured
-    temperature."""
+    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
+    Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
     """Factor on the heat that housing and shaft carry off, 0.016 W/mm2 of the seats at 50 K above ambient as in ISO 15312. A
     plummer block in moving air carries off more, a hot housing nothing (0)."""
