@@ -1,6 +1,7 @@
 """Fatigue life, and makers' rules on friction and minimum load.
 
 - ``rollers``, ``balls``: ratings from dimensions (ISO 281, ISO 76) and life from the loads of each rolling element (ISO/TS 16281)
+- ``duty``: life over points with shares of the time (Palmgren and Miner), and the equivalent load
 - ``rollers`` also: minimum loads, SKF's friction model and the heat of ISO 15312
 
 This file has what both kinds of bearing share: the life in turns of one ring against the other and in hours, with the loads and
