@@ -15,8 +15,8 @@ from rbdyn.base.records import finite
 from rbdyn.life import Life
 
 BALL_EXPONENT, ROLLER_EXPONENT = 3.0, 10.0 / 3.0
-# Largest difference of the sum of shares from 1: shares of a table have three decimals.
-SHARE_ROUNDING = 0.002
+# Largest difference of the sum of shares from 1 that rounding explains.
+SHARE_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
