@@ -194,8 +194,8 @@ def reference_runs(study: Study) -> Runs | None:
 
 def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
     """Each response of both tables, with the linear effects on the surfaces through each table."""
-    assert study.file.reference is not None
     study, ours, theirs = study.of_figures, *(_of_figures(study, runs) for runs in (ours, theirs))
+    assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
     rows = []
@@ -218,7 +218,9 @@ def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[Publi
 def _of_figures(study: Study, runs: Runs) -> Runs:
     """Runs without the limits at points of a duty, which are the last responses."""
     columns = slice(len(study.figures))
-    replicates = runs.replicates if runs.replicates is None or runs.replicates.ndim == 1 else runs.replicates[:, columns]
+    replicates = (
+        runs.replicates if runs.replicates is None or runs.replicates.ndim == 1 else runs.replicates[:, columns]
+    )
     return replace(runs, values=runs.values[:, columns], errors=runs.errors[:, columns], replicates=replicates)
 
 
