@@ -1,5 +1,6 @@
 """The files of a study: summary.json, the report, answer.txt, tables and pictures; and its answer on the terminal."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
+from doe.duty import main_scene
 from doe.report.identity import study_identity
 from doe.report.page import html_report, markdown_report, notes, reference
 from doe.report.sections.answer import (
@@ -49,6 +51,8 @@ from rbdyn.base.workbook import write_workbook
 from rbdyn.result import versions, write_json
 
 FORMAT = "doe.study/1"
+# What the name of a file should not have; a limit at a point of a duty has a name with a colon.
+NO_WORD = re.compile(r"[^\w.-]+")
 # Shaft turns of the motion in the pictures.
 DRAWN_TURNS = 10.0
 
@@ -79,7 +83,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         save_table(rows, folder / name)
     pictures = []
     for surface in outcome.surfaces:
-        pictures.append(f"surface_{surface.name}.png")
+        pictures.append(f"surface_{NO_WORD.sub('_', surface.name)}.png")
         plots.response_surface(study, surface, folder / pictures[-1])
     plots.pareto_front(outcome, folder / "pareto_front.png")
     if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
@@ -165,6 +169,8 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
             "adaptive": study.file.adaptive.seed,
         },
     }
+    if outcome.duty is not None:
+        record["duty"] = outcome.duty.as_dict()
     if outcome.adaptive is not None:
         record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
     if outcome.searched_pick is not None:
@@ -207,7 +213,7 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
 
 def settings_record(study: Study) -> dict[str, Any]:
     """Scene, factors with their ranges, responses with their goals."""
-    scene = clearance.design_scenes(study, study.baseline[None])[0]
+    scene = main_scene(clearance.design_scenes(study, study.baseline[None])[0])
     return {
         "study_file": study.path.name,
         "scene_file": study.scene.file,

@@ -38,6 +38,7 @@ from doe.workflow.confirmation import (
     verdict_of,
     whirl_sentence,
 )
+from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
@@ -222,7 +223,7 @@ class StudyResult:
     "baseline" (without gains) and "pick" first. ``tries``: points simulated as the pick until one kept its limits.
 
     ``tolerances`` is None if the study asks for none. ``adaptive``, ``searched_pick`` and ``front_comparison`` are None
-    without the adaptive search, ``robust`` without the robust judgement.
+    without the adaptive search, ``robust`` without the robust judgement, ``duty`` without a duty.
     """
 
     study: Study
@@ -246,6 +247,7 @@ class StudyResult:
     failures: tuple[Failure, ...]
     notes: tuple[str, ...]
     cost: Mapping[str, float]
+    duty: DutyAnswer | None = None
 
     @property
     def baseline(self) -> Confirmed:
@@ -375,6 +377,7 @@ def run_study(
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *step_failures, *selection.failures),
         notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
+        duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
 

@@ -26,6 +26,8 @@ from doe.report.sections.record import (
     sizes,
 )
 from doe.study_file import Study
+from doe.study_file.duty import OverDuty
+from doe.study_file.sections import Goal
 from doe.workflow.confirmation import (
     LOSS,
     NOISE,
@@ -537,5 +539,8 @@ def asked_record(study: Study) -> dict[str, Any]:
             }
             for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
         ],
-        "responses": [response.model_dump() for response in study.file.response],
+        "responses": [
+            response.model_dump(exclude=set() if study.shares else set(OverDuty.model_fields) - set(Goal.model_fields))
+            for response in study.file.response
+        ],
     }
