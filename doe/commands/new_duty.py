@@ -74,7 +74,9 @@ def _assignments(values: dict[str, list[Any]], row: int) -> Iterator[str]:
 
 
 def _text(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
+    if isinstance(value, str):
+        return value
+    return str(value).lower() if isinstance(value, bool) else repr(value).removesuffix(".0")
 
 
 def _quoted(value: str | list[str]) -> str:
