@@ -21,6 +21,7 @@ from doe.report.sections.answer import (
 )
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
+from doe.report.sections.duty import duty_rows, figures
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
@@ -75,6 +76,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
+    if outcome.duty is not None:
+        tables["duty_points.csv"] = duty_rows(record)
     if outcome.robust is not None:
         tables |= robust_tables(record["robust"])
     if outcome.reference_values is not None:
@@ -121,6 +124,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
     details = [
         *in_few_runs(clean),
         changes(clean),
+        figures(clean),
         *chains(clean, {}).blocks,
         *reference(clean, {}).blocks,
         *diagnostics(clean, {}).blocks,

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from doe.report import still
-from doe.report.sections.record import Record
+from doe.report.sections.record import Record, response_label
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
 from doe.study_file import Study
@@ -55,7 +55,7 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        axis.set_zlabel(label(surface.name))
+        axis.set_zlabel(_label(study, surface.name))
         rest = [place for place in range(1, factors) if place != panel]
         named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
         fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
@@ -68,6 +68,11 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def _label(study: Study, name: str) -> str:
+    aggregates = {response.name: response.aggregate for response in study.file.response} if study.shares else {}
+    return response_label({"duty": {"aggregate": aggregates}}, name)
 
 
 def _bounds(study: Study, name: str) -> list[float]:
@@ -105,10 +110,10 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
                 axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
         for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
             for bound in _bounds(study, surfaces[response].name):
-                words = f"limit {label(surfaces[response].name)} {bound:g}" if number == 0 else ""
+                words = f"limit {_label(study, surfaces[response].name)} {bound:g}" if number == 0 else ""
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
-        axis.set_xlabel(label(surfaces[i].name))
-        axis.set_ylabel(label(surfaces[j].name))
+        axis.set_xlabel(_label(study, surfaces[i].name))
+        axis.set_ylabel(_label(study, surfaces[j].name))
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:

@@ -46,7 +46,7 @@ def test_command_line_writes_the_duty(tmp_path):
     assert {point["name"]: point["set"] for point in duty} == SETS
     assert [point["share"] for point in duty] == [0.2, 0.75, 0.05]
     plain = doe("new", str(EXAMPLE)).stdout
-    assert study == tomllib.loads(plain) and "duty" not in plain
+    assert study == tomllib.loads(plain) and "[[duty]]" not in plain
     (tmp_path / "study.toml").write_text(ran.stdout, encoding="utf-8")
     assert [point.name for point in Study.load(tmp_path / "study.toml").file.duty] == [*SETS]
 
