@@ -117,11 +117,10 @@ def over_duty(
     duty = Duty.of(study)
     if duty is None:
         return scene(())
-    sets = {point.name: point.set for point in study.file.duty}
     points, faults = dict[str, Scene](), dict[str, list[str]]()
-    for name in duty.shares:
+    for name, overrides in duty.overrides.items():
         try:
-            points[name] = scene(sets[name])
+            points[name] = scene(overrides)
         except InputError as error:
             faults[name] = error.faults
     # A fault at all points is none of the duty.
@@ -143,6 +142,18 @@ def baseline_scenes(study: Study) -> dict[str, Scene]:
         return {}
     run = over_duty(study, partial(_confirmation_scene, original, original.baseline))
     return dict(run.scenes) if isinstance(run, DutyScenes) else {}
+
+
+def duty_with_groups(study: Study) -> Duty | None:
+    """The duty of a study with its points that have one scene together; None without a duty. Raises InputError."""
+    duty = Duty.of(study)
+    if duty is None:
+        return None
+    (run,) = design_scenes(study, study.baseline[None])
+    keys, groups = [point.key for point in points_of(scenes_of(run), list(duty.shares))], dict[str, list[str]]()
+    for name, key in zip(duty.shares, keys, strict=True):
+        groups.setdefault(key, []).append(name)
+    return replace(duty, groups=tuple(map(tuple, groups.values())))
 
 
 def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Run]:

@@ -5,7 +5,7 @@ those with one scene are one, so that neither the order of the tables nor a poin
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,8 +16,8 @@ from doe.running.store import alike
 from doe.study_file import Study
 from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
-from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RunError
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import RunError, key_path
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -58,10 +58,17 @@ class Rule(NamedTuple):
 
 @dataclass(frozen=True)
 class Duty:
-    """Shares of the time by point, in the order of the names, and the rules of all responses by name of their figure."""
+    """Shares of the time and overrides by point, in the order of the names; rules of the responses by name of their figure.
+
+    ``limits``: point and figure of each response that is a limit at a point. ``groups``: names of points, those with one scene
+    together; empty where nobody has compared the scenes.
+    """
 
     shares: Mapping[str, float]
+    overrides: Mapping[str, Sequence[str]]
     rules: Mapping[str, Rule]
+    limits: tuple[tuple[str, str], ...] = ()
+    groups: tuple[tuple[str, ...], ...] = ()
 
     @classmethod
     def of(cls, study: Study) -> "Duty | None":
@@ -71,12 +78,22 @@ class Duty:
             for response in study.file.response
             if not isinstance(response, PointResponse)
         }
-        return cls(study.shares, rules) if study.shares else None
+        sets = {point.name: point.set for point in study.file.duty}
+        limits = [
+            (response.point, response.figure) for response in study.file.response if isinstance(response, PointResponse)
+        ]
+        overrides = {name: sets[name] for name in study.shares}
+        return cls(study.shares, overrides, rules, tuple(limits)) if study.shares else None
 
     @property
     def relative(self) -> bool:
         """Whether a response compares with the baseline."""
         return any(rule.aggregate == "worst_relative" for rule in self.rules.values())
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the scene that its points set."""
+        return [".".join(key_path(override)) for overrides in self.overrides.values() for override in overrides]
 
     @property
     def main(self) -> str:
@@ -87,6 +104,54 @@ class Duty:
     def columns(self) -> list[str]:
         """Names of all figures at all points, point by point."""
         return [at_point(point, figure) for point in self.shares for figure in self.rules]
+
+    def responses(self, outputs: Array, variances: Array, freedom: Whole, smooth: Array) -> tuple[Array, Array, Whole]:
+        """Responses of a study (p, n, m), their variances and degrees of freedom, of p designs at n input sets.
+
+        They follow from the figures at all points (p, n, c), in the order of `columns`, which have the same inputs in each row:
+        the worst point is that of the row. Its simulation takes the ``smooth`` variances, for those of a row's few replicates
+        scatter widely. Ratios are those to the first design.
+        """
+        shape = (*outputs.shape[:2], len(self.shares), len(self.rules))
+        whole = [array.reshape(shape) for array in (outputs, variances, freedom, smooth)]
+        names = list(self.shares)
+        places = [names.index(group[0]) for group in self.groups]
+        columns = [
+            self._response(rule, *(array[:, :, places, figure] for array in whole))
+            for figure, rule in enumerate(self.rules.values())
+        ]
+        figures = list(self.rules)
+        columns += [
+            tuple(array[:, :, names.index(point), figures.index(figure)] for array in whole[:3])
+            for point, figure in self.limits
+        ]
+        values, errors, degrees = (np.stack(arrays, axis=-1) for arrays in zip(*columns, strict=True))
+        return values, errors, degrees.astype(np.int64)
+
+    def _response(
+        self, rule: Rule, values: Array, variances: Array, freedom: Whole, smooth: Array
+    ) -> tuple[Array, ...]:
+        """A response (p, n) of its figure at groups of points (p, n, g)."""
+        from doe.aggregation import Estimates
+
+        if rule.aggregate == "worst_relative":
+            ratios = values / values[0]
+            variances, smooth = ((ours + ratios**2 * ours[0]) / values[0] ** 2 for ours in (variances, smooth))
+            # The first design is exactly 1 of itself.
+            values, variances[0], smooth[0] = ratios, 0.0, 0.0
+        if values.shape[2] == 1:
+            return values[..., 0], variances[..., 0], freedom[..., 0].astype(float)
+        normal = np.full(values.shape, np.inf)
+        parts = (variances, freedom.astype(float)) if rule.aggregate == "mean" else (smooth, normal)
+        flat = [array.reshape(-1, values.shape[2]) for array in (values, *parts)]
+        figure = rule.over(Estimates(flat[0], np.sqrt(flat[1]), flat[2]), self.weights(self.groups))
+        degrees = (
+            np.minimum(figure.freedom, freedom.sum(axis=2).ravel()) if rule.aggregate == "mean" else freedom.min(axis=2)
+        )
+        return tuple(
+            np.asarray(array).reshape(values.shape[:2])
+            for array in (figure.values, figure.errors**2, np.floor(degrees))
+        )
 
     def weights(self, groups: Sequence[Sequence[str]]) -> Array:
         """Shares (g,) of groups of points that are one."""
@@ -115,6 +180,24 @@ class DutyScenes:
 
 # What a study simulates at values of its factors: a scene, or one at each point of its duty.
 Run = Scene | DutyScenes
+
+
+def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene | str]]) -> list[Run | str]:
+    """Runs of ``scenes`` with the overrides of a point, or of none without a duty. A sentence in place of a scene replaces the run."""
+    if duty is None:
+        return [*scenes(())]
+    columns = [scenes(overrides) for overrides in duty.overrides.values()]
+    runs = list[Run | str]()
+    for row in zip(*columns, strict=True):
+        whole = {name: scene for name, scene in zip(duty.shares, row, strict=True) if isinstance(scene, Scene)}
+        faults = [f"at {name}: {one}" for name, one in zip(duty.shares, row, strict=True) if isinstance(one, str)]
+        runs.append(faults[0] if faults else DutyScenes(duty, whole))
+    return runs
+
+
+def points_in(duty: Duty | None) -> int:
+    """Simulations of a run: one at each point of a duty with another scene, one without a duty."""
+    return 1 if duty is None else len(duty.groups)
 
 
 def scenes_of(run: Run) -> list[Scene]:
@@ -239,6 +322,9 @@ class DutyResult:
     def jitters(self) -> bool:
         """Whether the cage only jitters at any point, so that its whirl there is none."""
         return any(result.jitters for result in self.points.values())
+
+
+Simulated = SimulationResult | DutyResult
 
 
 def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple[Quantity, Array]:
