@@ -32,7 +32,7 @@ POWER = "power_loss_W"
 
 def duty(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """The points of the duty with all figures there."""
-    blocks = [_points(summary), *at_points(summary), *_costs(summary), figures(summary)]
+    blocks = [_points(summary), *_costs(summary), figures(summary)]
     return Section("duty", "The duty", blocks) if part(summary, "duty") else None
 
 
