@@ -115,7 +115,7 @@ def flight(folder):
     for name in ("cylindrical_roller.toml", "duty_study.toml"):
         shutil.copy(EXAMPLES / name, folder)
     with (folder / "duty_study.toml").open("a", encoding="utf-8") as file:
-        file.write("\n[front]\npopulation = 40\ngenerations = 5\ndraws = 100\n")
+        file.write("\n[front]\ngenerations = 10\ndraws = 100\n")
     return folder / "duty_study.toml"
 
 
