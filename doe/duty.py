@@ -344,13 +344,13 @@ def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple
     odds = figure.odds[0]
     joint = math.floor(figure.freedom[0] + 1e-9) if np.isfinite(figure.freedom[0]) else None
     half = float(figure.errors[0] * quantile(np.array(joint or np.inf)))
-    numerical = [(share, part.numerical_error) for share, part in zip(odds.tolist(), parts, strict=True) if share > 0.0]
-    known = [share * error for share, error in numerical if error is not None]
+    possible = [(share, part) for share, part in zip(odds.tolist(), parts, strict=True) if share > 0.0]
+    known = [share * part.numerical_error for share, part in possible if part.numerical_error is not None]
     quantity = Quantity(
         float(figure.values[0]),
         half if math.isfinite(half) else None,
-        math.fsum(known) if len(known) == len(numerical) else None,
-        min(parts[place].effective_samples for place in counted),
+        math.fsum(known) if len(known) == len(possible) else None,
+        min(part.effective_samples for _, part in possible),
         joint,
     )
     return quantity, odds
