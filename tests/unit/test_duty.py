@@ -182,12 +182,19 @@ def test_the_optimum_of_the_mean_lies_between_those_of_the_points(tmp_path, monk
     text = ('model = "quadratic"\ngoal = "min"', 'model = "linear"\ngoal = "none"')
     front = ("generations = 5", "generations = 40")
     start = ("pocket_clearance_mm = 0.30", "pocket_clearance_mm = 0.36")
-    study = duty_study(tmp_path, duty, text, quadratic, front, start, ('tolerance_aware = "quantile"', ""))
+    mounted = ("bore_mm=27.0", "outside_diameter_mm=60.0", "housing_diameter_mm=80.0", "outer_ring_temperature_C=100.0")
+    keys = ", ".join(f'"mounting.{key}"' for key in (*mounted, "inner_ring_temperature_C=100.0"))
+    scene = ("set = [", f"set = [{keys}, ")
+    hot = duty.replace(SLOW, SLOW.replace("]", ', "mounting.inner_ring_temperature_C=120.0"]'))
+    study = duty_study(tmp_path, hot, scene, text, quadratic, front, start, ('tolerance_aware = "quantile"', ""))
     outcome = run_study(study, tmp_path, 1, lambda title: silent)
     place = study.factors.index("pocket_clearance_mm")
     assert outcome.pick.point[place] == pytest.approx(0.30, abs=0.006)
     alone = {point.name: point.own.point[place] for point in outcome.duty.points}
     assert alone == pytest.approx({"idle": 0.34, "cruise": 0.26}, abs=0.006)
+    # A hot inner ring takes of the radial clearance.
+    play = {name: point.operating["radial_clearance_mm"] for name, point in outcome.clearances_at_points.items()}
+    assert play["idle"]["pick"] < play["cruise"]["pick"] - 0.005
     # The compromise costs 1e4 (0.04 mm)^2 = 16 N of 116 N at either point.
     for point in outcome.duty.points:
         (cost,) = (gain for gain in point.own.gains if gain.response == "impact_force_N")
