@@ -205,6 +205,11 @@ def scenes_of(run: Run) -> list[Scene]:
     return [run] if isinstance(run, Scene) else list(run.scenes.values())
 
 
+def scene_at(run: Run, point: str) -> Scene:
+    """The scene of a run at a point of the duty; without one, its only scene."""
+    return run if isinstance(run, Scene) else run.scenes[point]
+
+
 def main_scene(run: Run) -> Scene:
     """The scene of a run that stands for it in a picture: over a duty, at the point with the largest share of the time."""
     return run if isinstance(run, Scene) else run.main

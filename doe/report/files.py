@@ -175,6 +175,8 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     }
     if outcome.duty is not None:
         record["duty"] = outcome.duty.as_dict()
+        for point in record["duty"]["points"]:
+            point["operating_clearances_mm"] = outcome.clearances_at_points[point["name"]].operating
     if outcome.adaptive is not None:
         record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
     if outcome.searched_pick is not None:

@@ -29,6 +29,8 @@ from rbdyn.result import read_json, versions
 
 # Typical wall times [s] of the surfaces with their front, and of the pick's tolerances with the chains.
 FRONT_S, TOLERANCES_S = 6.0, 1.0
+# Typical wall time [s] of the surfaces and the front of one point of a duty alone.
+OWN_PICK_S = 2.0
 # Typical wall time [s] of the emulators for a batch of an adaptive search.
 BATCH_S = 0.6
 DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
@@ -72,7 +74,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         stages.append(robust_stage(study))
     if study.file.tolerances is not None or study.file.chain:
         stages.append(Stage(TOLERANCES, besides_s=TOLERANCES_S))
-    return [*stages, Stage(ANSWER, besides_s=ANSWER_S)]
+    return [*stages, Stage(ANSWER, besides_s=ANSWER_S + OWN_PICK_S * len(study.shares))]
 
 
 def _stage_of(name: str, runs: int, run: Run, *titles: str, fewest: int, most: int | None = None) -> Stage:

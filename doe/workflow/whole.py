@@ -18,6 +18,7 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
+from doe.duty import scene_at
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
@@ -264,6 +265,16 @@ class StudyResult:
         """Clearances among the factors in operation, at baseline and pick."""
         points = scenes_of(self.study, self.baseline.point, self.pick.point)
         return operating_clearances(self.study, points)
+
+    @cached_property
+    def clearances_at_points(self) -> dict[str, OperatingClearances]:
+        """The same at each point of the duty, whose temperatures and speeds differ; empty without a duty."""
+        ends = {"baseline": (self.study.with_levels(()), self.baseline), "pick": (self.study, self.pick)}
+        runs = {name: clearance.confirmation_run(study, end.point) for name, (study, end) in ends.items()}
+        return {
+            point: operating_clearances(self.study, {name: scene_at(run, point) for name, run in runs.items()})
+            for point in self.study.shares
+        }
 
     @property
     def limits(self) -> list[Limit]:

@@ -182,12 +182,19 @@ def test_the_optimum_of_the_mean_lies_between_those_of_the_points(tmp_path, monk
     text = ('model = "quadratic"\ngoal = "min"', 'model = "linear"\ngoal = "none"')
     front = ("generations = 5", "generations = 40")
     start = ("pocket_clearance_mm = 0.30", "pocket_clearance_mm = 0.36")
-    study = duty_study(tmp_path, duty, text, quadratic, front, start, ('tolerance_aware = "quantile"', ""))
+    mounted = ("bore_mm=27.0", "outside_diameter_mm=60.0", "housing_diameter_mm=80.0", "outer_ring_temperature_C=100.0")
+    keys = ", ".join(f'"mounting.{key}"' for key in (*mounted, "inner_ring_temperature_C=100.0"))
+    scene = ("set = [", f"set = [{keys}, ")
+    hot = duty.replace(SLOW, SLOW.replace("]", ', "mounting.inner_ring_temperature_C=120.0"]'))
+    study = duty_study(tmp_path, hot, scene, text, quadratic, front, start, ('tolerance_aware = "quantile"', ""))
     outcome = run_study(study, tmp_path, 1, lambda title: silent)
     place = study.factors.index("pocket_clearance_mm")
     assert outcome.pick.point[place] == pytest.approx(0.30, abs=0.006)
     alone = {point.name: point.own.point[place] for point in outcome.duty.points}
     assert alone == pytest.approx({"idle": 0.34, "cruise": 0.26}, abs=0.006)
+    # A hot inner ring takes of the radial clearance.
+    play = {name: point.operating["radial_clearance_mm"] for name, point in outcome.clearances_at_points.items()}
+    assert play["idle"]["pick"] < play["cruise"]["pick"] - 0.005
     # The compromise costs 1e4 (0.04 mm)^2 = 16 N of 116 N at either point.
     for point in outcome.duty.points:
         (cost,) = (gain for gain in point.own.gains if gain.response == "impact_force_N")
@@ -418,3 +425,56 @@ def test_an_unknown_input_is_no_key_of_the_duty(tmp_path):
     study = duty_study(tmp_path, IDLE_AND_CRUISE, ("[front]", law))
     with pytest.raises(InputError, match="is a key of the duty too; remove it from one of them"):
         case_of_study(study)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("points", [2, 3, 6, 12])
+@pytest.mark.parametrize("apart", [0.0, 0.5, 1.5])
+def test_the_interval_of_the_worst_holds_the_truth_of_many_points(points, apart):
+    """Figures that lie ``apart`` by so many standard errors, one after the other; 2000 seeds."""
+    random, truth = np.random.default_rng(8), -apart * np.arange(points)
+    errors = np.sqrt(random.chisquare(9, (2000, points)) / 9)
+    worst = largest(Estimates(truth + random.standard_normal(errors.shape), errors, np.full(errors.shape, 9.0)))
+    caught = np.abs(worst.values - truth.max()) <= worst.errors * quantile(worst.freedom)
+    assert 0.92 <= caught.mean() <= 0.98
+
+
+@pytest.mark.slow
+def test_the_interval_of_the_worst_ratio_holds_the_truth():
+    """Ratios of 0.9 at either point, whose baseline scatters too; 1000 seeds."""
+    random, rule, caught = np.random.default_rng(3), Rule("worst_relative", "min", None), 0
+
+    def simulated(truth, share, freedom):
+        error = share * truth * math.sqrt(random.chisquare(freedom) / freedom)
+        value = truth * (1.0 + share * random.standard_normal())
+        return Quantity(value, error * float(stats.t.ppf(0.975, freedom)), 0.0, 10.0, freedom)
+
+    for _ in range(1000):
+        parts = {"a": simulated(90.0, 0.03, 7), "b": simulated(45.0, 0.03, 7)}
+        base = {"a": simulated(100.0, 0.02, 15), "b": simulated(50.0, 0.02, 15)}
+        ratio = quantities(result_of(rule, parts, {"a": 0.5, "b": 0.5}, base))["impact_force_N"]
+        caught += abs(ratio.value - 0.9) <= ratio.statistical_error
+    assert 0.92 <= caught / 1000 <= 0.98
+
+
+@pytest.mark.slow
+def test_a_search_and_a_robust_judgement_over_a_duty_are_the_same_with_any_workers(tmp_path):
+    """Short simulations of the example: worst and relative figures, a limit at a point, all steps of a study."""
+    inputs = (
+        '[robust]\npoints = 32\n[uncertain]\nset = ["numerics.turns=2", "numerics.discard_turns=1", "numerics.replicates=2", '
+        '"numerics.extend=false", "numerics.companion=false", "numerics.impact_window_turns=1"]\n'
+        '[adaptive]\nbudget = 40\nset = ["numerics.extend_limit=1"]\n[front]'
+    )
+    relative = (POWER, f'{POWER}upper = 245.0\naggregate = "worst_relative"\npoints = ["cruise"]\n')
+    keys = relative, (IMPACT, f'{IMPACT}aggregate = "worst"\n'), ("[front]", inputs)
+    found = []
+    for workers in (1, 2):
+        study = duty_study(tmp_path / str(workers), IDLE_AND_CRUISE, *keys)
+        options = {"adaptive": True, "robust": True}
+        outcome = run_study(study, study.path.parent, workers, lambda title: silent, **options)
+        record = summary(outcome)
+        stored_keys = set(rows(study.path.parent / "study.sqlite"))
+        found.append((stored_keys, *(json.dumps(record[key]) for key in ("gains", "limits", "duty", "robust"))))
+        assert record["robust"]["runs"] % 2 == 0
+        assert list(record["limits"]) == ["cruise: power_loss_W"]
+    assert found[0] == found[1]
