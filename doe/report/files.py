@@ -21,7 +21,7 @@ from doe.report.sections.answer import (
 )
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
-from doe.report.sections.duty import duty_rows, figures
+from doe.report.sections.duty import duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
@@ -95,6 +95,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(record, folder / pictures[-1])
+    if outcome.duty is not None and gain_stills(record):
+        pictures.append("duty_gains.png")
+        plots.duty_gains(record, folder / pictures[-1])
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from doe.report import still
+from doe.report.sections.duty import gain_stills
 from doe.report.sections.record import Record, response_label
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
@@ -84,6 +85,11 @@ def adaptive_search(record: Record, path: Path) -> None:
     """Hypervolume against runs compared with other fronts, and where each run was spent and why, of the record of a study."""
     progress, places = search_stills(record)
     still.save([*progress, *places], COLUMNS, path)
+
+
+def duty_gains(record: Record, path: Path) -> None:
+    """Gains at each point of a duty, of the record of a study."""
+    still.save(gain_stills(record), COLUMNS, path)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:

@@ -18,7 +18,7 @@ from rbdyn.scene import Scene
 def static_life(scene: Scene) -> ReferenceLife:
     """Reference life of ISO/TS 16281 at the operating clearance, by its laminae and its own line contact.
 
-    The load is the steady one in line with the rotating one, without a schedule. Gravity, form errors and a flexible support
+    The load is the steady one in line with the rotating one, of a schedule the largest. Gravity, form errors and a flexible support
     are left out. Edge stresses count where the roller has a profile, as in ``motion.rating_life``.
     """
     drawing, geometry = scene.bearing, scene.geometry

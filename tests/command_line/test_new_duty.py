@@ -108,3 +108,17 @@ def test_command_line_a_duty_that_no_study_takes(tmp_path, text, fault):
     """Command line: faults of the duty as a whole end it with 2, as those of the written study would."""
     ran = doe("new", str(EXAMPLE), "--duty", str(table(tmp_path, text)))
     assert ran.returncode == 2 and fault in ran.stderr and ran.stdout == ""
+
+
+@pytest.mark.slow
+def test_command_line_the_written_study_runs(tmp_path):
+    """Command line: the study as it is written, with short runs, ends with an answer at each of its points."""
+    path = table(tmp_path, TABLE)
+    text = doe("new", str(EXAMPLE), "--duty", str(path), "--limit", "cage_slip<=0.5").stdout
+    text = text.replace("turns=40", "turns=3").replace("discard_turns=20", "discard_turns=1").replace("=8", "=2")
+    text = text.replace('"numerics.companion=false"', '"numerics.companion=false", "numerics.extend=false"')
+    text = text.replace("replicates = 16", "replicates = 2")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    ran = doe("study", str(tmp_path / "study.toml"), "--out", str(tmp_path / "study"))
+    assert ran.returncode == 0, ran.stderr
+    assert all(f"{name}: cage slip" in ran.stdout for name in SETS)

@@ -9,7 +9,7 @@ from synthetic_study import FACTORS, RESPONSES, summary
 
 from doe.report.files import answer_text, blocks
 from doe.report.page import page_data, sections
-from doe.report.sections.duty import at_points, duty_rows
+from doe.report.sections.duty import at_points, duty_rows, gain_stills
 from doe.report.sections.record import drop_undefined, readable
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
@@ -148,6 +148,43 @@ def test_life_and_energy_over_the_duty():
     for entry in record["duty"]["points"]:
         del entry["pick"][POWER]
     assert not any(text.startswith(("Life", "Energy")) for text in sentences(record))
+
+
+def test_mean_slip_is_weighted_by_the_shares():
+    """Closed form: 0.25 * 0.02 + 0.7 * 0.01 + 0.05 * 0.04 = 0.014 at the baseline; errors as of independent parts."""
+    record = over_duty()
+    for entry, slip in zip(record["duty"]["points"], (0.02, 0.01, 0.04), strict=True):
+        entry["baseline"]["cage_slip"] = {"value": slip, "statistical_error": 0.001, "numerical_error": None}
+        entry["pick"]["cage_slip"] = {"value": 0.5 * slip, "statistical_error": 0.001, "numerical_error": None}
+    (text,) = (text for text in sentences(record) if "Mean cage slip" in text)
+    assert text.endswith(
+        "Mean cage slip by shares of the time: 0.01400 ± 0.00074 at the baseline, 0.00700 ± 0.00074 at the pick."
+    )
+
+
+def test_gains_are_drawn_at_each_point_and_over_the_duty():
+    """Unit: a picture a response with a goal, a row a point and one over the duty; long names are cut."""
+    record = over_duty()
+    record["duty"]["points"][0]["name"] = "idle " * 20
+    first, second = gain_stills(record)
+    assert first.words == "Gain in impact force at 3 points of the duty" and first.height == second.height
+    svg = first.svg()
+    assert all(f">{name}<" in svg for name in ("cruise", "take-off", "over the duty"))
+    assert svg.count('class="mark"') == 4 and "idle " * 20 not in svg
+    assert gain_stills(summary()) == []
+
+
+def test_clearances_in_operation_stand_at_each_point():
+    """Unit: where temperatures change them each point has its own, at baseline and pick; else no such table."""
+    record = over_duty()
+    assert "Clearances in operation" not in str(sections(drop_undefined(record)))
+    for entry, play in zip(record["duty"]["points"], (0.01, 0.02, 0.03), strict=True):
+        entry["operating_clearances_mm"] = {FACTORS[0]: {"baseline": play, "pick": play + 0.001}}
+    (chapter,) = (part for part in sections(drop_undefined(record)) if part.key == "duty")
+    (table,) = (
+        block for block in chapter.blocks if getattr(block, "caption", "").startswith("Clearances in operation")
+    )
+    assert [row[1:] for row in table.rows] == [["0.0100", "0.0110"], ["0.0200", "0.0210"], ["0.0300", "0.0310"]]
 
 
 def test_a_ratio_has_no_unit_anywhere():

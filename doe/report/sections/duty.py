@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from doe.report.sections.record import (
     LIMITS,
@@ -16,23 +17,34 @@ from doe.report.sections.record import (
     signed,
     value_text,
 )
-from rbdyn.base.blocks import Block, Detail, Paragraph, Section, Table
+from doe.report.still import COLOURS, GUIDE, Still, name_marks
+from rbdyn.base.blocks import Block, Detail, Figures, Paragraph, Section, Table
+from rbdyn.base.faults import one_line
 from rbdyn.base.words import chance, label, quantity, shown, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # The figure over all points, by its aggregate.
 OVER_DUTY = {
     "mean": "the mean by shares of the time",
-    "worst": "that of the worst point",
+    "worst": "the worst point",
     "worst_relative": "the worst ratio to the baseline at the same point",
 }
+OPERATING = "operating_clearances_mm"
 # Verdicts on limits, the worst first.
 WORST_FIRST = ("broken", "undecided", "kept")
-POWER = "power_loss_W"
+POWER, SLIP = "power_loss_W", "cage_slip"
+# Of a picture of gains [pt]: height of a row, of all else, and width of a letter of a name.
+ROW, AROUND, LETTER = 26.0, 64.0, 6.0
+LONGEST = 24  # letters of a name in a picture
 
 
 def duty(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """The points of the duty with all figures there."""
-    blocks = [_points(summary), *_costs(summary), figures(summary)]
+    caption = "Gain of the pick over the baseline at each point, and over the duty, with 95 % intervals."
+    pictures = Figures([still.svg for still in gain_stills(summary)], caption, "duty")
+    blocks = [_points(summary), pictures, *_costs(summary), *_clearances(summary), figures(summary)]
     return Section("duty", "The duty", blocks) if part(summary, "duty") else None
 
 
@@ -52,7 +64,7 @@ def at_points(summary: Record) -> list[Block]:
         Paragraph(_worst(summary)),
         Paragraph(_dearest(points)),
         Paragraph(_life(summary)),
-        Paragraph(_energy(summary)),
+        Paragraph(_energy(points)),
     ]
 
 
@@ -78,7 +90,7 @@ def _aggregates(summary: Record) -> str:
     groups: dict[str, list[str]] = {}
     for name, aggregate in (part(summary, "duty", "aggregate") or {}).items():
         groups.setdefault(aggregate, []).append(quantity(name)[0])
-    parts = [f"{' and '.join(names)} {OVER_DUTY[aggregate]}" for aggregate, names in groups.items()]
+    parts = [f"for {' and '.join(names)} {OVER_DUTY[aggregate]}" for aggregate, names in groups.items()]
     return f"Over the duty: {'; '.join(parts)}." if parts else ""
 
 
@@ -140,27 +152,31 @@ def _life(summary: Record) -> str:
     )
 
 
-def _energy(summary: Record) -> str:
-    """Energy lost in an hour of the duty, where the power loss is a response."""
-    points = part(summary, "duty", "points") or []
-    means = [mean for name in ("baseline", "pick") if (mean := _mean_power(points, name)) is not None]
-    if len(means) < 2:
-        return ""
-    before, after = (with_error(*mean) for mean in means)
-    return f"Energy lost in an hour of the duty: {before} Wh at the baseline, {after} Wh at the pick."
+def _energy(points: Sequence[Record]) -> str:
+    """Energy lost in an hour of the duty, and mean cage slip, where these are responses."""
+    power, slip = (_means(points, name) for name in (POWER, SLIP))
+    sentences = []
+    if power:
+        sentences.append(
+            f"Energy lost in an hour of the duty: {power[0]} Wh at the baseline, {power[1]} Wh at the pick."
+        )
+    if slip:
+        sentences.append(f"Mean cage slip by shares of the time: {slip[0]} at the baseline, {slip[1]} at the pick.")
+    return " ".join(sentences)
 
 
-def _mean_power(points: Sequence[Record], end: str) -> tuple[float, float | None] | None:
-    """Mean power loss [W] by shares of the time with its half-width; None where a point lacks it."""
-    powers = [(point["share"], part(point, end, POWER)) for point in points if point["share"] > 0.0]
-    if not powers or any(power is None for _, power in powers):
-        return None
-    mean, halves = (
-        math.fsum(share * power["value"] for share, power in powers),
-        [half_width(power) for _, power in powers],
-    )
-    known = [share * half for (share, _), half in zip(powers, halves, strict=True) if half is not None]
-    return mean, math.hypot(*known) if len(known) == len(powers) else None
+def _means(points: Sequence[Record], name: str) -> list[str]:
+    """Means of a figure at baseline and pick by shares of the time, with their half-widths; none where a point lacks it."""
+    means = []
+    for end in ("baseline", "pick"):
+        shares = [(point["share"], part(point, end, name)) for point in points if point["share"] > 0.0]
+        if not shares or any(value is None for _, value in shares):
+            return []
+        halves = [(share, half_width(value)) for share, value in shares]
+        known = [share * half for share, half in halves if half is not None]
+        mean = math.fsum(share * value["value"] for share, value in shares)
+        means.append(with_error(mean, math.hypot(*known) if len(known) == len(shares) else None))
+    return means
 
 
 def _points(summary: Record) -> Table:
@@ -198,6 +214,55 @@ def _costs(summary: Record) -> Iterator[Block]:
     note = f"Change from the study's pick to that of the point alone, on the surfaces of its runs. {SIGNS_NOTE}"
     yield Table("What the compromise costs", header, rows, note)
     yield from (Paragraph(point["own_note"]) for point in points if point.get("own_note"))
+
+
+def _clearances(summary: Record) -> Iterator[Block]:
+    """Clearances in operation at every point, where fits, temperatures or rotation change them."""
+    points = part(summary, "duty", "points") or []
+    columns = [factor for factor in factors(summary) if any(part(one, OPERATING, factor.name) for one in points)]
+    rows = [
+        [
+            point["name"],
+            *(
+                factor.text(part(point, OPERATING, factor.name, end))
+                for factor in columns
+                for end in ("baseline", "pick")
+            ),
+        ]
+        for point in points
+    ]
+    header = ("point", *(f"{label(factor.name)}, {end}" for factor in columns for end in ("baseline", "pick")))
+    yield Table("Clearances in operation at every point", header, rows if columns else [])
+
+
+def gain_stills(summary: Record) -> list[Still]:
+    """A picture a response with a goal: its gain at each point and over the duty."""
+    points = part(summary, "duty", "points") or []
+    stills = []
+    for name in _with_goal(points):
+        gains = {point["name"]: part(point, "gains", name) for point in points}
+        gains |= {"over the duty": part(summary, "gains", name)}
+        rows = [
+            (one_line(row, LONGEST), gain) for row, gain in gains.items() if gain and gain.get("percent") is not None
+        ]
+        words = f"Gain in {quantity(name)[0]} at {len(points)} points of the duty"
+        width = LETTER * max((len(row) for row, _ in rows), default=0)
+        still = Still(words, partial(_gains, name, rows), height=AROUND + ROW * len(rows), left_margin=width + 16.0)
+        stills += [still] if rows else []
+    return stills
+
+
+def _gains(name: str, rows: Sequence[tuple[str, Record]], axis: "Axes") -> None:
+    """Gains with their intervals, the first row above."""
+    for place, (row, gain) in enumerate(rows):
+        half = gain.get("error_percent") or 0.0
+        axis.plot([gain["percent"] - half, gain["percent"] + half], [place, place], color=COLOURS["blue"])
+        marker = "D" if place == len(rows) - 1 else "o"
+        (mark,) = axis.plot([gain["percent"]], [place], marker, color=COLOURS["blue"])
+        name_marks(mark, "mark", [f"{row}: {change(gain)}"])
+    axis.axvline(0.0, **GUIDE)
+    axis.set_yticks(range(len(rows)), [row for row, _ in rows])
+    axis.set(ylim=(len(rows) - 0.5, -0.5), xlabel=f"gain in {quantity(name)[0]} [%]")
 
 
 def figures(summary: Record) -> Table:
