@@ -21,7 +21,7 @@ from doe.report.sections.answer import (
 )
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
-from doe.report.sections.duty import duty_rows, figures, gain_stills
+from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
@@ -127,6 +127,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
     details = [
         *in_few_runs(clean),
         changes(clean),
+        *costs(clean),
         figures(clean),
         *chains(clean, {}).blocks,
         *reference(clean, {}).blocks,

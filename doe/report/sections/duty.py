@@ -44,7 +44,7 @@ def duty(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """The points of the duty with all figures there."""
     caption = "Gain of the pick over the baseline at each point, and over the duty, with 95 % intervals."
     pictures = Figures([still.svg for still in gain_stills(summary)], caption, "duty")
-    blocks = [_points(summary), pictures, *_costs(summary), *_clearances(summary), figures(summary)]
+    blocks = [_points(summary), pictures, *costs(summary), *_clearances(summary), figures(summary)]
     return Section("duty", "The duty", blocks) if part(summary, "duty") else None
 
 
@@ -197,7 +197,7 @@ def _points(summary: Record) -> Table:
     return Table("Points of the duty", header, rows, note if any(lives) else "", text_columns=(2,))
 
 
-def _costs(summary: Record) -> Iterator[Block]:
+def costs(summary: Record) -> Iterator[Block]:
     """The pick of each point alone, and by how much it is better there than the study's pick."""
     points = part(summary, "duty", "points") or []
     names, columns = _with_goal(points), factors(summary)
