@@ -11,11 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from doe.duty import Duty, DutyResult, DutyScenes, Run, main_scene, scenes_of
 from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
 from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
@@ -52,7 +54,7 @@ def check_responses(study: Study) -> None:
     """Raises InputError for a response that is no figure of the simulation."""
     refuse(
         f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
-        for name in study.responses
+        for name in study.figures
         if name not in RESPONSES
     )
 
@@ -102,7 +104,59 @@ def assignments(study: Study, factors: Array) -> list[str]:
     ]
 
 
-def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
+def over_duty(
+    study: Study,
+    scene: Callable[[Sequence[str]], Scene],
+    baseline: Mapping[str, Scene] | None = None,
+    baseline_errors: bool = False,
+) -> Run:
+    """A run of a study: ``scene`` of no further overrides, or of those at each point of the duty.
+
+    ``baseline`` and ``baseline_errors``: as of `DutyScenes`. Raises InputError, which names the point with an impossible scene.
+    """
+    duty = Duty.of(study)
+    if duty is None:
+        return scene(())
+    points, faults = dict[str, Scene](), dict[str, list[str]]()
+    for name, overrides in duty.overrides.items():
+        try:
+            points[name] = scene(overrides)
+        except InputError as error:
+            faults[name] = error.faults
+    # A fault at all points is none of the duty.
+    everywhere = set.intersection(*map(set, faults.values())) if len(faults) == len(duty.shares) else set[str]()
+    at_points = [
+        f"{study.path}: duty.set of {name}: {fault}"
+        for name, sentences in faults.items()
+        for fault in sentences
+        if fault not in everywhere
+    ]
+    refuse([*sorted(everywhere), *at_points])
+    return DutyScenes(duty, points, baseline or {}, baseline_errors)
+
+
+def baseline_scenes(study: Study) -> dict[str, Scene]:
+    """Scenes of the confirmation of the original design by point of the duty, if any response compares with them; else none."""
+    duty, original = Duty.of(study), study.with_levels(())
+    if duty is None or not duty.relative:
+        return {}
+    run = over_duty(study, partial(_confirmation_scene, original, original.baseline))
+    return dict(run.scenes) if isinstance(run, DutyScenes) else {}
+
+
+def duty_with_groups(study: Study) -> Duty | None:
+    """The duty of a study with its points that have one scene together; None without a duty. Raises InputError."""
+    duty = Duty.of(study)
+    if duty is None:
+        return None
+    (run,) = design_scenes(study, study.baseline[None])
+    keys, groups = [point.key for point in points_of(scenes_of(run), list(duty.shares))], dict[str, list[str]]()
+    for name, key in zip(duty.shares, keys, strict=True):
+        groups.setdefault(key, []).append(name)
+    return replace(duty, groups=tuple(map(tuple, groups.values())))
+
+
+def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Run]:
     """Scenes of the design runs (n, k); runs at one point differ only by their seed.
 
     ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. Raises
@@ -110,8 +164,13 @@ def design_scenes(study: Study, points: Array, order: Sequence[int] | None = Non
     """
     data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
-    numbered = zip(places, points, strict=True)
-    return [_scene_in_region(study, data, point, first + place, overrides) for place, point in numbered]
+    baseline = baseline_scenes(study)
+
+    def run(place: int, point: Array) -> Run:
+        seed = first + place
+        return over_duty(study, lambda sets: _scene_in_region(study, data, point, seed, [*overrides, *sets]), baseline)
+
+    return [run(place, point) for place, point in zip(places, points, strict=True)]
 
 
 def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int, overrides: Sequence[str]) -> Scene:
@@ -130,21 +189,44 @@ def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int
         ) from None
 
 
+def confirmation_run(study: Study, point: Array) -> Run:
+    """Scenes of a confirmation run: more replicates, fresh seeds."""
+    return over_duty(study, partial(_confirmation_scene, study, point), baseline_scenes(study), baseline_errors=True)
+
+
 def confirmation_scene(study: Study, point: Array) -> Scene:
-    """Scene of a confirmation run: more replicates, fresh seeds."""
+    """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""
+    return main_scene(confirmation_run(study, point))
+
+
+def _confirmation_scene(study: Study, point: Array, sets: Sequence[str]) -> Scene:
     settings, seed = study.file.confirmation, study.file.design.seed + CONFIRMATION_SEEDS
     effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-    return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *effort, *settings.set])
+    return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *sets, *effort, *settings.set])
 
 
-def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
+def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Run]:
     """Scenes of runs (n, k) of an adaptive search, numbered from ``first``, each with its own replicates and seed."""
     data, adaptive = read_scene(study), study.file.adaptive
-    usual = scene_at(study, data, study.baseline, adaptive.seed, study.scene.set).numerics.extend_limit
+    usual = _usual_extension(study, data)
     shared = ["numerics.companion=false", f"numerics.extend_limit={min(usual, ADAPTIVE_EXTENDED)!r}", *adaptive.set]
-    overrides = [[*study.scene.set, f"numerics.replicates={count}", *shared] for count in replicates]
-    runs = enumerate(zip(points, overrides, strict=True), adaptive.seed + ADAPTIVE_SEEDS + first)
-    return [scene_at(study, data, point, seed, keys) for seed, (point, keys) in runs]
+    baseline = baseline_scenes(study)
+
+    def run(seed: int, point: Array, count: int) -> Run:
+        effort = [f"numerics.replicates={count}", *shared]
+        return over_duty(
+            study, lambda sets: scene_at(study, data, point, seed, [*study.scene.set, *sets, *effort]), baseline
+        )
+
+    seeds = range(adaptive.seed + ADAPTIVE_SEEDS + first, adaptive.seed + ADAPTIVE_SEEDS + first + len(points))
+    return [run(*numbered) for numbered in zip(seeds, points, replicates, strict=True)]
+
+
+def _usual_extension(study: Study, data: dict[str, Any]) -> float:
+    """Factor by which runs with drifting figures may become longer, the least over the duty."""
+    seed, overrides = study.file.adaptive.seed, study.scene.set
+    run = over_duty(study, lambda sets: scene_at(study, data, study.baseline, seed, [*overrides, *sets]))
+    return min(scene.numerics.extend_limit for scene in scenes_of(run))
 
 
 @dataclass(frozen=True)
@@ -169,19 +251,37 @@ class Simulations:
         """Shaft turns of all requested runs, whether simulated now or stored before."""
         return sum(self.turns_of.values())
 
+    @overload
     def run(
         self,
-        scenes: Sequence[Scene],
+        runs: Sequence[Scene],
         labels: Sequence[str],
         progress: Progress,
         factors: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[SimulationResult | Failure]:
-        """Results or failures of scenes, in their order, from the store or simulated.
+    ) -> list[SimulationResult | Failure]: ...
+
+    @overload
+    def run(
+        self,
+        runs: Sequence[Run],
+        labels: Sequence[str],
+        progress: Progress,
+        factors: Sequence[Mapping[str, float]] | None = None,
+    ) -> list[SimulationResult | DutyResult | Failure]: ...
+
+    def run(
+        self,
+        runs: Sequence[Run],
+        labels: Sequence[str],
+        progress: Progress,
+        factors: Sequence[Mapping[str, float]] | None = None,
+    ) -> list[Any]:
+        """Results or failures of runs, in their order, from the store or simulated. A run fails where any of its points fails.
 
         ``factors``: those of design runs, which are then numbered. Raises RunError if the store cannot be written, InputError
         without the cluster, KeyboardInterrupt on Ctrl-C, always with all finished runs stored.
         """
-        points = points_of(scenes, labels, factors)
+        points, scenes = points_of(runs, labels, factors), every_scene(runs)
         if self.scheduler is None:
             by_key = dict(zip((point.key for point in points), scenes, strict=True))
             engine: Engine = partial(
@@ -200,7 +300,50 @@ class Simulations:
         for point, result in zip(points, results, strict=True):
             if isinstance(result, SimulationResult):
                 self.turns_of[point.key] = float(result.cost.get("turns", 0.0))
-        return results
+        rest = zip(points, results, strict=True)
+        return [
+            _over_points(run, label, list(islice(rest, len(_parts(run)))))
+            for run, label in zip(runs, labels, strict=True)
+        ]
+
+
+def _parts(run: Run) -> list[tuple[str, Scene]]:
+    """Scenes of a run with what their labels say besides that of the run: those of its baseline first."""
+    if isinstance(run, Scene):
+        return [("", run)]
+    baseline = [(f"baseline at {name}", scene) for name, scene in run.baseline.items()]
+    return baseline + [(f"at {name}", scene) for name, scene in run.scenes.items()]
+
+
+def every_scene(runs: Sequence[Run]) -> list[Scene]:
+    """Scenes of runs, those over a duty point by point, in the order of `points_of`."""
+    return [scene for run in runs for _, scene in _parts(run)]
+
+
+def _over_points(
+    run: Run, label: str, outcomes: Sequence[tuple[Point, SimulationResult | Failure]]
+) -> SimulationResult | DutyResult | Failure:
+    """Result of a run of those of its scenes; the failure of any of them names its point."""
+    results = [result for _, result in outcomes]
+    if isinstance(run, Scene):
+        return results[0]
+    words = [words for words, _ in _parts(run)]
+    causes = [f"{where}: {part.cause}" for where, part in zip(words, results, strict=True) if isinstance(part, Failure)]
+    last = outcomes[-1][0]
+    if causes:
+        return Failure(label, "; ".join(dict.fromkeys(causes)), last.run, dict(last.factors))
+    sound = [result for result in results if isinstance(result, SimulationResult)]
+    ours, names = len(run.baseline), list(run.scenes)
+    groups = dict[str, list[str]]()
+    for name, (point, _) in zip(names, outcomes[ours:], strict=True):
+        groups.setdefault(point.key, []).append(name)
+    return DutyResult(
+        run.duty,
+        dict(zip(names, sound[ours:], strict=True)),
+        tuple(map(tuple, groups.values())),
+        dict(zip(run.baseline, sound[:ours], strict=True)),
+        run.baseline_errors,
+    )
 
 
 def work_of(scene: Scene) -> float:
@@ -234,15 +377,20 @@ def probe(scene: Scene) -> Measured:
 
 
 def points_of(
-    scenes: Sequence[Scene], labels: Sequence[str], factors: Sequence[Mapping[str, float]] | None = None
+    runs: Sequence[Run], labels: Sequence[str], factors: Sequence[Mapping[str, float]] | None = None
 ) -> list[Point]:
-    """Scenes as points of the store; those with factors are design runs, numbered from 1."""
-    version = code_version(SIMULATION)
-    keys = [run_key(scene.model_dump(mode="json"), version) for scene in scenes]
-    if factors is None:
-        return [Point(key, label) for key, label in zip(keys, labels, strict=True)]
-    numbers = range(1, len(keys) + 1)
-    return [Point(*fields) for fields in zip(keys, labels, numbers, factors, strict=True)]
+    """Scenes of runs as points of the store; those with factors are design runs, numbered from 1."""
+    version, keys = code_version(SIMULATION), dict[int, str]()
+    points = []
+    for place, (run, label) in enumerate(zip(runs, labels, strict=True)):
+        for words, scene in _parts(run):
+            # Runs share the scenes of the baseline.
+            if (key := keys.get(id(scene))) is None:
+                key = keys[id(scene)] = run_key(scene.model_dump(mode="json"), version)
+            place_words = f"{label} {words}".rstrip()
+            numbered = () if factors is None else (place + 1, factors[place])
+            points.append(Point(key, place_words, *numbered))
+    return points
 
 
 def sound(result: dict[str, Any]) -> bool:
@@ -351,7 +499,7 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
     Each has the shape (runs, responses). The value of a response that a run does not report is NaN.

@@ -1,5 +1,6 @@
 """The files of a study: summary.json, the report, answer.txt, tables and pictures; and its answer on the terminal."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
+from doe.duty import main_scene
 from doe.report.identity import study_identity
 from doe.report.page import html_report, markdown_report, notes, reference
 from doe.report.sections.answer import (
@@ -19,6 +21,7 @@ from doe.report.sections.answer import (
 )
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
+from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
@@ -49,6 +52,8 @@ from rbdyn.base.workbook import write_workbook
 from rbdyn.result import versions, write_json
 
 FORMAT = "doe.study/1"
+# What the name of a file should not have; a limit at a point of a duty has a name with a colon.
+NO_WORD = re.compile(r"[^\w.-]+")
 # Shaft turns of the motion in the pictures.
 DRAWN_TURNS = 10.0
 
@@ -71,6 +76,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
+    if outcome.duty is not None:
+        tables["duty_points.csv"] = duty_rows(record)
     if outcome.robust is not None:
         tables |= robust_tables(record["robust"])
     if outcome.reference_values is not None:
@@ -79,7 +86,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         save_table(rows, folder / name)
     pictures = []
     for surface in outcome.surfaces:
-        pictures.append(f"surface_{surface.name}.png")
+        pictures.append(f"surface_{NO_WORD.sub('_', surface.name)}.png")
         plots.response_surface(study, surface, folder / pictures[-1])
     plots.pareto_front(outcome, folder / "pareto_front.png")
     if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
@@ -88,6 +95,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(record, folder / pictures[-1])
+    if outcome.duty is not None and gain_stills(record):
+        pictures.append("duty_gains.png")
+        plots.duty_gains(record, folder / pictures[-1])
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
@@ -117,6 +127,8 @@ def blocks(record: dict[str, Any]) -> list[Block]:
     details = [
         *in_few_runs(clean),
         changes(clean),
+        *costs(clean),
+        figures(clean),
         *chains(clean, {}).blocks,
         *reference(clean, {}).blocks,
         *diagnostics(clean, {}).blocks,
@@ -165,6 +177,10 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
             "adaptive": study.file.adaptive.seed,
         },
     }
+    if outcome.duty is not None:
+        record["duty"] = outcome.duty.as_dict()
+        for point in record["duty"]["points"]:
+            point["operating_clearances_mm"] = outcome.clearances_at_points[point["name"]].operating
     if outcome.adaptive is not None:
         record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
     if outcome.searched_pick is not None:
@@ -207,7 +223,7 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
 
 def settings_record(study: Study) -> dict[str, Any]:
     """Scene, factors with their ranges, responses with their goals."""
-    scene = clearance.design_scenes(study, study.baseline[None])[0]
+    scene = main_scene(clearance.design_scenes(study, study.baseline[None])[0])
     return {
         "study_file": study.path.name,
         "scene_file": study.scene.file,

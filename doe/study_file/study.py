@@ -17,24 +17,15 @@ from pydantic import Field, model_validator
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.study_file.decimal_marks import is_like_number
-from doe.study_file.sections import (
-    Adaptive,
-    Category,
-    Design,
-    Factor,
-    Front,
-    Goal,
-    Name,
-    Robust,
-    StudyChain,
-    Tolerances,
-)
+from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
+from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Robust, StudyChain, Tolerances
 from doe.study_file.table import COUNT, DATE, LABELS, Column, Sheet, listed, quoted, read_sheet, table_of
 from doe.study_file.workbook import split_path
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
     InputError,
+    Name,
     Number,
     Strict,
     assignment_faults,
@@ -43,6 +34,7 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
+from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 FORMER_TABLE = (
@@ -50,6 +42,7 @@ FORMER_TABLE = (
 )
 
 MOST_FACTORS = 8
+REPLICATES = ("numerics", "replicates")
 
 
 class SceneFile(Strict):
@@ -72,11 +65,26 @@ class Fitted(Strict):
     """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
 
 
-class Response(Fitted, Goal):
+class Response(Fitted, OverDuty):
     """A response of the simulation, the fit of its surface, its goal and its limits."""
 
     name: Name
     """Name of the response: a figure of the simulation, or a column of the table."""
+
+
+class PointResponse(Response):
+    """A limited ``figure`` of the simulation at one ``point`` of the duty, without a goal."""
+
+    figure: str
+    """Name of the figure."""
+    point: str
+    """Name of the point."""
+
+    @classmethod
+    def of(cls, response: Response, point: str) -> Self:
+        """The limits of a response at a point."""
+        keys = response.model_dump(include={*Fitted.model_fields, "lower", "upper"})
+        return cls(name=at_point(point, response.name), goal="none", figure=response.name, point=point, **keys)
 
 
 class Confirmation(Strict):
@@ -109,6 +117,10 @@ class StudyFile(Consistent):
 
     scene: SceneFile | None = None
     """The scene of all runs; none if all runs come from a table."""
+    duty: list[DutyPoint] = []
+    """Points of operation at which every run is simulated, up to 12; without them the scene's own is the only one."""
+    normalise_shares: bool = False
+    """Whether the shares of the duty may have any sum, such as hours: they are then divided by it."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """The factors."""
     category: Annotated[list[Category], Field(max_length=3)] = []
@@ -191,6 +203,9 @@ class StudyFile(Consistent):
             for chain in self.chain
             if chain.factor not in names
         ]
+        named = {response.name: response for response in self.response}
+        claims = _claims(keys) | {REPLICATES: "each kind of run has its own number of them; leave it out"}
+        faults += duty_faults(self.duty, named, self.normalise_shares, claims, self.scene is not None)
         return [*faults, *self._gain_faults(), *self._key_faults(keys), *self._set_faults(keys)]
 
     def _gain_faults(self) -> Iterator[str]:
@@ -220,17 +235,21 @@ class StudyFile(Consistent):
 
     def _set_faults(self, keys: Sequence[str]) -> list[str]:
         """Faults of overrides that no run would have."""
-        claims = {tuple(key.split(".")): "is a factor, whose value each run has; leave it out" for key in keys}
-        claims |= {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
-        replicates = ("numerics", "replicates")
+        claims = _claims(keys)
         own_claims: dict[str, dict[tuple[str, ...], str]] = {
-            "confirmation": {replicates: "confirmation.replicates says it; write it there"},
-            "adaptive": {replicates: "the search chooses it for each run; leave it out"},
+            "confirmation": {REPLICATES: "confirmation.replicates says it; write it there"},
+            "adaptive": {REPLICATES: "the search chooses it for each run; leave it out"},
         }
         faults = assignment_faults("scene.set", self.scene.set, claims) if self.scene else []
         for name, more in own_claims.items():
             faults += assignment_faults(f"{name}.set", getattr(self, name).set, claims | more)
         return faults
+
+
+def _claims(keys: Sequence[str]) -> dict[tuple[str, ...], str]:
+    """Keys of a scene that no override may set, with the reason; ``keys`` are those of factors."""
+    factors = {tuple(key.split(".")): "is a factor, whose value each run has; leave it out" for key in keys}
+    return factors | {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
 
 
 @dataclass(frozen=True)
@@ -241,6 +260,43 @@ class Study:
     file: StudyFile
     levels: tuple[int, ...] = ()
     """Places of the values of its categories; by default the first of each, which are those of the baseline."""
+
+    def __post_init__(self) -> None:
+        """Put a response for each limit at a point of the duty in the place of the limits of its figure."""
+        responses = [*self._responses_over_duty()]
+        if len(responses) > len(self.file.response):
+            object.__setattr__(self, "file", self.file.model_copy(update={"response": responses}))
+
+    def _responses_over_duty(self) -> Iterator[Response]:
+        points, limits = self.file.duty, list[Response]()
+        same = alike(points)
+        for response in self.file.response:
+            limited = response.lower is not None or response.upper is not None
+            # Where all points are one, its limits are those of the response, unless that is a ratio.
+            apart = limited and points and not (same and response.aggregate != "worst_relative")
+            if isinstance(response, PointResponse) or not apart:
+                yield response
+                continue
+            yield response.model_copy(update={"lower": None, "upper": None})
+            names = [point.name for point in points]
+            limits += [PointResponse.of(response, name) for name in sorted(response.points or names)]
+        yield from limits
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Shares of the time by point of the duty, in the order of their names; empty without a duty."""
+        return shares_of(self.file.duty)
+
+    @property
+    def of_figures(self) -> Self:
+        """The study without the limits at points of its duty: its responses are then those of any table of its design."""
+        figures = [response for response in self.file.response if not isinstance(response, PointResponse)]
+        return replace(self, file=self.file.model_copy(update={"response": figures}))
+
+    @property
+    def figures(self) -> list[str]:
+        """Figures of the simulation behind the responses, each once: a limit at a point is one of a response's own."""
+        return [response.name for response in self.file.response if not isinstance(response, PointResponse)]
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

@@ -18,6 +18,7 @@ from doe.adaptive import Runs as SearchRuns
 from doe.adaptive.acquisition import Region
 from doe.adaptive.search import NEAR, Face, check_budget
 from doe.clearance import Simulations
+from doe.duty import Run, main_scene, scenes_of
 from doe.pareto.front import DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.response_surface import Surface
@@ -31,7 +32,6 @@ from doe.workflow.runs import Runs, design_of, ordered_runs, region_of, runs_of
 from doe.workflow.surfaces import goals_of, independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, check_all, refuse
-from rbdyn.scene import Scene
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -70,12 +70,12 @@ class Evaluator:
         self.done = 0
         self.failures: list[Failure] = []
 
-    def run(self, scenes: list[Scene], label: str) -> tuple[Array, Array, Whole]:
-        """Responses (n, m) of scenes, their 95 % half-widths (n, m) and sample sizes (n, m); NaN for a failed run."""
-        labels = [f"{label} {self.done + row}" for row in range(1, len(scenes) + 1)]
-        results = self._simulations.run(scenes, labels, self._watch)
-        self.done += len(scenes)
-        values = np.full((len(scenes), len(self._study.responses)), np.nan)
+    def run(self, runs: list[Run], label: str) -> tuple[Array, Array, Whole]:
+        """Responses (n, m) of runs, their 95 % half-widths (n, m) and sample sizes (n, m); NaN for a failed run."""
+        labels = [f"{label} {self.done + row}" for row in range(1, len(runs) + 1)]
+        results = self._simulations.run(runs, labels, self._watch)
+        self.done += len(runs)
+        values = np.full((len(runs), len(self._study.responses)), np.nan)
         errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
         for row, result in enumerate(results):
             if isinstance(result, Failure):
@@ -85,7 +85,8 @@ class Evaluator:
         return values, errors, samples
 
     def _watch(self, count: int, total: int) -> None:
-        self._progress(self.done + count, max(self._total, self.done + total))
+        points = max(len(self._study.shares), 1)
+        self._progress(points * self.done + count, max(points * self._total, points * self.done + total))
 
 
 def check_adaptive(study: Study, search: bool) -> None:
@@ -113,7 +114,7 @@ def check_adaptive(study: Study, search: bool) -> None:
 def plan_of(study: Study) -> Plan:
     """Settings of the search; a fresh run at a finalist has the replicates of a design run."""
     settings = study.file.adaptive
-    usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
+    usual = main_scene(clearance.design_scenes(study, study.baseline[None])[0]).numerics.replicates
     return Plan(settings.budget, settings.batch, settings.seed, usual=usual, pick=study.file.front.pick)
 
 
@@ -252,8 +253,9 @@ def border_of(study: Study) -> Border | None:
         try:
             for corner in corners:
                 numbers = study.centre + reach * corner[: reach.size]
-                (scene,) = clearance.adaptive_scenes(study.with_levels(levels_at(study, corner)), numbers[None], [2], 0)
-                if 1e3 * scene.mounted_clearance_mm < study.file.adaptive.least_clearance_um:
+                (run,) = clearance.adaptive_scenes(study.with_levels(levels_at(study, corner)), numbers[None], [2], 0)
+                least_mm = min(scene.mounted_clearance_mm for scene in scenes_of(run))
+                if 1e3 * least_mm < study.file.adaptive.least_clearance_um:
                     return False
         except InputError:
             return False

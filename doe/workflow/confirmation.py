@@ -5,7 +5,7 @@ Intervals are Student's at the degrees of freedom of the errors. A limit is kept
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.duty import DutyResult
 from doe.running.store import Failure
 from doe.study_file import Study
 from doe.threads import one_thread
@@ -23,7 +24,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
-from rbdyn.result import SimulationResult
+from rbdyn.result import Quantity, SimulationResult
 
 LEVEL = 0.95  # probability that a stated interval holds the truth
 
@@ -90,6 +91,9 @@ class Confirmed:
     ``power_terms``: power losses [W] by contact. ``reason``: why the point was chosen. ``orbit_share``: radius of the
     cage's orbit over its play if the cage trembles, else None. ``friction_check``: friction by the maker's model, None
     without a designation.
+
+    ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
+    likeliest point and its probability. Both are empty without a duty.
     """
 
     point: Array
@@ -101,6 +105,8 @@ class Confirmed:
     freedom: Array | None = None
     orbit_share: float | None = None
     friction_check: Mapping[str, float | None] | None = None
+    at_points: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
+    worst: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     @property
     def error(self) -> Array:
@@ -156,11 +162,11 @@ def confirm(
     Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
     points = {"baseline": Choice(study.baseline, "the original design"), **choices}
-    scenes = [
-        clearance.confirmation_scene(study.with_levels(()) if name == "baseline" else study, choice.point)
+    runs = [
+        clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, choice.point)
         for name, choice in points.items()
     ]
-    results = simulations.run(scenes, list(points), simulations.progress("confirmation"))
+    results = simulations.run(runs, list(points), simulations.progress("confirmation"))
     confirmed, failures = {}, []
     for (name, choice), result in zip(points.items(), results, strict=True):
         if not isinstance(result, Failure):
@@ -172,7 +178,7 @@ def confirm(
     return confirmed, failures
 
 
-def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Confirmed:
+def confirmed_from(study: Study, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
     record = result.as_dict()
     quantities = [record[name] for name in study.responses]
@@ -184,7 +190,8 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
     errors = statistical, numerical
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
-    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    point = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    return replace(point, at_points=result.at_points, worst=result.worst) if isinstance(result, DutyResult) else point
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

@@ -20,6 +20,7 @@ from scipy.stats import t as student
 
 from doe import clearance
 from doe.clearance import Simulations, work_of
+from doe.duty import Duty, Run, Simulated, over_points
 from doe.running.store import Failure, sentence
 from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, read_sheet
 from doe.study_file.table import is_number as is_numeral
@@ -41,7 +42,7 @@ from rbdyn.base.faults import (
 )
 from rbdyn.base.storage import digest_of
 from rbdyn.base.words import shown
-from rbdyn.result import SimulationResult, read_json
+from rbdyn.result import read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
@@ -149,8 +150,7 @@ NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 # Quantiles of a law at which its scenes must be possible: no plan of input sets goes farther out.
 ENDS = np.array([1e-3, 1.0 - 1e-3])
 NOTHING: Mapping[str, str] = MappingProxyType({})
-# Input sets that are checked before anything runs.
-CHECKS = 16
+CHECKS = 16  # input sets that are checked before anything runs
 # Seeds of further replicates of the same input sets.
 ROUND_SEEDS = 10_000
 
@@ -199,7 +199,7 @@ class Case:
     """A scene file with its unknown inputs, ``every`` one, and the ``outputs`` that are studied.
 
     ``sample``: columns of a posterior sample by key, with the ``doubt`` about it in a sentence. ``remarks``: sentences on
-    keys that do not vary. ``home``: the file that declares the unknown inputs.
+    keys that do not vary. ``home``: the file that declares the inputs. With a ``duty`` outputs are figures at its points.
     """
 
     source: str
@@ -212,6 +212,7 @@ class Case:
     doubt: str = ""
     remarks: tuple[str, ...] = ()
     home: str = ""
+    duty: Duty | None = None
 
     def scenes(
         self,
@@ -443,9 +444,9 @@ def impossible(case: Case) -> Iterator[str]:
     yield from faults
     if faults:
         return
-    sets = case.joint(case.every).sets(CHECKS, case.uncertain.seed)
-    scenes = case.scenes(case.every, unknown.table_of(laws_of(case.every), sets), 0)
-    sentences = [scene for scene in scenes if isinstance(scene, str)]
+    values = unknown.table_of(laws_of(case.every), case.joint(case.every).sets(CHECKS, case.uncertain.seed))
+    runs = over_points(case.duty, lambda overrides: case.scenes(case.every, values, 0, overrides))
+    sentences = [run for run in runs if isinstance(run, str)]
     if 2 * len(sentences) > CHECKS:
         yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, sentences[0])}; change their laws"
 
@@ -515,13 +516,12 @@ def run(
     """
     values = unknown.table_of(laws_of(inputs), quantiles)
     seed = case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds
-    scenes = case.scenes(inputs, values, seed, overrides, set_overrides)
-    faults = [scene for scene in scenes if isinstance(scene, str)]
-    check_holes(len(faults), len(scenes), (), faults)
-    results = outcomes(scenes, [f"{title} {place + 1}" for place in range(len(scenes))], simulations, title)
+    runs = over_points(case.duty, lambda one: case.scenes(inputs, values, seed, [*overrides, *one], set_overrides))
+    impossible = tuple(run for run in runs if isinstance(run, str))
+    check_holes(len(impossible), len(runs), (), impossible)
+    results = outcomes(runs, [f"{title} {place + 1}" for place in range(len(runs))], simulations, title)
     successes = [(place, result) for place, result in enumerate(results) if not isinstance(result, Failure | str)]
     failures = tuple(result for result in results if isinstance(result, Failure))
-    impossible = tuple(result for result in results if isinstance(result, str))
     check_holes(len(results) - len(successes), len(results), failures, impossible)
     outputs, variances, freedom = outputs_with_scatter(case.outputs, [result for _, result in successes])
     places = np.array([place for place, _ in successes], dtype=np.int64)
@@ -567,13 +567,13 @@ def shares_outside(case: Case, places: Collection[int], quantiles: Array, signal
 
 
 def outcomes(
-    scenes: Sequence[Scene | str], labels: Sequence[str], simulations: Simulations, title: str
-) -> list[SimulationResult | Failure | str]:
-    """Results or failures of scenes; a sentence in place of a scene is handed through. Raises KeyboardInterrupt."""
-    possible = [(scene, label) for scene, label in zip(scenes, labels, strict=True) if isinstance(scene, Scene)]
-    possible_scenes, possible_labels = [scene for scene, _ in possible], [label for _, label in possible]
-    results = iter(simulations.run(possible_scenes, possible_labels, simulations.progress(title)))
-    return [next(results) if isinstance(scene, Scene) else scene for scene in scenes]
+    runs: Sequence[Run | str], labels: Sequence[str], simulations: Simulations, title: str
+) -> list[Simulated | Failure | str]:
+    """Results or failures of runs; a sentence in place of a run is handed through. Raises KeyboardInterrupt."""
+    possible = [(run, label) for run, label in zip(runs, labels, strict=True) if not isinstance(run, str)]
+    progress = simulations.progress(title)
+    results = iter(simulations.run([run for run, _ in possible], [label for _, label in possible], progress))
+    return [run if isinstance(run, str) else next(results) for run in runs]
 
 
 def check_holes(
@@ -588,7 +588,7 @@ def check_holes(
         )
 
 
-def outputs_with_scatter(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+def outputs_with_scatter(names: Sequence[str], results: Sequence[Simulated]) -> tuple[Array, Array, Whole]:
     """Outputs (n, m) of results, their variances by the scatter of replicates, and the degrees of freedom of these."""
     outputs, errors, samples = clearance.figures(names, results)
     freedom = np.maximum(samples - 1, 1)

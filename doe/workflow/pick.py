@@ -455,18 +455,18 @@ def _gains_by_simulation(
     study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains per unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
-    scenes, reachable = [], []
+    runs, reachable = [], []
     for index, side in names:
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
         try:
-            scenes.append(clearance.confirmation_scene(study, point))
+            runs.append(clearance.confirmation_run(study, point))
         except InputError:
             # No scene has this value of the factor.
             continue
         reachable.append((index, point))
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
-    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if reachable else []
+    results = simulations.run(runs, labels, simulations.progress("beyond the region")) if reachable else []
     goals = goals_of(study)
     responses = [study.responses[index] for index in goals.objectives]
     gains_beyond = {}

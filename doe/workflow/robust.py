@@ -6,13 +6,14 @@ until the further runs that the study allows are spent. The robust front holds p
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.duty import Duty, points_in
 from doe.emulator import pooled_variances
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.runner import Stage
@@ -29,6 +30,7 @@ from doe.workflow.input_sets import (
     Sets,
     case_of,
     declared,
+    impossible,
     run,
     run_notes,
     strongest_inputs,
@@ -37,7 +39,7 @@ from doe.workflow.input_sets import (
 from doe.workflow.runs import region_of, rounded_within
 from doe.workflow.surfaces import goals_of
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import set_key
+from rbdyn.base.faults import refuse, set_key
 from rbdyn.scene.unknown import Input, is_number
 
 
@@ -46,7 +48,7 @@ class Pairs:
     """p designs at the same n input sets.
 
     ``places`` (n,) of the sets in the plan, their quantiles (n, d), outputs, variances and degrees of freedom (p, n, m).
-    ``effort`` (n,): replicates over those of the first runs.
+    ``effort`` (n,): replicates over those of the first runs. Over a ``duty`` outputs are figures at its points.
     """
 
     places: Whole
@@ -55,11 +57,27 @@ class Pairs:
     variances: Array
     freedom: Whole
     effort: Whole
+    duty: Duty | None = None
+
+    @cached_property
+    def responses(self) -> tuple[Array, Array, Whole]:
+        """Responses of the study, their variances and degrees of freedom (p, n, m)."""
+        if self.duty is None:
+            return self.outputs, self.variances, self.freedom
+        smooth = np.array([self._smooth(design) for design in range(len(self.outputs))])
+        return self.duty.responses(self.outputs, self.variances, self.freedom, smooth)
+
+    def _smooth(self, design: int) -> Array:
+        """Variances (n, c) of all outputs of a design, smoothed over the inputs."""
+        columns = zip(self.effort * self.variances[design].T, self.freedom[design].T, strict=True)
+        smooth = [pooled_variances(self.quantiles, *column) for column in columns]
+        return np.column_stack(smooth) / self.effort[:, None]
 
     def rows(self, rows: Whole) -> "Pairs":
         """The same at these rows; a row may come more than once."""
         outputs, variances, freedom = self.outputs[:, rows], self.variances[:, rows], self.freedom[:, rows]
-        return Pairs(self.places[rows], self.quantiles[rows], outputs, variances, freedom, self.effort[rows])
+        places, quantiles, effort = self.places[rows], self.quantiles[rows], self.effort[rows]
+        return Pairs(places, quantiles, outputs, variances, freedom, effort, self.duty)
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same with as many replicates more at these rows."""
@@ -76,9 +94,10 @@ class Pairs:
 
         The variances are smoothed over the inputs, because those of a row's few replicates scatter widely.
         """
+        outputs, variances, freedom = self.responses
         designs = [0, design]
-        gains, variances = relative_gains(goals, self.outputs[designs], self.variances[designs])
-        freedom = self.freedom[designs][:, :, goals.objectives].sum(axis=0)
+        gains, variances = relative_gains(goals, outputs[designs], variances[designs])
+        freedom = freedom[designs][:, :, goals.objectives].sum(axis=0)
         single_variances = self.effort[:, None] * variances
         smooth = [
             pooled_variances(self.quantiles, *column) for column in zip(single_variances.T, freedom.T, strict=True)
@@ -87,9 +106,9 @@ class Pairs:
 
     def values(self, response: int, design: int = 1) -> tuple[Array, Array]:
         """Values (n,) of a response of a design, and their variances, smoothed over the inputs like those of gains."""
-        single_variances = self.effort * self.variances[design][:, response]
-        smooth = pooled_variances(self.quantiles, single_variances, self.freedom[design][:, response])
-        return self.outputs[design][:, response], smooth / self.effort
+        outputs, variances, freedom = (array[design][:, response] for array in self.responses)
+        smooth = pooled_variances(self.quantiles, self.effort * variances, freedom)
+        return outputs, smooth / self.effort
 
 
 def relative_gains(goals: Goals, outputs: Array, variances: Array) -> tuple[Array, Array]:
@@ -123,7 +142,7 @@ def simulate_designs(
     )
     failures = tuple(failure for sets in sets_of_design for failure in sets.failures)
     effort = np.ones(len(places), dtype=np.int64)
-    return Pairs(places, quantiles[places], outputs, variances, freedom, effort), failures
+    return Pairs(places, quantiles[places], outputs, variances, freedom, effort, case.duty), failures
 
 
 JOINT_SEEDS = 200_000
@@ -240,14 +259,15 @@ def _emulators(
     required = [*range(factors), *(factors + place for place in declared(case))]
     cover = factors + case.uncertain.inputs, required
     positions = np.hstack([places, sets.quantiles])
-    gains, variances = relative_gains(
-        goals, np.stack([base.outputs[0], sets.outputs]), np.stack([base.variances[0], sets.variances])
-    )
-    freedom = (base.freedom[0] + sets.freedom)[:, goals.objectives]
-    columns = zip(gains.T, variances.T, freedom.T, strict=True)
+    pairs = ((base.outputs, sets.outputs), (base.variances, sets.variances), (base.freedom, sets.freedom))
+    outputs, variances, freedom = (np.stack([ours[0], theirs]) for ours, theirs in pairs)
+    designs = Pairs(sets.places, positions, outputs, variances, freedom, np.ones_like(sets.places), base.duty)
+    gains, gain_variances = relative_gains(goals, *designs.responses[:2])
+    gain_freedom = designs.responses[2][:, :, goals.objectives].sum(axis=0)
+    columns = zip(gains.T, gain_variances.T, gain_freedom.T, strict=True)
     gain = [emulated(Runs(positions, *column), *cover, logarithms=False) for column in columns]
     limit_emulators = [
-        emulated(Runs(positions, sets.outputs[:, index], sets.variances[:, index], sets.freedom[:, index]), *cover)
+        emulated(Runs(positions, *(array[1][:, index] for array in designs.responses)), *cover)
         for index, _, _ in goals.limited
     ]
     seed = case.uncertain.seed + 3
@@ -450,7 +470,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         inputs=case.every,
         screened=outside_shares,
         pairs=len(gains),
-        runs=spent,
+        runs=points_in(case.duty) * spent,
         doubtful=int(in_doubt(gains, variances).size),
         failures=failures,
         decision=decision,
@@ -501,8 +521,14 @@ def case_of_study(study: Study) -> Case:
     for override in study.scene.set:
         set_key(data, override, f"{study.path}: scene.set")
     keys = *(factor.key for factor in study.file.factor), *(category.key for category in study.file.category)
-    fixed = dict.fromkeys(keys, "a factor of the study")
-    return case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
+    duty = clearance.duty_with_groups(study)
+    fixed = dict.fromkeys([] if duty is None else duty.keys, "a key of the duty")
+    fixed |= dict.fromkeys(keys, "a factor of the study")
+    case = case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
+    if duty is not None:
+        case = replace(case, outputs=tuple(duty.columns), duty=duty)
+        refuse(impossible(case))
+    return case
 
 
 def _input_readings(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:
@@ -565,5 +591,6 @@ def robust_stage(study: Study) -> Stage:
         fewest += settings.points
         runs += settings.points + POINTS * CONFIRMED + 2 * new_sets
     titles = "input sets", "runs of the robust front"
-    stage = Stage.of("robust", runs, work_of_set(case), *titles, fewest=fewest)
+    points = points_in(case.duty)
+    stage = Stage.of("robust", points * runs, work_of_set(case), *titles, fewest=points * fewest)
     return replace(stage, besides_s=ROBUST_S)

@@ -1,7 +1,7 @@
 """Design and runs of a study: points and their evaluation, the region of the design, and runs from simulations or a table."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from operator import itemgetter
 from pathlib import Path
@@ -14,16 +14,17 @@ from doe import clearance, designs
 from doe.designs import Design
 from doe.designs.design import replicate_groups
 from doe.designs.model import Model, Terms, model_terms
+from doe.duty import Run
 from doe.running.runner import AgendaKeeper, Progress
 from doe.running.store import Failure, Store, alike, sentence
 from doe.study_file import Study
+from doe.study_file.duty import at_point
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
 from doe.study_file.table import Table, read_sheet, read_table
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.words import are, counted
-from rbdyn.scene import Scene
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
 MAKERS: dict[str, Callable[..., Design]] = {
@@ -250,7 +251,8 @@ class Runs:
 
     ``notes``: distinct warnings of the simulations, or how a table was read; its responses without a value are NaN. ``replicates``, (n,) or (n, m), count the independent
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
-    ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs.
+    ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs. ``at_points``: by
+    point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty.
     """
 
     coded: Array
@@ -262,6 +264,7 @@ class Runs:
     block: Whole | None = None
     failures: tuple[Failure, ...] = ()
     turns: float = 0.0
+    at_points: Mapping[str, "Runs"] = field(default_factory=dict)
 
     @property
     def places(self) -> list[int]:
@@ -282,7 +285,7 @@ class RunPlan:
 
     design: Design
     actual: Array
-    scenes: list[Scene]
+    scenes: list[Run]
     labels: list[str]
     factors: list[dict[str, float]]
 
@@ -338,9 +341,15 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
         )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
-    return Runs(
+    runs = Runs(
         coded[rows], actual[rows], values, errors, tuple(notes), independent, block, failures, turns=simulations.turns
     )
+    at_points = {}
+    for name in study.shares:
+        columns = [at_point(name, figure) for figure in study.figures]
+        values, errors, independent = clearance.figures(columns, sound)
+        at_points[name] = replace(runs, values=values, errors=errors, replicates=independent)
+    return replace(runs, at_points=at_points)
 
 
 def _distinct_notes(notes: Sequence[Sequence[str]]) -> list[str]:

@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any, get_args
 
 from doe import clearance
-from doe.clearance import points_of, work_of
+from doe.clearance import every_scene, points_of, work_of
+from doe.duty import Run, main_scene, scenes_of
 from doe.running.runner import ANSWER, ANSWER_S, Agenda, Stage, agendas_of, forecast_of
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file import Study
 from doe.study_file.sections import Front
 from doe.study_file.workbook import split_path
-from doe.workflow.runs import STORE, ordered_runs
+from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.base.storage import code_version, digest_of, intact
@@ -28,6 +29,8 @@ from rbdyn.result import read_json, versions
 
 # Typical wall times [s] of the surfaces with their front, and of the pick's tolerances with the chains.
 FRONT_S, TOLERANCES_S = 6.0, 1.0
+# Typical wall time [s] of the surfaces and the front of one point of a duty alone.
+OWN_PICK_S = 2.0
 # Typical wall time [s] of the emulators for a batch of an adaptive search.
 BATCH_S = 0.6
 DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
@@ -47,38 +50,48 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
     if adaptive:
         from doe.adaptive.search import FRESH
 
-        usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
-        (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
-        settings, runs = study.file.adaptive, max(study.file.adaptive.budget - len(works), 0)
+        usual = main_scene(clearance.design_scenes(study, study.baseline[None])[0]).numerics.replicates
+        (search,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
+        settings, design = study.file.adaptive, [design_of(study.with_levels(levels)) for levels in study.every_level]
+        runs = max(settings.budget - sum(len(levels.coded) for levels in design), 0)
         # The shortest search stops after one batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
-        stage = Stage.of("adaptive front", runs, work_of(scene), fewest=fewest)
+        stage = _stage_of("adaptive front", runs, search, fewest=fewest)
         stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
-    point_work = work_of(clearance.confirmation_scene(study, study.baseline))
+    confirmation = clearance.confirmation_run(study, study.baseline)
     limited = any(response.lower is not None or response.upper is not None for response in study.file.response)
     tries = study.file.confirmation.tries - 1 if limited else 0
     most = points + tries + (len(study.factors) if adaptive else 0)
     # Picks by several rules may be one point of the drawing.
-    stages.append(
-        Stage.of("confirmation", points, point_work, "confirmation", "beyond the region", fewest=2, most=most)
-    )
+    titles = "confirmation", "beyond the region"
+    stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=2, most=most))
     if robust or clearance.declares_unknowns(study):
         from doe.workflow.robust import robust_stage
 
         stages.append(robust_stage(study))
     if study.file.tolerances is not None or study.file.chain:
         stages.append(Stage(TOLERANCES, besides_s=TOLERANCES_S))
-    return [*stages, Stage(ANSWER, besides_s=ANSWER_S)]
+    return [*stages, Stage(ANSWER, besides_s=ANSWER_S + OWN_PICK_S * len(study.shares))]
+
+
+def _stage_of(name: str, runs: int, run: Run, *titles: str, fewest: int, most: int | None = None) -> Stage:
+    """A stage of ``runs`` runs like this one, counted by their simulations: over a duty each has several."""
+    scenes = scenes_of(run)
+    points = points_of(scenes, [""] * len(scenes))
+    works = {point.key: work_of(scene) for point, scene in zip(points, scenes, strict=True)}
+    count, mean_work = len(works), sum(works.values()) / len(works)
+    most = None if most is None else count * most
+    return Stage.of(name, count * runs, mean_work, *titles, fewest=count * fewest, most=most)
 
 
 def design_works(study: Study) -> list[tuple[str, float]]:
     """Key and work of every design run. Raises InputError."""
     ordered = ordered_runs(study)
     points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
-    return [(point.key, work_of(scene)) for point, scene in zip(points, ordered.scenes, strict=True)]
+    return [(point.key, work_of(scene)) for point, scene in zip(points, every_scene(ordered.scenes), strict=True)]
 
 
 # Modules whose code decides the files of a study: simulation, judgement and report.

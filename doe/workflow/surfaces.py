@@ -176,7 +176,7 @@ def reference_runs(study: Study) -> Runs | None:
     if study.file.reference is None:
         return None
     path = study.path_of(study.file.reference.file)
-    table = read_runs(study, path)
+    table = read_runs(study.of_figures, path)
     rows = list(range(len(table.coded)))
     order = []
     for point in design_of(study).coded:
@@ -186,11 +186,15 @@ def reference_runs(study: Study) -> Runs | None:
                 [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
             )
         order.append(rows.pop(int(np.argmin(distance))))
-    return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order], table.notes)
+    # No table has limits at points of a duty.
+    blank = np.full((len(order), len(study.responses) - len(study.figures)), np.nan)
+    values, errors = (np.hstack([array[order], blank]) for array in (table.values, table.errors))
+    return Runs(table.coded[order], table.actual[order], values, errors, table.notes)
 
 
 def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
     """Each response of both tables, with the linear effects on the surfaces through each table."""
+    study, ours, theirs = study.of_figures, *(_of_figures(study, runs) for runs in (ours, theirs))
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
@@ -209,6 +213,15 @@ def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[Publi
             )
         )
     return rows
+
+
+def _of_figures(study: Study, runs: Runs) -> Runs:
+    """Runs without the limits at points of a duty, which are the last responses."""
+    columns = slice(len(study.figures))
+    replicates = (
+        runs.replicates if runs.replicates is None or runs.replicates.ndim == 1 else runs.replicates[:, columns]
+    )
+    return replace(runs, values=runs.values[:, columns], errors=runs.errors[:, columns], replicates=replicates)
 
 
 def _effect(ours: Surface, theirs: Surface, letter: str) -> Effect:

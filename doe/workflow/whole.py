@@ -18,6 +18,7 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
+from doe.duty import scene_at
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
@@ -38,6 +39,7 @@ from doe.workflow.confirmation import (
     verdict_of,
     whirl_sentence,
 )
+from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
@@ -222,7 +224,7 @@ class StudyResult:
     "baseline" (without gains) and "pick" first. ``tries``: points simulated as the pick until one kept its limits.
 
     ``tolerances`` is None if the study asks for none. ``adaptive``, ``searched_pick`` and ``front_comparison`` are None
-    without the adaptive search, ``robust`` without the robust judgement.
+    without the adaptive search, ``robust`` without the robust judgement, ``duty`` without a duty.
     """
 
     study: Study
@@ -246,6 +248,7 @@ class StudyResult:
     failures: tuple[Failure, ...]
     notes: tuple[str, ...]
     cost: Mapping[str, float]
+    duty: DutyAnswer | None = None
 
     @property
     def baseline(self) -> Confirmed:
@@ -262,6 +265,16 @@ class StudyResult:
         """Clearances among the factors in operation, at baseline and pick."""
         points = scenes_of(self.study, self.baseline.point, self.pick.point)
         return operating_clearances(self.study, points)
+
+    @cached_property
+    def clearances_at_points(self) -> dict[str, OperatingClearances]:
+        """The same at each point of the duty, whose temperatures and speeds differ; empty without a duty."""
+        ends = {"baseline": (self.study.with_levels(()), self.baseline), "pick": (self.study, self.pick)}
+        runs = {name: clearance.confirmation_run(study, end.point) for name, (study, end) in ends.items()}
+        return {
+            point: operating_clearances(self.study, {name: scene_at(run, point) for name, run in runs.items()})
+            for point in self.study.shares
+        }
 
     @property
     def limits(self) -> list[Limit]:
@@ -375,6 +388,7 @@ def run_study(
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *step_failures, *selection.failures),
         notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
+        duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
 

@@ -45,6 +45,8 @@ Figure = Annotated[float, Field(ge=-1e60, le=1e60)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Share = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
+# A name that heads a column of a table, and is one field of CSV for any reader.
+Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
 
 
 N = TypeVar("N")

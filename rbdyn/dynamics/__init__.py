@@ -5,7 +5,7 @@
 - ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result;
   ``temperatures``: those that the friction of a bearing keeps up
 - ``statistics``: figures and their errors; ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
-- ``motion``: every motion and contact over time, on request
+- ``motion``: every motion and contact over time, on request; ``duty``: life over a duty by static loads, without a run
 
 Frame: the origin is the rest position of the centre of the outer ring, with x along the radial load. y is 90 degrees ahead
 in the sense of positive rotation; angles count from x. Everything is SI. Roller j runs in pocket j, whose mid-line is at the

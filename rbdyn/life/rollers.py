@@ -214,6 +214,76 @@ def _lamina_loads(loads: Array, race: str) -> Array:
     return array
 
 
+LINE_EXPONENT = 10.0 / 9.0
+# Newton's steps, with bisection where one leaves its bracket, and the relative error of the sum of forces at which they end.
+BALANCE_STEPS, BALANCE_ERROR = 200, 1e-13
+
+
+class RollerContacts(NamedTuple):
+    """Contacts of a row of rollers for its static loads: K of Q = K delta^(10/9) of one race [N/m^(10/9)], roller to race.
+
+    ``relief``: approach that a lamina lacks at a race because of profile and tilt [m], of the inner and the outer race, each
+    (rollers, slices) or (1, slices).
+    """
+
+    stiffness: float
+    relief: tuple[Array, Array]
+
+
+def static_loads(
+    contacts: RollerContacts, rollers: int, load: float, clearance: float, centrifugal: float = 0.0
+) -> tuple[Array, Array]:
+    """Loads [N] of the laminae on the inner and the outer race, each (1, rollers, slices), under a radial ``load`` [N].
+
+    ISO/TS 16281: the ring is displaced by d along the load, so the races approach at azimuth phi by d cos(phi) - s/2, with the
+    diametral operating ``clearance`` s [m]. One roller is under the load. Both contacts of a roller share the approach. The
+    outer race bears also its ``centrifugal`` force [N], which the standard leaves out.
+    """
+    from scipy.optimize import brentq
+
+    angle = 2.0 * math.pi * np.arange(rollers) / rollers
+    most = max(float(np.max(relief)) for relief in contacts.relief)
+    solid = sum((force / contacts.stiffness) ** (1.0 / LINE_EXPONENT) for force in (load, centrifugal))
+    reach = 0.5 * max(clearance, 0.0) + 2.0 * (solid + most)
+
+    def balance(displacement: float) -> float:
+        inner, _ = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
+        return float(inner.sum(axis=1) @ np.cos(angle)) - load
+
+    displacement = brentq(balance, -reach, reach, xtol=1e-15, rtol=1e-13) if load > 0.0 else 0.0
+    inner, outer = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
+    return inner[None], outer[None]
+
+
+def _race_loads(contacts: RollerContacts, approach: Array, centrifugal: float) -> tuple[Array, Array]:
+    """Loads of the laminae (rollers, slices) on both races where these approach by ``approach`` (rollers,) [m].
+
+    The approach at the outer race is the root of Q_o - Q_i - F_c, which rises with it.
+    """
+    inner_relief, outer_relief = contacts.relief
+    lamina = contacts.stiffness / inner_relief.shape[1]
+
+    def loads(approach: Array, relief: Array) -> Array:
+        return np.asarray(lamina * np.clip(approach[:, None] - relief, 0.0, None) ** LINE_EXPONENT)
+
+    low = np.full(approach.shape, float(np.min(outer_relief)))
+    thrown = (centrifugal / contacts.stiffness) ** (1.0 / LINE_EXPONENT)
+    high = np.maximum(approach - np.min(inner_relief), np.max(outer_relief) + thrown)
+    high = np.maximum(high, low)
+    outside = 0.5 * (low + high)
+    for _ in range(BALANCE_STEPS):
+        inner, outer = loads(approach - outside, inner_relief), loads(outside, outer_relief)
+        excess = outer.sum(axis=1) - inner.sum(axis=1) - centrifugal
+        if np.all(np.abs(excess) <= BALANCE_ERROR * (outer.sum(axis=1) + centrifugal)):
+            break
+        # dQ/d delta = K^0.9 (10/9) Q^0.1
+        slope = LINE_EXPONENT * lamina**0.9 * (outer**0.1 + inner**0.1).sum(axis=1)
+        low, high = np.where(excess < 0.0, outside, low), np.where(excess < 0.0, high, outside)
+        newton = outside - np.divide(excess, slope, out=np.full(excess.shape, np.inf), where=slope > 0.0)
+        outside = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+    return inner, outer
+
+
 class SeriesFactors(NamedTuple):
     """Factors of one dimension series: R1 and S1 of SKF's friction model, and k_r of its minimum load."""
 

@@ -9,23 +9,31 @@ from string import ascii_uppercase
 from typing import Any
 
 from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
+from doe.report.sections.duty import at_points
 from doe.report.sections.record import (
+    LIMITS,
     SENSES,
+    SIGNS_NOTE,
+    VERDICTS,
     Factor,
     Record,
     change,
     dimension,
     factors,
-    half_width,
     moved,
     nearest,
     of_hundred,
     part,
     responses,
     share_with_interval,
+    sign_of,
+    signed,
     sizes,
+    value_text,
 )
 from doe.study_file import Study
+from doe.study_file.duty import OverDuty
+from doe.study_file.sections import Goal
 from doe.workflow.confirmation import (
     LOSS,
     NOISE,
@@ -58,10 +66,7 @@ CLEARANCES = {
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
 SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
-SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
-VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
-LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -70,13 +75,17 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def first_screen(summary: Record) -> list[Block]:
-    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
+    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point.
+
+    Over a duty the verdicts at each of its points follow the gains.
+    """
     identity = part(summary, "identity")
     return [
         *([identity_line(Identity.from_dict(identity))] if identity else ()),
         *_clearances(summary),
         *_judged(summary),
         *_gained(summary),
+        *at_points(summary),
         *_parts_to_make(summary),
         *_reasons(summary),
     ]
@@ -243,10 +252,12 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
     rows = [
-        (label(name), _value(before.get(name)), _value(after.get(name)), _signed(gain)) for name, gain in gains.items()
+        (label(name), value_text(before.get(name)), value_text(after.get(name)), signed(gain))
+        for name, gain in gains.items()
     ]
     header = ("response", "baseline", "pick", "change")
-    return Table("Changes confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
+    where = " over the duty" if part(summary, "duty") else ""
+    return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
 
 
 def limits(summary: Record) -> Table:
@@ -295,11 +306,6 @@ def _verdict(limit: Record) -> tuple[str, str]:
     """The verdict with its sign, and the probability of keeping the limit."""
     probability = limit.get("probability")
     return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
-
-
-def sign_of(gain: Record) -> str:
-    """The verdict of a gain with a sign that needs no colour."""
-    return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -379,7 +385,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         [
             point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in inputs),
-            *(_value(part(point, "responses", response)) for response in names),
+            *(value_text(part(point, "responses", response)) for response in names),
         ]
         for name, point in points.items()
     ]
@@ -413,7 +419,7 @@ def changes(summary: Record) -> Table:
         [
             point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in factors(summary)),
-            *(_signed(point["gains"].get(response)) for response in names),
+            *(signed(point["gains"].get(response)) for response in names),
         ]
         for name, point in (part(summary, "confirmation") or {}).items()
         if point.get("gains")
@@ -421,15 +427,6 @@ def changes(summary: Record) -> Table:
     caption = "Changes from the baseline at every confirmed point"
     header = ("point", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names))
     return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
-
-
-def _signed(gain: Record | None) -> str:
-    """A gain with the sign of its verdict."""
-    return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
-
-
-def _value(quantity: Record | None) -> str:
-    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
 
 
 def tolerances(summary: Record) -> Table:
@@ -537,5 +534,8 @@ def asked_record(study: Study) -> dict[str, Any]:
             }
             for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
         ],
-        "responses": [response.model_dump() for response in study.file.response],
+        "responses": [
+            response.model_dump(exclude=set() if study.shares else set(OverDuty.model_fields) - set(Goal.model_fields))
+            for response in study.file.response
+        ],
     }

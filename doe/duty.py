@@ -1,0 +1,385 @@
+"""A run over a duty: its scene at every point, and one result whose figures are those of all points together.
+
+The result answers for the responses of a study like that of one simulation. Points are taken in the order of their names, and
+those with one scene are one, so that neither the order of the tables nor a point stated twice changes a figure.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from doe.running.store import alike
+from doe.study_file import Study
+from doe.study_file.duty import Aggregate, at_point
+from doe.study_file.study import PointResponse
+from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.faults import RunError, key_path
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+
+if TYPE_CHECKING:
+    from doe.aggregation import Aggregated, Estimates
+
+
+class Rule(NamedTuple):
+    """How a response follows from its figures at the points, and its goal, which decides what is worse."""
+
+    aggregate: Aggregate
+    goal: str
+    target: float | None
+
+    def badness(self, values: Array) -> Array:
+        """Values on a scale on which the largest is the worst."""
+        if self.target is not None:
+            return np.asarray(np.abs(values - self.target))
+        return -values if self.goal == "max" else values
+
+    def value(self, badness: Array, worst: Array) -> Array:
+        """Inverse of `badness`; ``worst``: values on whose side of a target the answer lies."""
+        if self.target is not None:
+            return np.asarray(self.target + np.where(worst < self.target, -badness, badness))
+        return -badness if self.goal == "max" else badness
+
+    def over(self, estimates: "Estimates", weights: Array) -> "Aggregated":
+        """The response (n,) of figures (n, p) at points with ``weights`` (p,), which for worst_relative are ratios already."""
+        from doe.aggregation import Estimates, largest, weighted_mean
+
+        if self.aggregate == "mean":
+            return weighted_mean(estimates, weights)
+        badness = self.badness(estimates.values)
+        worst = largest(Estimates(badness, *estimates[1:]))
+        places = badness.argmax(axis=1)
+        return worst._replace(values=self.value(worst.values, estimates.values[np.arange(len(places)), places]))
+
+
+@dataclass(frozen=True)
+class Duty:
+    """Shares of the time and overrides by point, in the order of the names; rules of the responses by name of their figure.
+
+    ``limits``: point and figure of each response that is a limit at a point. ``groups``: names of points, those with one scene
+    together; empty where nobody has compared the scenes.
+    """
+
+    shares: Mapping[str, float]
+    overrides: Mapping[str, Sequence[str]]
+    rules: Mapping[str, Rule]
+    limits: tuple[tuple[str, str], ...] = ()
+    groups: tuple[tuple[str, ...], ...] = ()
+
+    @classmethod
+    def of(cls, study: Study) -> "Duty | None":
+        """The duty of a study; None without one."""
+        rules = {
+            response.name: Rule(response.aggregate, response.goal, response.target)
+            for response in study.file.response
+            if not isinstance(response, PointResponse)
+        }
+        sets = {point.name: point.set for point in study.file.duty}
+        limits = [
+            (response.point, response.figure) for response in study.file.response if isinstance(response, PointResponse)
+        ]
+        overrides = {name: sets[name] for name in study.shares}
+        return cls(study.shares, overrides, rules, tuple(limits)) if study.shares else None
+
+    @property
+    def relative(self) -> bool:
+        """Whether a response compares with the baseline."""
+        return any(rule.aggregate == "worst_relative" for rule in self.rules.values())
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the scene that its points set."""
+        return [".".join(key_path(override)) for overrides in self.overrides.values() for override in overrides]
+
+    @property
+    def main(self) -> str:
+        """The point with the largest share of the time."""
+        return max(self.shares, key=lambda name: self.shares[name])
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of all figures at all points, point by point."""
+        return [at_point(point, figure) for point in self.shares for figure in self.rules]
+
+    def responses(self, outputs: Array, variances: Array, freedom: Whole, smooth: Array) -> tuple[Array, Array, Whole]:
+        """Responses of a study (p, n, m), their variances and degrees of freedom, of p designs at n input sets.
+
+        They follow from the figures at all points (p, n, c), in the order of `columns`, which have the same inputs in each row:
+        the worst point is that of the row. Its simulation takes the ``smooth`` variances, for those of a row's few replicates
+        scatter widely. Ratios are those to the first design.
+        """
+        shape = (*outputs.shape[:2], len(self.shares), len(self.rules))
+        whole = [array.reshape(shape) for array in (outputs, variances, freedom, smooth)]
+        names = list(self.shares)
+        places = [names.index(group[0]) for group in self.groups]
+        columns = [
+            self._response(rule, *(array[:, :, places, figure] for array in whole))
+            for figure, rule in enumerate(self.rules.values())
+        ]
+        figures = list(self.rules)
+        columns += [
+            tuple(array[:, :, names.index(point), figures.index(figure)] for array in whole[:3])
+            for point, figure in self.limits
+        ]
+        values, errors, degrees = (np.stack(arrays, axis=-1) for arrays in zip(*columns, strict=True))
+        return values, errors, degrees.astype(np.int64)
+
+    def _response(
+        self, rule: Rule, values: Array, variances: Array, freedom: Whole, smooth: Array
+    ) -> tuple[Array, ...]:
+        """A response (p, n) of its figure at groups of points (p, n, g)."""
+        from doe.aggregation import Estimates
+
+        if rule.aggregate == "worst_relative":
+            ratios = values / values[0]
+            variances, smooth = ((ours + ratios**2 * ours[0]) / values[0] ** 2 for ours in (variances, smooth))
+            # The first design is exactly 1 of itself.
+            values, variances[0], smooth[0] = ratios, 0.0, 0.0
+        if values.shape[2] == 1:
+            return values[..., 0], variances[..., 0], freedom[..., 0].astype(float)
+        normal = np.full(values.shape, np.inf)
+        parts = (variances, freedom.astype(float)) if rule.aggregate == "mean" else (smooth, normal)
+        flat = [array.reshape(-1, values.shape[2]) for array in (values, *parts)]
+        figure = rule.over(Estimates(flat[0], np.sqrt(flat[1]), flat[2]), self.weights(self.groups))
+        degrees = (
+            np.minimum(figure.freedom, freedom.sum(axis=2).ravel()) if rule.aggregate == "mean" else freedom.min(axis=2)
+        )
+        return tuple(
+            np.asarray(array).reshape(values.shape[:2])
+            for array in (figure.values, figure.errors**2, np.floor(degrees))
+        )
+
+    def weights(self, groups: Sequence[Sequence[str]]) -> Array:
+        """Shares (g,) of groups of points that are one."""
+        return np.array([math.fsum(self.shares[name] for name in group) for group in groups])
+
+
+@dataclass(frozen=True)
+class DutyScenes:
+    """A run over a duty: a scene by name of each point.
+
+    ``baseline``: scenes of the original design by point, whose figures those of a worst_relative response are divided by; empty
+    without such a response. ``baseline_errors``: whether their errors count. In runs from which surfaces and emulators are
+    fitted they do not: the divisor is one for all of these and is no scatter of a run.
+    """
+
+    duty: Duty
+    scenes: Mapping[str, Scene]
+    baseline: Mapping[str, Scene] = field(default_factory=dict)
+    baseline_errors: bool = False
+
+    @property
+    def main(self) -> Scene:
+        """The scene at the point with the largest share of the time."""
+        return self.scenes[self.duty.main]
+
+
+# What a study simulates at values of its factors: a scene, or one at each point of its duty.
+Run = Scene | DutyScenes
+
+
+def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene | str]]) -> list[Run | str]:
+    """Runs of ``scenes`` with the overrides of a point, or of none without a duty. A sentence in place of a scene replaces the run."""
+    if duty is None:
+        return [*scenes(())]
+    columns = [scenes(overrides) for overrides in duty.overrides.values()]
+    runs = list[Run | str]()
+    for row in zip(*columns, strict=True):
+        whole = {name: scene for name, scene in zip(duty.shares, row, strict=True) if isinstance(scene, Scene)}
+        faults = [f"at {name}: {one}" for name, one in zip(duty.shares, row, strict=True) if isinstance(one, str)]
+        runs.append(faults[0] if faults else DutyScenes(duty, whole))
+    return runs
+
+
+def points_in(duty: Duty | None) -> int:
+    """Simulations of a run: one at each point of a duty with another scene, one without a duty."""
+    return 1 if duty is None else len(duty.groups)
+
+
+def scenes_of(run: Run) -> list[Scene]:
+    """All scenes of a run, without those of the baseline."""
+    return [run] if isinstance(run, Scene) else list(run.scenes.values())
+
+
+def scene_at(run: Run, point: str) -> Scene:
+    """The scene of a run at a point of the duty; without one, its only scene."""
+    return run if isinstance(run, Scene) else run.scenes[point]
+
+
+def main_scene(run: Run) -> Scene:
+    """The scene of a run that stands for it in a picture: over a duty, at the point with the largest share of the time."""
+    return run if isinstance(run, Scene) else run.main
+
+
+@dataclass(frozen=True)
+class DutyResult:
+    """Results of a run by point, in the order of the names, and of the baseline if its figures count.
+
+    ``groups``: names of points, those with one scene together.
+    """
+
+    duty: Duty
+    points: Mapping[str, SimulationResult]
+    groups: tuple[tuple[str, ...], ...]
+    baseline: Mapping[str, SimulationResult] = field(default_factory=dict)
+    baseline_errors: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Every response, and every figure at every point, as `SimulationResult.as_dict` has them. Raises RunError."""
+        record = {
+            at_point(point, figure): quantity.as_dict()
+            for point, figures in self.at_points.items()
+            for figure, quantity in figures.items()
+        }
+        return record | {figure: quantity.as_dict() for figure, (quantity, _) in self._responses.items()}
+
+    @cached_property
+    def at_points(self) -> dict[str, dict[str, Quantity]]:
+        """Figures by point; those that a run does not report are left out."""
+        figures = {point: result.quantities for point, result in self.points.items()}
+        return {
+            point: {name: quantities[name] for name in self.duty.rules if name in quantities}
+            for point, quantities in figures.items()
+        }
+
+    @property
+    def worst(self) -> dict[str, tuple[str, float]]:
+        """By response that is a worst one: the likeliest worst point and the probability that it is."""
+        return {name: worst for name, (_, worst) in self._responses.items() if worst is not None}
+
+    @cached_property
+    def _responses(self) -> dict[str, tuple[Quantity, tuple[str, float] | None]]:
+        responses = {}
+        for figure, rule in self.duty.rules.items():
+            names = [group[0] for group in self.groups]
+            if not all(figure in self.at_points[name] for name in names):
+                continue
+            if rule.aggregate == "worst_relative":
+                if not self.baseline:
+                    continue
+                parts = [self._ratio(name, figure) for name in names]
+            else:
+                parts = [self.at_points[name][figure] for name in names]
+            quantity, odds = _over_points(rule, parts, self.duty.weights(self.groups))
+            place = int(odds.argmax())
+            compares = rule.aggregate == "mean" or (rule.aggregate == "worst_relative" and self._is_baseline)
+            responses[figure] = quantity, None if compares else (names[place], float(odds[place]))
+        return responses
+
+    @property
+    def _is_baseline(self) -> bool:
+        return all(self.points[name].scene == self.baseline[name].scene for name in self.points)
+
+    def _ratio(self, point: str, figure: str) -> Quantity:
+        """A figure over that of the baseline at the same point; of the baseline itself exactly 1."""
+        ours, base = self.points[point], self.baseline[point]
+        if figure not in base.quantities:
+            raise RunError(f"{figure} of the baseline at {point}: the run does not report it")
+        value, divisor = ours.quantities[figure], base.quantities[figure]
+        if not abs(divisor.value) > (divisor.error or 0.0):
+            raise RunError(
+                f"{figure} of the baseline at {point} is {divisor}, not different from 0, so that no ratio to it exists; write "
+                'aggregate = "worst" or "mean"'
+            )
+        if ours.scene == base.scene:
+            return Quantity(1.0, 0.0, 0.0, value.effective_samples)
+        return quotient(value, divisor, self.baseline_errors)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes of all points, each once: those that not every point has name their points."""
+        placed = [(group[0], note) for group in self.groups for note in self.points[group[0]].notes]
+        texts = []
+        for notes in alike(placed, lambda pair: pair[1]):
+            names = list(dict.fromkeys(name for name, _ in notes))
+            texts.append(notes[0][1] if len(names) == len(self.groups) else f"at {', '.join(names)}: {notes[0][1]}")
+        return tuple(texts)
+
+    @property
+    def power_terms_W(self) -> dict[str, float]:  # noqa: N802
+        """Parts of the power loss, weighted by the shares of the time."""
+        if len(self.groups) == 1:
+            return self.points[self.groups[0][0]].power_terms_W
+        terms = dict.fromkeys(name for result in self.points.values() for name in result.power_terms_W)
+        return {
+            name: math.fsum(
+                share * self.points[point].power_terms_W.get(name, 0.0) for point, share in self.duty.shares.items()
+            )
+            for name in terms
+        }
+
+    @property
+    def friction_check(self) -> dict[str, float | None] | None:
+        """The maker's friction; None over several points, where it is that of none."""
+        return self.points[self.groups[0][0]].friction_check if len(self.groups) == 1 else None
+
+    @property
+    def cage_orbit_radius_share(self) -> Quantity | None:
+        """Radius of the cage's orbit over its play at the point where it is least."""
+        orbits = [self.points[group[0]].cage_orbit_radius_share for group in self.groups]
+        return min((orbit for orbit in orbits if orbit is not None), key=lambda orbit: orbit.value, default=None)
+
+    @property
+    def jitters(self) -> bool:
+        """Whether the cage only jitters at any point, so that its whirl there is none."""
+        return any(result.jitters for result in self.points.values())
+
+
+Simulated = SimulationResult | DutyResult
+
+
+def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple[Quantity, Array]:
+    """One quantity of those at the points, and the odds (p,) of each to be the worst.
+
+    Numerical errors of a method have one sign at all points, so that they add: by the weights, or by the odds.
+    """
+    from doe.aggregation import Estimates, quantile
+
+    counted = [place for place, weight in enumerate(weights) if weight > 0.0 or rule.aggregate != "mean"]
+    if len(counted) == 1:
+        return parts[counted[0]], np.eye(len(parts))[counted[0]]
+    freedom = np.array([part.degrees_of_freedom or np.inf for part in parts])
+    halves = np.array([np.nan if part.statistical_error is None else part.statistical_error for part in parts])
+    rows = (np.array([part.value for part in parts]), halves / quantile(freedom), freedom)
+    figure = rule.over(Estimates(*(row[None] for row in rows)), weights)
+    odds = figure.odds[0]
+    joint = math.floor(figure.freedom[0] + 1e-9) if np.isfinite(figure.freedom[0]) else None
+    half = float(figure.errors[0] * quantile(np.array(joint or np.inf)))
+    possible = [(share, part) for share, part in zip(odds.tolist(), parts, strict=True) if share > 0.0]
+    known = [share * part.numerical_error for share, part in possible if part.numerical_error is not None]
+    quantity = Quantity(
+        float(figure.values[0]),
+        half if math.isfinite(half) else None,
+        math.fsum(known) if len(known) == len(possible) else None,
+        min(part.effective_samples for _, part in possible),
+        joint,
+    )
+    return quantity, odds
+
+
+def quotient(value: Quantity, divisor: Quantity, with_errors: bool) -> Quantity:
+    """Ratio of two independent quantities, to first order in their errors; ``with_errors``: whether those of the divisor count."""
+    from doe.aggregation import quantile
+
+    scale, ratio = abs(divisor.value), value.value / divisor.value
+    numerical = None if value.numerical_error is None else value.numerical_error / scale
+    if not with_errors:
+        half = None if value.statistical_error is None else value.statistical_error / scale
+        return Quantity(ratio, half, numerical, value.effective_samples, value.degrees_of_freedom)
+    if numerical is not None:
+        numerical = (
+            None if divisor.numerical_error is None else numerical + abs(ratio) * divisor.numerical_error / scale
+        )
+    if value.statistical_error is None or divisor.statistical_error is None:
+        return Quantity(ratio, None, numerical, value.effective_samples)
+    freedom = np.array([part.degrees_of_freedom or np.inf for part in (value, divisor)])
+    halves = np.array([value.statistical_error, abs(ratio) * divisor.statistical_error])
+    variances = (halves / scale / quantile(freedom)) ** 2
+    spread = float((variances**2 / freedom).sum())
+    joint = max(math.floor(float(variances.sum()) ** 2 / spread + 1e-9), 1) if spread > 0.0 else None
+    half = float(np.sqrt(variances.sum()) * quantile(np.array(joint or np.inf)))
+    return Quantity(ratio, half, numerical, min(value.effective_samples, divisor.effective_samples), joint)
