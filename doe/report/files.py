@@ -88,8 +88,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(record, folder / pictures[-1])
-    points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    motions = clearance.histories(study, points, DRAWN_TURNS)
+    motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
     texts = {
         "report.html": html_report(record, clearance.motion_record(motions)),

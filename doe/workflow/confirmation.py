@@ -5,7 +5,7 @@ Intervals are Student's at the degrees of freedom of the errors. A limit is kept
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -23,7 +23,9 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
-from rbdyn.result import SimulationResult
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+from rbdyn.scene.thermal import simulated_scene
 
 LEVEL = 0.95  # probability that a stated interval holds the truth
 
@@ -89,7 +91,8 @@ class Confirmed:
 
     ``power_terms``: power losses [W] by contact. ``reason``: why the point was chosen. ``orbit_share``: radius of the
     cage's orbit over its play if the cage trembles, else None. ``friction_check``: friction by the maker's model, None
-    without a designation.
+    without a designation. ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 90 % of them over
+    the inputs of the heat balance, and ``hot``: the scene at those of its run; None without a balance.
     """
 
     point: Array
@@ -101,6 +104,9 @@ class Confirmed:
     freedom: Array | None = None
     orbit_share: float | None = None
     friction_check: Mapping[str, float | None] | None = None
+    temperatures: Mapping[str, Quantity] | None = None
+    temperature_ranges: Mapping[str, Sequence[float]] | None = None
+    hot: Scene | None = None
 
     @property
     def error(self) -> Array:
@@ -175,7 +181,7 @@ def confirm(
 def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
     record = result.as_dict()
-    quantities = [record[name] for name in study.responses]
+    quantities = [clearance.quantity_of(record, name) for name in study.responses]
     values, statistical, numerical = (
         np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
         for key in ("value", "statistical_error", "numerical_error")
@@ -184,7 +190,13 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
     errors = statistical, numerical
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
-    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    confirmed = Confirmed(
+        choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check, result.temperatures_C
+    )
+    if result.thermal is None:
+        return confirmed
+    ranges = (result.thermal["input_range"] or {}).get("temperatures_C")
+    return replace(confirmed, temperature_ranges=ranges, hot=simulated_scene(result))
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

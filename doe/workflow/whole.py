@@ -258,10 +258,15 @@ class StudyResult:
         return self.confirmed["pick"]
 
     @cached_property
+    def scenes(self) -> dict[str, Scene]:
+        """Scenes of baseline and pick; those with a heat balance at the temperatures of their runs."""
+        scenes = scenes_of(self.study, self.baseline.point, self.pick.point)
+        return {name: self.confirmed[name].hot or scene for name, scene in scenes.items()}
+
+    @cached_property
     def clearances(self) -> OperatingClearances:
         """Clearances among the factors in operation, at baseline and pick."""
-        points = scenes_of(self.study, self.baseline.point, self.pick.point)
-        return operating_clearances(self.study, points)
+        return operating_clearances(self.study, self.scenes)
 
     @property
     def limits(self) -> list[Limit]:
