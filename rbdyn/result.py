@@ -88,6 +88,15 @@ class SavedRecord(Record):
 JITTER = 0.1
 
 
+# Temperatures of a heat balance as figures of their own, and the node that each is of.
+TEMPERATURES = {
+    "oil_temperature_C": "oil",
+    "outer_temperature_C": "outer",
+    "inner_temperature_C": "inner",
+    "roller_temperature_C": "rollers",
+}
+
+
 class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Its figures have the names of the keys of its JSON form, units included.
 
@@ -156,9 +165,11 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """Figures with errors, by their key, which names the unit."""
+        """Figures with errors, by their key, which names the unit; temperatures of a heat balance by ``TEMPERATURES``."""
         figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
-        return {key: figure for key, figure in figures if isinstance(figure, Quantity)}
+        nodes = self.temperatures_C
+        temperatures = {} if nodes is None else {name: nodes[node] for name, node in TEMPERATURES.items()}
+        return {key: figure for key, figure in figures if isinstance(figure, Quantity)} | temperatures
 
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""

@@ -2,7 +2,8 @@
 
 - ``parameters``: what a scene becomes for compiled code; ``forces``: interactions, state and equations; ``integrators``: time stepping
 - ``run``: one replicate under way, and its method; ``recording``: the same in batches; ``ensemble``: runs side by side in threads
-- ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result
+- ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result;
+  ``temperatures``: those that the friction of a bearing keeps up
 - ``statistics``: figures and their errors; ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
 - ``motion``: every motion and contact over time, on request
 

@@ -2,6 +2,7 @@
 
 - ``rollers``, ``balls``: ratings from dimensions (ISO 281, ISO 76) and life from the loads of each rolling element (ISO/TS 16281)
 - ``rollers`` also: minimum loads, SKF's friction model and the heat of ISO 15312
+- ``friction``: what SKF's model has in common for all kinds, and its moments of ball bearings
 
 This file has what both kinds of bearing share: the life in turns of one ring against the other and in hours, with the loads and
 capacities of the races behind it.

@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, MethodError
 from rbdyn.life import Life, Turning
+from rbdyn.life.friction import FrictionMoments, inlet_heating_factor, sliding_friction, starvation_factor
 from rbdyn.properties.catalogue import Envelope
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
@@ -231,49 +232,11 @@ SERIES = {
 }
 RADIAL_SLIDING = 0.0015  # S2
 ROLLER_GEOMETRY = 5.1  # K_Z of cylindrical roller bearings with a cage
-# K_rs: 3e-8 for baths and jets, 6e-8 for grease and oil-air; SKF has no drop feed, which is treated as a bath.
-STARVATION, SCARCE_STARVATION = 3e-8, 6e-8
-SCARCE = ("grease", "oil_air")
-# mu_bl of a rotating bearing: 0.12 in the catalogue of 2018 (from memory); that of 2013 has 0.15 for all.
-BOUNDARY_FRICTION, FILM_FRICTION = 0.12, 0.02
+FILM_FRICTION = 0.02
 # ISO 15312: heat flow density at 50 K above the surroundings, up to a seat of 50 000 mm^2; above it falls with the power
 # -0.34 of the seat (from memory) [W/mm^2], [mm^2].
 HEAT_FLOW, LARGE_SEAT, LARGE_SEAT_EXPONENT = 0.016, 5e4, -0.34
 SEAT_RISE = 50.0  # [K]
-
-
-class FrictionMoments(NamedTuple):
-    """Rolling and sliding frictional moment [N m], without drag of a bath and without seals."""
-
-    rolling: float
-    sliding: float
-
-
-def inlet_heating_factor(mean_diameter: float, speed: float, viscosity: float) -> float:
-    """phi_ish, reduction of the rolling moment by inlet shear heating: 1/(1 + 1.84e-9 (n d_m)^1.28 nu^0.64).
-
-    Mean diameter [m], speed [rad/s], kinematic viscosity [m^2/s].
-    """
-    fast = abs(speed) / RPM * mean_diameter * 1e3
-    return 1.0 / (1.0 + 1.84e-9 * fast**1.28 * (viscosity * 1e6) ** 0.64)
-
-
-def starvation_factor(bore: float, outside: float, speed: float, viscosity: float, supply: str | None = None) -> float:
-    """phi_rs, reduction of the rolling moment by starvation: exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))).
-
-    Bore and outside diameter [m], speed [rad/s], kinematic viscosity [m^2/s]; ``supply`` as ``lubricant.supply``.
-    """
-    constant = SCARCE_STARVATION if supply in SCARCE else STARVATION
-    inner, outer = bore * 1e3, outside * 1e3
-    room = math.sqrt(ROLLER_GEOMETRY / (2.0 * (outer - inner)))
-    return math.exp(-constant * viscosity * 1e6 * abs(speed) / RPM * (inner + outer) * room)
-
-
-def sliding_friction(mean_diameter: float, speed: float, viscosity: float) -> float:
-    """mu_sl = phi_bl mu_bl + (1 - phi_bl) mu_EHL with phi_bl = exp(-2.6e-8 (n nu)^1.4 d_m); units as above."""
-    flow = abs(speed) / RPM * viscosity * 1e6
-    boundary = math.exp(-2.6e-8 * flow**1.4 * mean_diameter * 1e3)
-    return boundary * BOUNDARY_FRICTION + (1.0 - boundary) * FILM_FRICTION
 
 
 def skf_moments(
@@ -294,12 +257,12 @@ def skf_moments(
     """
     factors, mean = SERIES[series], 0.5 * (bore + outside)
     diameter, flow = mean * 1e3, abs(speed) / RPM * viscosity * 1e6
-    reduction = inlet_heating_factor(mean, speed, viscosity) * starvation_factor(
-        bore, outside, speed, viscosity, supply
-    )
+    starved = starvation_factor(ROLLER_GEOMETRY, bore, outside, speed, viscosity, supply)
+    reduction = inlet_heating_factor(mean, speed, viscosity) * starved
     rolling = reduction * factors.rolling * diameter**2.41 * radial_load**0.31 * flow**0.6
     sliding = factors.sliding * diameter**0.9 * axial_load + RADIAL_SLIDING * diameter * radial_load
-    return FrictionMoments(1e-3 * rolling, 1e-3 * sliding * sliding_friction(mean, speed, viscosity))
+    slides = sliding_friction(FILM_FRICTION, mean, speed, viscosity)
+    return FrictionMoments(1e-3 * rolling, 1e-3 * sliding * slides)
 
 
 def iso_15312_heat(sizes: Envelope) -> float:

@@ -427,7 +427,12 @@ class Scene(SceneFile):
     @cached_property
     def film_temperatures_C(self) -> FilmTemperatures:  # noqa: N802
         """Temperatures of the oil in the cavity and in the films [C]."""
-        return film_temperatures(self)
+        if self.mounting is None or self.lubricant.film_temperature == "oil":
+            return film_temperatures(self, None)
+        from rbdyn.mounting.fits import mounted_rings
+
+        material = self.material("rings")
+        return film_temperatures(self, mounted_rings(self.mounting, self.bearing, material, material, 0.0))
 
     def oil(self, place: str = "cavity") -> Oil:
         """The oil in the "cavity", or in the films of the "outer" and "inner" race, of the "pocket" and of the "land"."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from rbdyn.base.faults import RPM, SI, Consistent, Fraction, NonNegative, NotVanishing, Positive, Share, Sparse
 from rbdyn.properties.materials import OILS, Oil, oil_at
@@ -50,6 +50,8 @@ def _four_numbers(value: Any) -> Any:
 class Lubricant(Sparse):
     """The oil, its temperature and its supply."""
 
+    # A heat balance has a first guess of temperature_C where that is left out.
+    model_config = ConfigDict(json_schema_extra=lambda schema: schema["required"].remove("temperature_C"))
     UNSAVED: ClassVar[Mapping[str, Any]] = UNSAVED
 
     oil: OilName

@@ -15,6 +15,8 @@ from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
+    from rbdyn.mounting.rings import MountedRings
+    from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
@@ -29,6 +31,10 @@ RATED_C, USUAL_RISE = 70.0, 20.0
 OIL_CEILINGS = {"mineral": 120.0, "naphthenic": 120.0, "PAO": 150.0, "PAG": 150.0, "ester": 200.0}
 CAGE_CEILINGS = {"peek": 150.0, "phenolic_cotton": 120.0}
 
+NO_MOUNTING = (
+    "[thermal]: needs [mounting] with bore, outside diameter and housing diameter, which decide what heat does; add it"
+)
+
 
 class Thermal(Strict):
     """Heat balance of the bearing, which computes its temperatures: oil, outer ring with housing, inner ring with shaft, and
@@ -41,9 +47,8 @@ class Thermal(Strict):
     ambient_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C)] = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
     surface_factor: Positive = 1.0
-    """Factor on the heat transfer from the surfaces of rings, rolling elements and cage to the oil, that of a flat plate in
-    laminar flow of pure oil. Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured
-    temperature."""
+    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
+    Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
     """Factor on the heat that housing and shaft carry off, 0.016 W/mm2 of the seats at 50 K above ambient as in ISO 15312. A
     plummer block in moving air carries off more, a hot housing nothing (0)."""
@@ -81,18 +86,15 @@ class FilmTemperatures(NamedTuple):
     land: float
 
 
-def film_temperatures(scene: "Scene") -> FilmTemperatures:
-    """Temperatures of the oil where the scene's laws need it.
+def film_temperatures(scene: "Scene", rings: "MountedRings | None") -> FilmTemperatures:
+    """Temperatures of the oil where the scene's laws need it; ``rings``: as mounted, None for films at the oil's temperature.
 
     An inlet between two surfaces takes the mean of their temperatures by their speeds, which are equal in rolling.
     """
     oil, mounting = scene.lubricant.temperature_C, scene.mounting
-    if mounting is None or scene.lubricant.film_temperature == "oil":
+    if mounting is None or rings is None:
         return FilmTemperatures(oil, oil, oil, oil, oil)
-    from rbdyn.mounting.fits import mounted_rings
-
-    material, reference = scene.material("rings"), mounting.reference_temperature_C
-    rings = mounted_rings(mounting, scene.bearing, material, material, 0.0)
+    reference = mounting.reference_temperature_C
     outer, inner = reference + rings.outer_ring.temperature_rise, reference + rings.inner_ring.temperature_rise
     rollers, cage = reference + rings.element_temperature_rise, scene.cage_temperature_C
     assert cage is not None
@@ -109,11 +111,16 @@ def base_oil_of(lubricant: Lubricant) -> str:
     return "ester"
 
 
+def oil_ceiling(thermal: Thermal, lubricant: Lubricant) -> float:
+    """Highest allowed temperature of the oil [C], stated or by its base oil."""
+    return OIL_CEILINGS[base_oil_of(lubricant)] if thermal.oil_ceiling_C is None else thermal.oil_ceiling_C
+
+
 def ceilings(scene: "Scene") -> dict[str, float]:
     """Highest allowed temperature [C] of "oil" and "cage"; without an entry for a cage that endures any."""
     thermal = scene.thermal
     assert thermal is not None
-    oil = OIL_CEILINGS[base_oil_of(scene.lubricant)] if thermal.oil_ceiling_C is None else thermal.oil_ceiling_C
+    oil = oil_ceiling(thermal, scene.lubricant)
     name = scene.materials.cage
     cage = thermal.cage_ceiling_C
     if cage is None and isinstance(name, str):
@@ -160,7 +167,7 @@ def thermal_faults(
     if thermal is None:
         return
     if mounting is None:
-        yield "[thermal]: needs [mounting] with bore, outside diameter and housing diameter, which decide what heat does; add it"
+        yield NO_MOUNTING
     else:
         for key in PART_TEMPERATURES:
             if (value := getattr(mounting, key)) is not None:

@@ -1,4 +1,4 @@
-"""Steady temperatures of a bearing: four nodes, the conductances between them, and the gain of heat that follows temperature.
+"""Steady temperatures of a bearing: four nodes and the conductances between them.
 
 The nodes are the oil in the cavity, the outer ring with its housing, the inner ring with its shaft, and the rollers with their
 cage. The oil is fully mixed, so it leaves at the temperature of its node. In steady state G T = Q + b: ``matrix`` times the
@@ -38,23 +38,6 @@ class Boundaries(NamedTuple):
 
     inlet: float
     ambient: float
-
-
-class Gain(NamedTuple):
-    """Gain of the loop from temperatures through heat back to temperatures.
-
-    ``value``: largest real part of ``eigenvalues``. ``unseen``: share of the response that lies outside the directions of the
-    measurement, 0 where all were measured.
-    """
-
-    value: float
-    eigenvalues: Array
-    unseen: float = 0.0
-
-    @property
-    def steady(self) -> bool:
-        """Whether the steady state is stable: the gain is below 1."""
-        return self.value < 1.0
 
 
 def matrix(conductances: Conductances) -> Array:
@@ -106,41 +89,6 @@ def carried_off(conductances: Conductances, boundaries: Boundaries, temperatures
         "housing": float(conductances.outer_ambient * (outer - boundaries.ambient)),
         "shaft": float(conductances.inner_ambient * (inner - boundaries.ambient)),
     }
-
-
-def gain(matrix: Array, slopes: Array) -> Gain:
-    """Gain of heat that follows temperature: eigenvalues of G^-1 dQ/dT, ``slopes`` = dQ/dT [W/K], (4, 4).
-
-    The steady state ceases to exist where an eigenvalue reaches 1: G - dQ/dT is singular there, whatever the heat capacities. Losses
-    that fall with viscosity give negative gains, clearances that close give positive ones.
-    """
-    eigenvalues = np.linalg.eigvals(np.linalg.solve(matrix, slopes))
-    return Gain(float(eigenvalues.real.max()), eigenvalues)
-
-
-def projected_gain(matrix: Array, directions: Array, responses: Array) -> Gain:
-    """Gain within the span of ``directions`` (4, k) [K], where only the ``responses`` (4, k) [W] of the heat to them are measured.
-
-    The temperatures G^-1 dQ/dT d_k are fitted by least squares with the directions, in the norm of G: eigenvalues of
-    (D' G D)^-1 D' R. The gain is exact where the responses stay within the span or the directions are all four. Else
-    ``unseen`` is the share of the response, in the same norm, that no direction describes. Raises MethodError for directions
-    that depend on each other.
-    """
-    if np.linalg.matrix_rank(directions) < directions.shape[1]:
-        raise MethodError(f"{directions.shape[1]} directions depend on each other; change temperatures in as many ways")
-    within = np.linalg.solve(directions.T @ matrix @ directions, directions.T @ responses)
-    eigenvalues = np.linalg.eigvals(within)
-    shift = np.linalg.solve(matrix, responses)
-    rest = shift - directions @ within
-    whole = float(np.sum(shift * (matrix @ shift)))
-    unseen = float(np.sqrt(max(np.sum(rest * (matrix @ rest)), 0.0) / whole)) if whole > 0.0 else 0.0
-    return Gain(float(eigenvalues.real.max()), eigenvalues, unseen)
-
-
-def response(matrix: Array, slopes: Array | None = None) -> Array:
-    """dT/dQ [K/W], (4, 4): (G - dQ/dT)^-1, by which errors of heat become errors of temperature; None for constant heat."""
-    whole = matrix if slopes is None else matrix - slopes
-    return np.asarray(np.linalg.inv(whole))
 
 
 def _parts(conductances: Conductances, boundaries: Boundaries) -> tuple[Array, Array, Array]:

@@ -152,7 +152,7 @@ def _load_independent(scene: Scene) -> Any:
 def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
     from rbdyn.contact.rheology import traction_coefficient, with_body_creep
 
-    rheology = _rheology(scene, race, oil)
+    rheology = _rheology(scene, oil, race)
 
     def coefficient(slip: Any, load: Any) -> Any:
         film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
@@ -174,7 +174,7 @@ def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oi
     return fit.surface
 
 
-def _rheology(scene: Scene, race: str, oil: Oil) -> "Rheology":
+def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Rheology":
     from rbdyn.contact.rheology import Eyring, LimitingShear, thermal_newtonian
 
     table = scene.traction
