@@ -98,8 +98,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.duty is not None and gain_stills(record):
         pictures.append("duty_gains.png")
         plots.duty_gains(record, folder / pictures[-1])
-    points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    motions = clearance.histories(study, points, DRAWN_TURNS)
+    motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
     texts = {
         "report.html": html_report(record, clearance.motion_record(motions)),

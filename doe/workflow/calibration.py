@@ -142,6 +142,11 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         if key not in {candidate.key for candidate in case.every}
     )
     refuse([] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
+    refuse(
+        f"{data}: column {name}: {path} has no [thermal], which computes temperatures; add that table there or remove the column"
+        for name in rig.outputs
+        if name in clearance.TEMPERATURES and case.scene.thermal is None
+    )
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
@@ -361,7 +366,9 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     turns = np.array([result.counted_turns * result.replicates for result in results])
     records = [result.as_dict() for result in results]
     numerical = [
-        (records[condition][rows.outputs[name]]["numerical_error"] or 0.0) / NORMAL / np.exp(value)
+        (clearance.quantity_of(records[condition], rows.outputs[name])["numerical_error"] or 0.0)
+        / NORMAL
+        / np.exp(value)
         for (condition, name), value in zip(rows.cells, values[0], strict=True)
     ]
     return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
 
+from doe.clearance import TEMPERATURES
 from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points
 from doe.report.sections.record import (
@@ -189,9 +190,32 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
+        *_temperatures(summary),
         Paragraph(part(summary, "tolerances_warning") or "", "warning"),
         Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
+
+
+def _temperatures(summary: Record) -> list[Block]:
+    """Steady temperatures at baseline and pick, and what the inputs of the heat balance leave open; nothing without a balance."""
+    baseline, pick = (part(summary, "confirmation", name, "temperatures_C") or {} for name in ("baseline", "pick"))
+    rows = [
+        (quantity(name)[0], _plain(baseline.get(name)), _plain(figure), _range(figure.get("input_range")))
+        for name, figure in pick.items()
+    ]
+    header = ("steady state [°C]", "baseline", "pick", "pick over inputs (90 %)")
+    note = (
+        "Inputs: factors on surfaces, housing and contacts, and the share of the oil. Errors: of the simulation (95 %)."
+    )
+    return [Table("Temperatures", header, rows, note)] if rows else []
+
+
+def _plain(figure: Record | None) -> str:
+    return with_error(figure["value"], figure["error"]) if figure else ""
+
+
+def _range(ends: Sequence[float] | None) -> str:
+    return "" if ends is None else f"{ends[0]:.0f} to {ends[1]:.0f}"
 
 
 def _robust_points(summary: Record) -> Table:
@@ -470,12 +494,23 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
             ],
         }
         | ({} if point.friction_check is None else {"friction_check": dict(point.friction_check)})
+        | ({} if point.temperatures is None else {"temperatures_C": temperatures_record(point)})
         | {
             key: record(outcome.gains[name])
             for key, record in (("gains", gains_record), ("statement", statement))
             if name in outcome.gains
         }
         for name, point in outcome.confirmed.items()
+    }
+
+
+def temperatures_record(point: Confirmed) -> dict[str, Any]:
+    """Steady temperatures by response, each with its value, its 95 % error, and 90 % of it over the inputs of the heat balance."""
+    ranges = point.temperature_ranges or {}
+    figures = point.temperatures or {}
+    return {
+        name: {"value": figures[node].value, "error": figures[node].stated_error, "input_range": ranges.get(node)}
+        for name, node in TEMPERATURES.items()
     }
 
 
