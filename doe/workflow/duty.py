@@ -6,6 +6,7 @@ the study's pick to that, on these surfaces, is what the compromise costs at the
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.records import finite
 from rbdyn.life.duty import DutyLife
 from rbdyn.result import Quantity
+from rbdyn.scene import Scene
 
 Figures = Mapping[str, Quantity]
 
@@ -146,17 +148,23 @@ def duty_answer(study: Study, runs: Runs, confirmed: Mapping[str, Confirmed]) ->
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)
     }
     worst = {"baseline": baseline.worst, "pick": pick.worst}
-    return DutyAnswer(study, points, aggregate, worst, lives(study, {"baseline": baseline.point, "pick": pick.point}))
+    life = lives(study, {"baseline": baseline.point, "pick": pick.point}, {"baseline": baseline.hot, "pick": pick.hot})
+    return DutyAnswer(study, points, aggregate, worst, life)
 
 
-def lives(study: Study, ends: Mapping[str, Array]) -> dict[str, DutyLife]:
-    """Life over the duty of the original design, "baseline", and of others, points (k,) by name."""
+def lives(
+    study: Study, ends: Mapping[str, Array], hot: Mapping[str, Mapping[str, Scene]] = MappingProxyType({})
+) -> dict[str, DutyLife]:
+    """Life over the duty of the original design, "baseline", and of others, points (k,) by name.
+
+    ``hot``: scenes at the temperatures of a heat balance by name of the design and point.
+    """
     from rbdyn.dynamics.duty import roller_duty_life
 
     names, life = [point.name for point in study.file.duty], {}
-    for name, point in ends.items():
-        run = clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, point)
-        by_name = dict(zip(study.shares, scenes_of(run), strict=True))
+    for name, place in ends.items():
+        run = clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, place)
+        by_name = {**dict(zip(study.shares, scenes_of(run), strict=True)), **hot.get(name, {})}
         life[name] = roller_duty_life([by_name[point] for point in names], [study.shares[point] for point in names])
     return life
 

@@ -90,11 +90,18 @@ def life_sentence(life: Mapping[str, float | None]) -> str:
 
 
 def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Sequence[float]) -> MapDuty:  # noqa: N803
-    """The duty of a file on a map of these speeds and loads. Raises InputError with all faults at once."""
+    """The duty of a file on a map of these speeds and loads, with [thermal] at the steady temperatures of each point.
+
+    Raises InputError with all faults at once, RunError for a point without steady temperatures.
+    """
     from rbdyn.dynamics.duty import roller_duty_life
 
     points = read_duty(path)
     scenes = duty_scenes(scene, points, str(path))
+    if scene.thermal is not None:
+        from rbdyn.dynamics.simulate import steady_scene
+
+        scenes = [steady_scene(hot) for hot in scenes]
     whole = sum(point.share for point in points)
     life = roller_duty_life(scenes, [point.share / whole for point in points])
     return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))
