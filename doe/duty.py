@@ -240,11 +240,15 @@ class DutyResult:
     @cached_property
     def at_points(self) -> dict[str, dict[str, Quantity]]:
         """Figures by point; those that a run does not report are left out."""
-        figures = {point: result.quantities for point, result in self.points.items()}
-        return {
-            point: {name: quantities[name] for name in self.duty.rules if name in quantities}
-            for point, quantities in figures.items()
-        }
+        return {point: self._figures(result) for point, result in self.points.items()}
+
+    @cached_property
+    def _baseline_figures(self) -> dict[str, dict[str, Quantity]]:
+        return {point: self._figures(result) for point, result in self.baseline.items()}
+
+    def _figures(self, result: SimulationResult) -> dict[str, Quantity]:
+        quantities = result.quantities
+        return {name: quantities[name] for name in self.duty.rules if name in quantities}
 
     @property
     def worst(self) -> dict[str, tuple[str, float]]:
@@ -276,16 +280,15 @@ class DutyResult:
 
     def _ratio(self, point: str, figure: str) -> Quantity:
         """A figure over that of the baseline at the same point; of the baseline itself exactly 1."""
-        ours, base = self.points[point], self.baseline[point]
-        if figure not in base.quantities:
+        value, divisor = self.at_points[point][figure], self._baseline_figures[point].get(figure)
+        if divisor is None:
             raise RunError(f"{figure} of the baseline at {point}: the run does not report it")
-        value, divisor = ours.quantities[figure], base.quantities[figure]
-        if not abs(divisor.value) > (divisor.error or 0.0):
+        if not divisor.value > (divisor.error or 0.0):
             raise RunError(
-                f"{figure} of the baseline at {point} is {divisor}, not different from 0, so that no ratio to it exists; write "
-                'aggregate = "worst" or "mean"'
+                f"{figure} of the baseline at {point} is {divisor}, not above 0 by more than its error, so that no ratio to it "
+                'exists; write aggregate = "worst" or "mean"'
             )
-        if ours.scene == base.scene:
+        if self.points[point].scene == self.baseline[point].scene:
             return Quantity(1.0, 0.0, 0.0, value.effective_samples)
         return quotient(value, divisor, self.baseline_errors)
 
@@ -362,10 +365,10 @@ def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple
 
 
 def quotient(value: Quantity, divisor: Quantity, with_errors: bool) -> Quantity:
-    """Ratio of two independent quantities, to first order in their errors; ``with_errors``: whether those of the divisor count."""
+    """Ratio to a positive quantity, to first order in their independent errors; ``with_errors``: whether those of the divisor count."""
     from doe.aggregation import quantile
 
-    scale, ratio = abs(divisor.value), value.value / divisor.value
+    scale, ratio = divisor.value, value.value / divisor.value
     numerical = None if value.numerical_error is None else value.numerical_error / scale
     if not with_errors:
         half = None if value.statistical_error is None else value.statistical_error / scale
