@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from doe.duty import Duty, DutyResult, DutyScenes, Run, main_scene, scenes_of
+from doe.duty import Duty, DutyResult, DutyScenes, Run, labelled_scenes, main_scene, over_duty, result_of, scenes_of
 from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
 from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
@@ -117,37 +117,6 @@ def assignments(study: Study, factors: Array) -> list[str]:
         *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers if factor.name not in inactive),
         *(f"{category.key}={values[category.name]}" for category in study.file.category),
     ]
-
-
-def over_duty(
-    study: Study,
-    scene: Callable[[Sequence[str]], Scene],
-    baseline: Mapping[str, Scene] | None = None,
-    baseline_errors: bool = False,
-) -> Run:
-    """A run of a study: ``scene`` of no further overrides, or of those at each point of the duty.
-
-    ``baseline`` and ``baseline_errors``: as of `DutyScenes`. Raises InputError, which names the point with an impossible scene.
-    """
-    duty = Duty.of(study)
-    if duty is None:
-        return scene(())
-    points, faults = dict[str, Scene](), dict[str, list[str]]()
-    for name, overrides in duty.overrides.items():
-        try:
-            points[name] = scene(overrides)
-        except InputError as error:
-            faults[name] = error.faults
-    # A fault at all points is none of the duty.
-    everywhere = set.intersection(*map(set, faults.values())) if len(faults) == len(duty.shares) else set[str]()
-    at_points = [
-        f"{study.path}: duty.set of {name}: {fault}"
-        for name, sentences in faults.items()
-        for fault in sentences
-        if fault not in everywhere
-    ]
-    refuse([*sorted(everywhere), *at_points])
-    return DutyScenes(duty, points, baseline or {}, baseline_errors)
 
 
 def baseline_scenes(study: Study) -> dict[str, Scene]:
@@ -317,48 +286,14 @@ class Simulations:
                 self.turns_of[point.key] = float(result.cost.get("turns", 0.0))
         rest = zip(points, results, strict=True)
         return [
-            _over_points(run, label, list(islice(rest, len(_parts(run)))))
+            result_of(run, label, list(islice(rest, len(labelled_scenes(run)))))
             for run, label in zip(runs, labels, strict=True)
         ]
 
 
-def _parts(run: Run) -> list[tuple[str, Scene]]:
-    """Scenes of a run with what their labels say besides that of the run: those of its baseline first."""
-    if isinstance(run, Scene):
-        return [("", run)]
-    baseline = [(f"baseline at {name}", scene) for name, scene in run.baseline.items()]
-    return baseline + [(f"at {name}", scene) for name, scene in run.scenes.items()]
-
-
 def every_scene(runs: Sequence[Run]) -> list[Scene]:
     """Scenes of runs, those over a duty point by point, in the order of `points_of`."""
-    return [scene for run in runs for _, scene in _parts(run)]
-
-
-def _over_points(
-    run: Run, label: str, outcomes: Sequence[tuple[Point, SimulationResult | Failure]]
-) -> SimulationResult | DutyResult | Failure:
-    """Result of a run of those of its scenes; the failure of any of them names its point."""
-    results = [result for _, result in outcomes]
-    if isinstance(run, Scene):
-        return results[0]
-    words = [words for words, _ in _parts(run)]
-    causes = [f"{where}: {part.cause}" for where, part in zip(words, results, strict=True) if isinstance(part, Failure)]
-    last = outcomes[-1][0]
-    if causes:
-        return Failure(label, "; ".join(dict.fromkeys(causes)), last.run, dict(last.factors))
-    sound = [result for result in results if isinstance(result, SimulationResult)]
-    ours, names = len(run.baseline), list(run.scenes)
-    groups = dict[str, list[str]]()
-    for name, (point, _) in zip(names, outcomes[ours:], strict=True):
-        groups.setdefault(point.key, []).append(name)
-    return DutyResult(
-        run.duty,
-        dict(zip(names, sound[ours:], strict=True)),
-        tuple(map(tuple, groups.values())),
-        dict(zip(run.baseline, sound[:ours], strict=True)),
-        run.baseline_errors,
-    )
+    return [scene for run in runs for _, scene in labelled_scenes(run)]
 
 
 def work_of(scene: Scene) -> float:
@@ -418,7 +353,7 @@ def points_of(
     version, keys = code_version(SIMULATION), dict[int, str]()
     points = []
     for place, (run, label) in enumerate(zip(runs, labels, strict=True)):
-        for words, scene in _parts(run):
+        for words, scene in labelled_scenes(run):
             # Runs share the scenes of the baseline.
             if (key := keys.get(id(scene))) is None:
                 key = keys[id(scene)] = run_key(scene.model_dump(mode="json"), version)

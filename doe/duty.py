@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from doe.running.store import alike
+from doe.running.store import Failure, Point, alike
 from doe.study_file import Study
 from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import RunError, key_path
+from rbdyn.base.faults import InputError, RunError, key_path, refuse
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -182,6 +182,37 @@ class DutyScenes:
 Run = Scene | DutyScenes
 
 
+def over_duty(
+    study: Study,
+    scene: Callable[[Sequence[str]], Scene],
+    baseline: Mapping[str, Scene] | None = None,
+    baseline_errors: bool = False,
+) -> Run:
+    """A run of a study: ``scene`` of no further overrides, or of those at each point of the duty.
+
+    ``baseline`` and ``baseline_errors``: as of `DutyScenes`. Raises InputError, which names the point with an impossible scene.
+    """
+    duty = Duty.of(study)
+    if duty is None:
+        return scene(())
+    points, faults = dict[str, Scene](), dict[str, list[str]]()
+    for name, overrides in duty.overrides.items():
+        try:
+            points[name] = scene(overrides)
+        except InputError as error:
+            faults[name] = error.faults
+    # A fault at all points is none of the duty.
+    everywhere = set.intersection(*map(set, faults.values())) if len(faults) == len(duty.shares) else set[str]()
+    at_points = [
+        f"{study.path}: duty.set of {name}: {fault}"
+        for name, sentences in faults.items()
+        for fault in sentences
+        if fault not in everywhere
+    ]
+    refuse([*sorted(everywhere), *at_points])
+    return DutyScenes(duty, points, baseline or {}, baseline_errors)
+
+
 def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene | str]]) -> list[Run | str]:
     """Runs of ``scenes`` with the overrides of a point, or of none without a duty. A sentence in place of a scene replaces the run."""
     if duty is None:
@@ -208,6 +239,14 @@ def scenes_of(run: Run) -> list[Scene]:
 def scene_at(run: Run, point: str) -> Scene:
     """The scene of a run at a point of the duty; without one, its only scene."""
     return run if isinstance(run, Scene) else run.scenes[point]
+
+
+def labelled_scenes(run: Run) -> list[tuple[str, Scene]]:
+    """Scenes of a run with what their labels say besides that of the run, those of its baseline first."""
+    if isinstance(run, Scene):
+        return [("", run)]
+    baseline = [(f"baseline at {name}", scene) for name, scene in run.baseline.items()]
+    return baseline + [(f"at {name}", scene) for name, scene in run.scenes.items()]
 
 
 def main_scene(run: Run) -> Scene:
@@ -240,11 +279,15 @@ class DutyResult:
     @cached_property
     def at_points(self) -> dict[str, dict[str, Quantity]]:
         """Figures by point; those that a run does not report are left out."""
-        figures = {point: result.quantities for point, result in self.points.items()}
-        return {
-            point: {name: quantities[name] for name in self.duty.rules if name in quantities}
-            for point, quantities in figures.items()
-        }
+        return {point: self._figures(result) for point, result in self.points.items()}
+
+    @cached_property
+    def _baseline_figures(self) -> dict[str, dict[str, Quantity]]:
+        return {point: self._figures(result) for point, result in self.baseline.items()}
+
+    def _figures(self, result: SimulationResult) -> dict[str, Quantity]:
+        quantities = result.quantities
+        return {name: quantities[name] for name in self.duty.rules if name in quantities}
 
     @property
     def worst(self) -> dict[str, tuple[str, float]]:
@@ -276,16 +319,15 @@ class DutyResult:
 
     def _ratio(self, point: str, figure: str) -> Quantity:
         """A figure over that of the baseline at the same point; of the baseline itself exactly 1."""
-        ours, base = self.points[point], self.baseline[point]
-        if figure not in base.quantities:
+        value, divisor = self.at_points[point][figure], self._baseline_figures[point].get(figure)
+        if divisor is None:
             raise RunError(f"{figure} of the baseline at {point}: the run does not report it")
-        value, divisor = ours.quantities[figure], base.quantities[figure]
-        if not abs(divisor.value) > (divisor.error or 0.0):
+        if not divisor.value > (divisor.error or 0.0):
             raise RunError(
-                f"{figure} of the baseline at {point} is {divisor}, not different from 0, so that no ratio to it exists; write "
-                'aggregate = "worst" or "mean"'
+                f"{figure} of the baseline at {point} is {divisor}, not above 0 by more than its error, so that no ratio to it "
+                'exists; write aggregate = "worst" or "mean"'
             )
-        if ours.scene == base.scene:
+        if self.points[point].scene == self.baseline[point].scene:
             return Quantity(1.0, 0.0, 0.0, value.effective_samples)
         return quotient(value, divisor, self.baseline_errors)
 
@@ -332,6 +374,32 @@ class DutyResult:
 Simulated = SimulationResult | DutyResult
 
 
+def result_of(
+    run: Run, label: str, outcomes: Sequence[tuple[Point, SimulationResult | Failure]]
+) -> "SimulationResult | DutyResult | Failure":
+    """Result of a run of those of its scenes; the failure of any of them names its point."""
+    results = [result for _, result in outcomes]
+    if isinstance(run, Scene):
+        return results[0]
+    words = [words for words, _ in labelled_scenes(run)]
+    causes = [f"{where}: {part.cause}" for where, part in zip(words, results, strict=True) if isinstance(part, Failure)]
+    last = outcomes[-1][0]
+    if causes:
+        return Failure(label, "; ".join(dict.fromkeys(causes)), last.run, dict(last.factors))
+    sound = [result for result in results if isinstance(result, SimulationResult)]
+    ours, names = len(run.baseline), list(run.scenes)
+    groups = dict[str, list[str]]()
+    for name, (point, _) in zip(names, outcomes[ours:], strict=True):
+        groups.setdefault(point.key, []).append(name)
+    return DutyResult(
+        run.duty,
+        dict(zip(names, sound[ours:], strict=True)),
+        tuple(map(tuple, groups.values())),
+        dict(zip(run.baseline, sound[:ours], strict=True)),
+        run.baseline_errors,
+    )
+
+
 def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple[Quantity, Array]:
     """One quantity of those at the points, and the odds (p,) of each to be the worst.
 
@@ -362,10 +430,10 @@ def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple
 
 
 def quotient(value: Quantity, divisor: Quantity, with_errors: bool) -> Quantity:
-    """Ratio of two independent quantities, to first order in their errors; ``with_errors``: whether those of the divisor count."""
+    """Ratio to a positive quantity, to first order in their independent errors; ``with_errors``: whether those of the divisor count."""
     from doe.aggregation import quantile
 
-    scale, ratio = abs(divisor.value), value.value / divisor.value
+    scale, ratio = divisor.value, value.value / divisor.value
     numerical = None if value.numerical_error is None else value.numerical_error / scale
     if not with_errors:
         half = None if value.statistical_error is None else value.statistical_error / scale

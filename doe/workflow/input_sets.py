@@ -47,8 +47,7 @@ from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
 
-# Bits of the largest whole number, as in TOML.
-LARGEST_BITS = 63
+LARGEST_BITS = 63  # of whole numbers, as in TOML
 
 
 def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
@@ -143,16 +142,13 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     return [model for argument in get_args(annotation) for model in _models(argument)]
 
 
-# Share of input sets that may be impossible or fail.
-HOLES = 0.05
+HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
 NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 # Quantiles of a law at which its scenes must be possible: no plan of input sets goes farther out.
 ENDS = np.array([1e-3, 1.0 - 1e-3])
-NOTHING: Mapping[str, str] = MappingProxyType({})
 CHECKS = 16  # input sets that are checked before anything runs
-# Seeds of further replicates of the same input sets.
-ROUND_SEEDS = 10_000
+ROUND_SEEDS = 10_000  # of further replicates of the same input sets
 
 
 @dataclass(frozen=True)
@@ -304,7 +300,9 @@ def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> C
     return case
 
 
-def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
+def check_overrides(
+    overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = MappingProxyType({})
+) -> None:
     """Raises InputError for overrides that no run has: of inputs, unless their laws multiply them, and of ``fixed`` keys."""
     claims = {
         unknown_input.key: (
@@ -355,7 +353,7 @@ def case_of(
     data: dict[str, Any],
     outputs: Sequence[str],
     declared: Uncertain | None = None,
-    fixed: Mapping[str, str] = NOTHING,
+    fixed: Mapping[str, str] = MappingProxyType({}),
     stated_in: Path | None = None,
 ) -> Case:
     """Tables of a scene with its unknown inputs.
