@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.study_file.table import Limits, Sheet, listed, read_sheet
-from doe.workflow.input_sets import key_values, unknown_keys
+from doe.workflow.key_columns import key_values, unknown_keys
 from rbdyn.base.faults import InputError, refuse, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes

@@ -83,6 +83,15 @@ def question_of(question: Question) -> str:
     return digest_of(json.dumps(content, sort_keys=True))
 
 
+def _temperature_faults(path: Path, data: Path, outputs: Sequence[str], scene: Scene) -> list[str]:
+    """A sentence for each measured temperature of a scene without a heat balance."""
+    return [
+        f"{data}: column {name}: {path} has no [thermal], which computes temperatures; add that table there or remove the column"
+        for name in outputs
+        if name in clearance.TEMPERATURES and scene.thermal is None
+    ]
+
+
 def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
     """The question about a scene and a rig's table; ``free``: keys of the targets, by default all unknown ones.
 
@@ -142,11 +151,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         if key not in {candidate.key for candidate in case.every}
     )
     refuse([] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
-    refuse(
-        f"{data}: column {name}: {path} has no [thermal], which computes temperatures; add that table there or remove the column"
-        for name in rig.outputs
-        if name in clearance.TEMPERATURES and case.scene.thermal is None
-    )
+    refuse(_temperature_faults(path, data, rig.outputs, case.scene))
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:

@@ -10,7 +10,7 @@ import numpy as np
 
 from doe.clearance import TEMPERATURES
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, gap_notes, listed, read_sheet
-from doe.workflow.input_sets import key_values, unknown_keys
+from doe.workflow.key_columns import key_values, unknown_keys
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
