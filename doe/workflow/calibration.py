@@ -102,8 +102,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     base = Scene.from_dict(tables, str(path))
     uncertain = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is a result of calibration; leave it out"] if uncertain.sample else [])
-    documented_keys = {entry.key for entry in documented()}
-    law_keys = set(uncertain.laws)
+    documented_keys, law_keys = {entry.key for entry in documented()}, set(uncertain.laws)
     override_claims = Claims({key_path(override): override for override in uncertain.set})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
@@ -123,8 +122,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             if override_claims.on(tuple(key.split(".")))
         ]
     )
-    estimated_keys = [key for key in free if key not in law_keys]
-    changes = {"estimated": [*uncertain.estimated, *estimated_keys], "defaults": "documented"}
+    estimated = [*uncertain.estimated, *(key for key in free if key not in law_keys)]
+    changes = {"estimated": estimated, "defaults": "documented"}
     declared = uncertain.model_copy(update=changes if free else {})
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
     case = case_of(str(path), tables, rig.outputs, declared, fixed)
@@ -150,8 +149,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {candidate.key for candidate in case.every}
     )
-    refuse([] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
-    refuse(_temperature_faults(path, data, rig.outputs, case.scene))
+    idle = [] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"]
+    refuse([*idle, *_temperature_faults(path, data, rig.outputs, case.scene)])
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
