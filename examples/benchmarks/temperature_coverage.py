@@ -7,12 +7,12 @@ a tenth of the tolerance. The cost is in simulations of the usual length without
 """
 
 import argparse
-import math
 from pathlib import Path
 
 import numpy as np
 
 from rbdyn import Scene, simulate
+from rbdyn.base.words import with_error
 from rbdyn.result import SimulationResult
 
 SCENE = Path(__file__).parents[1] / "hot_roller.toml"
@@ -73,7 +73,7 @@ def main() -> None:
             holds = np.abs(values - exact.value) <= np.hypot(errors, exact.error or 0.0)
             shares.append(holds.mean())
             print(
-                f"| {name} | {node} | {exact.value:.3f} ± {exact.error or math.nan:.3f} | {values.mean():.3f} "
+                f"| {name} | {node} | {with_error(exact.value, exact.error)} | {values.mean():.3f} "
                 f"| {values.std(ddof=1):.4f} | {np.median(errors):.4f} | {holds.mean():.3f} | {cost:.2f} |",
                 flush=True,
             )

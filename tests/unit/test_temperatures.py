@@ -13,7 +13,7 @@ from rbdyn import Scene, history, simulate
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.result import SimulationResult
-from rbdyn.scene.thermal import Temperatures, at_temperatures, film_temperatures, simulated_scene
+from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
 from rbdyn.scene.unknown import documented_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -86,7 +86,7 @@ def test_unit_figures_are_those_of_the_scene_at_its_temperatures(hot):
     assert alone.impact_force_N == hot.impact_force_N and alone.power_loss_W == hot.power_loss_W
     assert alone.clearance_um == hot.clearance_um and alone.thermal is None
     state = hot.thermal["path_C"][-1]
-    films = film_temperatures(plain)
+    films = plain.film_temperatures_C
     assert films.outer == pytest.approx(0.5 * (state["outer"] + state["rollers"]))
     assert films.inner == pytest.approx(0.5 * (state["inner"] + state["rollers"]))
     assert films.land == pytest.approx(0.5 * (state["outer"] + state["rollers"]))

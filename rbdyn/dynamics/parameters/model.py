@@ -73,13 +73,14 @@ LARGEST_PRESSURE = 4e9
 LARGEST_ERROR = 0.01
 
 
-def race_traction(scene: Scene, race: str, largest_load: float) -> Any:
-    """Traction law of the "outer" or "inner" race by one of its contacts, with the oil at the temperature of that film.
+def race_traction(
+    scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float, race: str = "outer"
+) -> Any:
+    """Traction law of a race, "outer" or "inner", by one of its contacts.
 
-    A table covers loads up to ``largest_load`` [N]. The film is that of pure rolling. Raises InputError where a model needs a
-    film and nothing rolls.
+    ``oil``: at the temperature of that film; a table covers loads up to ``largest_load`` [N]. The film is that of pure
+    rolling. Raises InputError where a model needs a film and nothing rolls.
     """
-    contact, oil = rolling_contacts(scene)[race], scene.oil(race)
     table = scene.traction
     if table.elasticity and not contact.entrainment_speed > ROLLING:
         raise InputError(["traction.elasticity = true: needs contacts that roll, but the races do not; leave it out"])
@@ -258,7 +259,7 @@ def _race(scene: Scene, which: str) -> Race:
         form=form,
         contact=race_contact_law(scene, which),
         damping=_race_damping(scene),
-        traction=race_traction(scene, which, largest_load),
+        traction=race_traction(scene, rolling_contacts(scene)[which], scene.oil(which), largest_load, which),
         rolling=rolling_law(scene, scene.oil(which), reduced),
         tangential=_tangential(scene, place),
     )
