@@ -41,7 +41,7 @@ HOUSING_SHARE, INNER_RISE = 1.5, 7.5
 # By how much of the inner ring's rise above its drawing, at 20 C, the shaft stays below it: 0.10 to 0.15 (NSK).
 SHAFT_LAG, DRAWING = 0.125, 20.0
 NONE = dict.fromkeys(
-    ("shaft_by", "housing_by", "mounted_bore", "mounted_outside", "housing_diameter", "inner_temperature", "shaft_temperature",
+    ("shaft_by", "housing_by", "mounted_bore", "mounted_outside", "mounted_width", "housing_diameter", "inner_temperature", "shaft_temperature",
      "outer_temperature", "inner_interference", "inner_fit_by", "outer_interference", "outer_fit_by", "inner_law", "outer_law")
 )  # fmt: skip
 
@@ -63,6 +63,7 @@ def mounting_values(sizes: Envelope, shaft: str | None, housing: str | None, tem
         "shaft_by": f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}",
         "housing_by": f"housing {housing or f'{USUAL_HOUSING} (not stated, usual)'}",
         "mounted_bore": sizes.bore,
+        "mounted_width": sizes.width,
         "mounted_outside": sizes.outside,
         "housing_diameter": round(HOUSING_SHARE * sizes.outside, 1),
         "outer_temperature": temperature,

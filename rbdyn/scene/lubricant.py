@@ -85,7 +85,7 @@ class Lubricant(Sparse):
     """Temperature of the oil that flows to the bearing."""
     oil_fraction: Fraction = 0.02
     """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication. Default with oil_flow_l_min: 1e5
-    W^0.37/(n d_m^1.7) of a flow of W cm3/min, at most 0.15, unverified outside of 1 to 4 million n d_m (rbdyn/thermal)."""
+    W^0.37/(n d_m^1.7) of a flow of W cm3/min, at most 0.15. The formula is unverified and meant for 1 to 4 million n d_m."""
     oil_fraction_factor: Positive = 1.0
     """Factor on the oil fraction that follows from oil_flow_l_min."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
