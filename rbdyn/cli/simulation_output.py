@@ -144,7 +144,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
         for node, figure in figures.items()
     ]
     header = ("temperature [°C]", "value", "inputs (90 %)", "statistical (95 %)", "numerical (95 %)", "heat [W]")
-    ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance["carried_off_W"].items())
+    ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance["carried_off_W"].items() if power)
     state = "steady state" if balance["status"] == "steady" else balance["status"]
     inputs = ", ".join((balance["input_range"] or {}).get("inputs", ()))
     return [
