@@ -64,7 +64,7 @@ def main() -> None:
         truth = truth_of(scene, options.workers)
         seeds = range(scene.numerics.seed, scene.numerics.seed + options.repeats)
         results = [simulate(scene.changed({"numerics.seed": seed}), options.workers, notice=None) for seed in seeds]
-        cost = max(result.cost["balance_turns"] for result in results) / usual_turns(scene)
+        cost = max(result.cost["turns"] for result in results) / usual_turns(scene)
         assert truth.temperatures_C is not None
         for node, exact in truth.temperatures_C.items():
             figures = [result.temperatures_C[node] for result in results if result.temperatures_C is not None]

@@ -115,7 +115,7 @@ class Balance:
 
     @property
     def turns(self) -> float:
-        """Shaft turns of all runs."""
+        """Shaft turns of all runs, short ones included."""
         return sum(float(run.durations.sum()) for run in self.runs) / self.scene.turn_s
 
     @property
@@ -281,7 +281,7 @@ def _result(
         temperatures_C=temperatures,
         thermal=record,
         scene=scene.model_dump(mode="json"),
-        cost={**result.cost, **work_done(balance.runs), "balance_turns": balance.turns, "states": len(path)},
+        cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
         notes=(*_notes(trial.hot, status, reason, ranges), *result.notes),
     )
 
