@@ -93,7 +93,8 @@ class Confirmed:
     without a designation.
 
     ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
-    likeliest point and its probability. Both are empty without a duty.
+    likeliest point and its probability; ``jitter_points``: those at which the cage trembles, if not at all. They are empty
+    without a duty.
     """
 
     point: Array
@@ -107,6 +108,7 @@ class Confirmed:
     friction_check: Mapping[str, float | None] | None = None
     at_points: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
     worst: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    jitter_points: tuple[str, ...] = ()
 
     @property
     def error(self) -> Array:
@@ -191,7 +193,9 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
     point = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
-    return replace(point, at_points=result.at_points, worst=result.worst) if isinstance(result, DutyResult) else point
+    if not isinstance(result, DutyResult):
+        return point
+    return replace(point, at_points=result.at_points, worst=result.worst, jitter_points=result.jitter_points)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
@@ -223,7 +227,11 @@ def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:
     jitter_shares = {name: share for name, share in shares.items() if share is not None}
     if WHIRL not in objectives or not jitter_shares:
         return ""
-    radii = " and ".join(f"{share:.2g} of its play at the {name}" for name, share in jitter_shares.items())
+    points = {name: ", ".join(confirmed[name].jitter_points) for name in jitter_shares}
+    radii = " and ".join(
+        f"{share:.2g} of its play at the {name}{f' ({points[name]})' if points[name] else ''}"
+        for name, share in jitter_shares.items()
+    )
     return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
 
 

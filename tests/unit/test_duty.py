@@ -344,6 +344,19 @@ def test_the_worst_point_is_that_of_the_goal(goal, target, worst, point):
     assert result.worst == {"impact_force_N": (point, 1.0)}
 
 
+def test_the_cage_jitters_at_the_points_that_say_so():
+    """At a the orbit takes 0.05 of the play, at b 0.4: the whirl of the duty is in part that of a jitter."""
+    parts = dict.fromkeys("ab", Quantity(1.0, 0.1, 0.1, 10.0, 9))
+    result = result_of(Rule("mean", "min", None), parts, {"a": 0.5, "b": 0.5})
+    shares = {"a": 0.05, "b": 0.4}
+    orbits = {name: Quantity(share, 0.01, 0.0, 10.0, 9) for name, share in shares.items()}
+    points = {name: replace(part, cage_orbit_radius_share=orbits[name]) for name, part in result.points.items()}
+    moved = replace(result, points=points)
+    assert moved.jitters
+    assert moved.jitter_points == ("a",)
+    assert moved.cage_orbit_radius_share == orbits["a"]
+
+
 def test_a_worst_ratio_has_the_errors_of_the_baseline_too():
     """1.1 and 0.5 of the baseline: the larger ratio, whose relative variances add."""
     parts = {"a": Quantity(110.0, 2.0, 0.5, 30.0, 8), "b": Quantity(10.0, 0.1, 0.0, 20.0, 5)}
