@@ -93,7 +93,7 @@ class Confirmed:
     without a designation.
 
     ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
-    likeliest point and its probability; ``jitter_points``: those at which the cage trembles, if not at all. They are empty
+    likeliest point and its probability; ``jitter_points``: those at which alone the cage trembles. They are empty
     without a duty.
     """
 
