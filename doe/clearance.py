@@ -25,8 +25,9 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, read_toml, refuse
 from rbdyn.base.forecast import Measured
 from rbdyn.base.storage import code_version, run_key
-from rbdyn.result import SimulationResult
+from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import Temperatures, at_temperatures
 from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ Hear = Callable[[str, float, float], None] | None
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+# Short states of a heat balance at least: two of the search, and two for the gain of its loop.
+SHORT_STATES = 4
 # Offsets of seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
 INPUT_SEEDS = 3_000_000
@@ -51,12 +54,24 @@ ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 
 def check_responses(study: Study) -> None:
-    """Raises InputError for a response that is no figure of the simulation."""
+    """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
+    heats = any(name in TEMPERATURES for name in study.figures) and _has_balance(study)
+    names = ", ".join((*RESPONSES, *TEMPERATURES) if heats else RESPONSES)
     refuse(
-        f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
+        f"{study.path}: response.name = {name!r}: "
+        + (
+            f"{study.scene.file} has no [thermal], which computes temperatures; add that table there, or choose one of {names}"
+            if name in TEMPERATURES
+            else f"the simulation does not give it; choose one of {names}"
+        )
         for name in study.figures
-        if name not in RESPONSES
+        if name not in RESPONSES and not (heats and name in TEMPERATURES)
     )
+
+
+def _has_balance(study: Study) -> bool:
+    """Whether the study's scene has a heat balance, in its file or by scene.set."""
+    return "thermal" in read_scene(study) or any(override.startswith("thermal.") for override in study.scene.set)
 
 
 def read_scene(study: Study) -> dict[str, Any]:
@@ -282,9 +297,22 @@ def every_scene(runs: Sequence[Run]) -> list[Scene]:
 
 
 def work_of(scene: Scene) -> float:
-    """Least shaft turns of a run of a scene, with those of its companions."""
+    """Least shaft turns of a run of a scene, with those of its companions and of the short states of a heat balance."""
     numerics = scene.numerics
-    return (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
+    work = (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
+    if scene.thermal is None:
+        return work
+    from rbdyn.dynamics.temperatures import short
+
+    few = short(scene).numerics
+    return work + SHORT_STATES * few.replicates * (few.warm_up_turns + few.turns)
+
+
+def _first_state(scene: Scene) -> Scene:
+    """The scene at the temperatures at which a heat balance begins; itself without one. Raises InputError where it seizes."""
+    if scene.thermal is None:
+        return scene
+    return at_temperatures(scene, Temperatures(*[scene.lubricant.temperature_C] * len(Temperatures._fields)))
 
 
 # Shaft turns of a probe at most, the part between two looks at the clock, and the time [s] after which it ends.
@@ -292,11 +320,18 @@ PROBE_TURNS, PROBE_PART, PROBE_S = 4.0, 0.25, 0.5
 
 
 def probe(scene: Scene) -> Measured:
-    """Pace of a scene's runs by its first shaft turns, which are run for it and not kept. Raises RunError."""
+    """Pace of a scene's runs by its first shaft turns, which are run for it and not kept.
+
+    A heat balance is at the temperatures at which it begins; unknown if the bearing is impossible there. Raises RunError.
+    """
     from rbdyn.dynamics.ensemble import Stop
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import Run, prepare
 
+    try:
+        scene = _first_state(scene)
+    except InputError:
+        return Measured()
     bearing = roller_bearing(scene)
     prepare(scene, bearing)
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
@@ -363,7 +398,8 @@ def _in_threads(
     def runs() -> Iterator[Callable[[], RunOutcome]]:
         # One compilation here spares every thread the wait for it; the run itself reports faults.
         with suppress(Exception):
-            prepare(scenes[points[0].key], roller_bearing(scenes[points[0].key]))
+            first = _first_state(scenes[points[0].key])
+            prepare(first, roller_bearing(first))
         for remaining, point in zip(range(len(points), 0, -1), points, strict=True):
             # Replicates of the last points run in parallel too, so that no thread waits for the longest point.
             yield partial(run, point, threads if remaining < 2 * threads else 1)
@@ -399,7 +435,8 @@ def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, 
 def attempt(
     scene: Scene, stop: "Stop | None" = None, workers: int = 1, heard: Callable[[float, int, int], None] | None = None
 ) -> RunOutcome:
-    """Simulate a scene in ``workers`` threads; any fault of it is the cause of a failure.
+    """Simulate a scene in ``workers`` threads; any fault of it is the cause of a failure, and so is a bearing without steady
+    temperatures or too hot.
 
     ``heard(seconds, done, total)`` is called at the end of each replicate.
     """
@@ -414,7 +451,9 @@ def attempt(
             heard(time.perf_counter() - start_s, count, total)
 
     try:
-        result = simulate(scene, workers, progress, stop, notice=None).as_dict()
+        outcome = simulate(scene, workers, progress, stop, notice=None)
+        cause = heat_fault(outcome)
+        result = None if cause else outcome.as_dict()
     except (CancelledError, MemoryError, OSError):
         raise
     except (RunError, InputError) as error:
@@ -422,6 +461,13 @@ def attempt(
     except Exception as error:
         cause = f"unexpected {type(error).__name__}: {error}"
     return RunOutcome(result, cause, time.perf_counter() - start_s)
+
+
+def heat_fault(result: SimulationResult) -> str | None:
+    """Why a result has no steady temperatures, or too high ones; None for a sound one."""
+    if result.status == "ok":
+        return None
+    return f"{result.status}: {(result.thermal or {}).get('reason', 'its heat balance fails')}"
 
 
 def attempt_text(text: str, version: str) -> RunOutcome:
@@ -434,12 +480,20 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
+def quantity_of(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Figure of a response in the JSON form of a result; empty where the run does not report it."""
+    if name in TEMPERATURES and "temperatures_C" in record:
+        return record["temperatures_C"].get(TEMPERATURES[name]) or {}
+    return record.get(name) or {}
+
+
 def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
     Each has the shape (runs, responses). The value of a response that a run does not report is NaN.
     """
-    quantities = [[record.get(name, {}) for name in names] for record in (result.as_dict() for result in results)]
+    records = [result.as_dict() for result in results]
+    quantities = [[quantity_of(record, name) for name in names] for record in records]
     keys = "value", "statistical_error", "degrees_of_freedom"
     values, errors, freedom = ([[quantity.get(key) for quantity in row] for row in quantities] for key in keys)
     # Student's t of a mean of n independent values has n - 1 degrees of freedom.
@@ -447,14 +501,10 @@ def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResul
     return np.array(values, dtype=float), np.array(errors, dtype=float), samples
 
 
-def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str, History]":
-    """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
+def histories(scenes: Mapping[str, Scene], turns: float) -> "dict[str, History]":
+    """Motion of scenes by name, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion import history
 
-    original = study.with_levels(())
-    scenes = {
-        name: confirmation_scene(original if name == "baseline" else study, point) for name, point in points.items()
-    }
     return {name: history(scene, min(turns, scene.numerics.turns), notice=None) for name, scene in scenes.items()}
 
 

@@ -88,6 +88,15 @@ class SavedRecord(Record):
 JITTER = 0.1
 
 
+# Temperatures of a heat balance as figures of their own, and the node that each is of.
+TEMPERATURES = {
+    "oil_temperature_C": "oil",
+    "outer_temperature_C": "outer",
+    "inner_temperature_C": "inner",
+    "roller_temperature_C": "rollers",
+}
+
+
 class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Its figures have the names of the keys of its JSON form, units included.
 
@@ -108,6 +117,10 @@ class SimulationResult(Brief, SavedRecord):
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
       play, None where nothing guides the cage
+    - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
+    - ``thermal``: the balance: "status" ("steady", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+      first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
+      documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
       None unless numerics.pulse_threshold_N is stated
     """
@@ -142,6 +155,8 @@ class SimulationResult(Brief, SavedRecord):
     pulse_rate_hz: Quantity | None = None
     pulse_height_N: Quantity | None = None  # noqa: N815
     pulse_impulse_N_s: Quantity | None = None  # noqa: N815
+    temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
+    thermal: dict[str, Any] | None = None
 
     @property
     def jitters(self) -> bool:
@@ -150,9 +165,11 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """Figures with errors, by their key, which names the unit."""
+        """Figures with errors, by their key, which names the unit; temperatures of a heat balance by ``TEMPERATURES``."""
         figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
-        return {key: figure for key, figure in figures if isinstance(figure, Quantity)}
+        nodes = self.temperatures_C
+        temperatures = {} if nodes is None else {name: nodes[node] for name, node in TEMPERATURES.items()}
+        return {key: figure for key, figure in figures if isinstance(figure, Quantity)} | temperatures
 
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""

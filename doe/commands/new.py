@@ -69,6 +69,12 @@ def new(
         bool, flag("--tolerances", says="Tolerances of the clearances by grades of ISO 286, and the widest ones.")
     ] = False,
     chains: Annotated[bool, flag("--chains", says="Dimension chains of the parts that make the clearances.")] = False,
+    duty: Annotated[
+        Path | None,
+        valued(
+            "FILE.csv", "Points of operation: columns name, share, and keys of the scene.", "the scene's own", "--duty"
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a commented study of a scene's clearances on standard output."""
@@ -84,7 +90,8 @@ def new(
         bounds = limits_of(limit or [])
         scene = rollers_only(Scene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
-        sections = _sections(scene, read_toml(path), tolerances, chains) | {"responses": _responses(bounds)}
+        sections = _sections(scene, read_toml(path), tolerances, chains)
+        sections |= {"responses": _responses(bounds), "duty": _duty(duty, scene)}
         for name, section in sections.items():
             template = template.replace(f"{{{name}}}", section)
         text = fill_template(template, {"quoted": json.dumps(str(path))})
@@ -164,6 +171,15 @@ def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bo
         ),
         "parts": "\n".join([*[tolerances_text()] * tolerances, *closing * chains]).rstrip(),
     }
+
+
+def _duty(path: Path | None, scene: "Scene") -> str:
+    """The duty of the study; empty without a table of its points. Raises InputError."""
+    if path is None:
+        return ""
+    from doe.commands.new_duty import duty_text, read_points
+
+    return duty_text(read_points(path, scene))
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:

@@ -19,7 +19,8 @@ class StudyAnswer(Answer):
     """Chosen clearances with their gains, limits and parts.
 
     Tables: "gains" (a row a response: baseline and pick, simulated), "pick" (a row a factor), "runs", "front", "confirmation"
-    (all simulated points), "parts" (dimensions [mm]), and "quality", "anova", "coefficients" of the fits.
+    (all simulated points), "parts" (dimensions [mm]), and "quality", "anova", "coefficients" of the fits. Over a duty also
+    "duty" (a row a response at each of its points).
 
     ``finished_before``: whether the answer was read from the folder, because nothing had changed since.
     """
@@ -38,6 +39,8 @@ class StudyAnswer(Answer):
         return sections(drop_undefined(self.as_dict()))
 
     def rows(self) -> Mapping[str, Rows]:
+        from doe.report.sections.duty import duty_rows
+
         record = self.record
         fits = fit_rows(record["fit"]["responses"])
         return {
@@ -61,6 +64,7 @@ class StudyAnswer(Answer):
             ],
             "parts": part_rows(record["chains"]),
             **{name: fits[name] for name in ("quality", "anova", "coefficients")},
+            **({"duty": duty_rows(record)} if "duty" in record else {}),
         }
 
     def _front(self) -> list[dict[str, Any]]:

@@ -21,6 +21,7 @@ from doe.report.sections.answer import (
 )
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
+from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import drop_undefined, readable
@@ -75,6 +76,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
+    if outcome.duty is not None:
+        tables["duty_points.csv"] = duty_rows(record)
     if outcome.robust is not None:
         tables |= robust_tables(record["robust"])
     if outcome.reference_values is not None:
@@ -92,8 +95,10 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(record, folder / pictures[-1])
-    points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    motions = clearance.histories(study, points, DRAWN_TURNS)
+    if outcome.duty is not None and gain_stills(record):
+        pictures.append("duty_gains.png")
+        plots.duty_gains(record, folder / pictures[-1])
+    motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
     texts = {
         "report.html": html_report(record, clearance.motion_record(motions)),
@@ -121,6 +126,8 @@ def blocks(record: dict[str, Any]) -> list[Block]:
     details = [
         *in_few_runs(clean),
         changes(clean),
+        *costs(clean),
+        figures(clean),
         *chains(clean, {}).blocks,
         *reference(clean, {}).blocks,
         *diagnostics(clean, {}).blocks,

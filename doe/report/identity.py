@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,14 @@ def study_identity(command: str, study: Study, data: Path | None = None) -> Iden
             loaded = Scene.load(study.path_of(study.scene.file), study.scene.set)
             scene = loaded.model_dump(mode="json")
     named = [study.path, *named_files(study)] if study.file.scene is not None else [study.path]
-    return identity_of(command, scene, [*named, *([] if data is None else [data])])
+    identity = identity_of(command, scene, [*named, *([] if data is None else [data])])
+    return replace(identity, point=duty_words(study)) if study.shares and scene else identity
+
+
+def duty_words(study: Study) -> str:
+    """'duty of idle 15 %, cruise 80 %, take-off 5 %': the points of operation of a study with their shares of the time."""
+    points = (f"{point.name} {100.0 * study.shares[point.name]:.3g} %" for point in study.file.duty)
+    return f"duty of {', '.join(points)}"
 
 
 def scene_identity(command: str, path: Path, overrides: Iterable[str], data: Path | None = None) -> Identity:

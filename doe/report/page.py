@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import PurePath
 from typing import Any
 
-from doe.report.sections import answer, bearing, chain, design, fit, front, robust
+from doe.report.sections import answer, bearing, chain, design, duty, fit, front, robust
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import bounds, complete, fronts, picks
@@ -24,9 +24,11 @@ from doe.report.sections.record import (
     drop_undefined,
     factors,
     fits,
+    is_ratio,
     part,
     readable,
     record_table,
+    response_label,
     responses,
 )
 from rbdyn.base import markdown
@@ -126,7 +128,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     marks = picks(summary)
     record = {
         "factors": [_factor(summary, factor) for factor in inputs],
-        "responses": [{"name": name, **_named(name)} for name in names],
+        "responses": [{"name": name, **_named(summary, name)} for name in names],
         "surfaces": _surfaces(summary),
         "runs": [
             {
@@ -160,9 +162,13 @@ def _factor(summary: Record, factor: Factor) -> dict[str, Any]:
     return {key: getattr(factor, key) for key in keys} | {"tolerance": rounded_down(tolerance) if tolerance else None}
 
 
-def _named(name: str) -> dict[str, str]:
+def _named(summary: Record, name: str) -> dict[str, str]:
     words, unit = quantity(name)
-    return {"words": words, "unit": unit}
+    return (
+        {"words": response_label(summary, name), "unit": ""}
+        if is_ratio(summary, name)
+        else {"words": words, "unit": unit}
+    )
 
 
 def _point(point: Record, inputs: Sequence[Factor], names: Sequence[str]) -> dict[str, Any]:
@@ -211,7 +217,7 @@ def _surfaces(summary: Record) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "bounds": limits.get(name, []),
-                **_named(name),
+                **_named(summary, name),
                 "terms": list(coefficients),
                 "coefficients": list(coefficients.values()),
                 "covariance": covariance,
@@ -276,6 +282,7 @@ def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
 CHAPTERS = (
     identity,
     answer.answer,
+    duty.duty,
     answer.settings,
     design.design,
     fit.surfaces,

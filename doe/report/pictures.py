@@ -13,7 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from doe.report import still
-from doe.report.sections.record import Record
+from doe.report.sections.duty import gain_stills
+from doe.report.sections.record import Record, response_label
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
 from doe.study_file import Study
@@ -55,7 +56,7 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        axis.set_zlabel(label(surface.name))
+        axis.set_zlabel(_label(study, surface.name))
         rest = [place for place in range(1, factors) if place != panel]
         named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
         fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
@@ -70,6 +71,11 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     plt.close(figure)
 
 
+def _label(study: Study, name: str) -> str:
+    aggregates = {response.name: response.aggregate for response in study.file.response} if study.shares else {}
+    return response_label({"duty": {"aggregate": aggregates}}, name)
+
+
 def _bounds(study: Study, name: str) -> list[float]:
     response = next(entry for entry in study.file.response if entry.name == name)
     return [bound for bound in (response.lower, response.upper) if bound is not None]
@@ -79,6 +85,11 @@ def adaptive_search(record: Record, path: Path) -> None:
     """Hypervolume against runs compared with other fronts, and where each run was spent and why, of the record of a study."""
     progress, places = search_stills(record)
     still.save([*progress, *places], COLUMNS, path)
+
+
+def duty_gains(record: Record, path: Path) -> None:
+    """Gains at each point of a duty, of the record of a study."""
+    still.save(gain_stills(record), COLUMNS, path)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
@@ -105,10 +116,10 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
                 axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
         for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
             for bound in _bounds(study, surfaces[response].name):
-                words = f"limit {label(surfaces[response].name)} {bound:g}" if number == 0 else ""
+                words = f"limit {_label(study, surfaces[response].name)} {bound:g}" if number == 0 else ""
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
-        axis.set_xlabel(label(surfaces[i].name))
-        axis.set_ylabel(label(surfaces[j].name))
+        axis.set_xlabel(_label(study, surfaces[i].name))
+        axis.set_ylabel(_label(study, surfaces[j].name))
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:

@@ -11,28 +11,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from doe.study_file.sections import Goal, Name
-from rbdyn.base.faults import Consistent, NonNegative, assignment_faults
+from doe.study_file.sections import Goal
+from rbdyn.scene.duty import DutyPoint, point_faults
 
 Aggregate = Literal["mean", "worst", "worst_relative"]
-MOST_POINTS = 12
-# Largest distance of the sum of all shares from 1 that rounding explains.
-SUM_SLACK = 1e-6
-
-
-class DutyPoint(Consistent):
-    """A point of the duty: its share of the time, and what changes in the scene there."""
-
-    name: Name
-    """Name of the point in tables and messages."""
-    share: NonNegative
-    """Share of the time; the shares of all points sum to 1. A point of share 0 counts for worst figures and limits only."""
-    set: list[str] = []
-    """Overrides of the scene's keys at this point, as "key=value": operation, temperatures, oil flow; not of factors and seeds."""
-
-    def faults(self) -> Iterator[str]:
-        if ": " in self.name:
-            yield f"name = {self.name!r}: must not have a colon with a space; leave it out"
 
 
 class OverDuty(Goal):
@@ -68,8 +50,7 @@ def duty_faults(
     claims: Mapping[tuple[str, ...], str],
     has_scene: bool,
 ) -> Iterator[str]:
-    """Faults of a duty and of the responses' keys on it; ``claims``: keys that no
-    point may set, with the reason."""
+    """Faults of a duty and of the responses' keys on it; ``claims``: keys that no point may set, with the reasons."""
     if not points:
         if normalise:
             yield "normalise_shares = true: there is no [[duty]] with shares; add one or leave it out"
@@ -82,18 +63,8 @@ def duty_faults(
         return
     if not has_scene:
         yield "duty: there is no scene whose keys it can set; add [scene]"
-    if len(points) > MOST_POINTS:
-        yield f"duty: has {len(points)} points, more than {MOST_POINTS}; join or leave out some"
+    yield from point_faults(points, normalise, claims)
     names = [point.name for point in points]
-    repeated = [name for name, count in Counter(names).items() if count > 1]
-    yield from (f"duty.name = {name!r}: used more than once; name each once" for name in repeated)
-    total = math.fsum(point.share for point in points)
-    if not total > 0.0:
-        yield "duty.share: is 0 at every point; state the shares of the time"
-    elif not normalise and abs(total - 1.0) > SUM_SLACK:
-        yield f"duty.share: sums to {total:.6g} over all points, not to 1; change a share or write normalise_shares = true"
-    for point in points:
-        yield from assignment_faults(f"duty.set of {point.name}", point.set, claims)
     for name, response in responses.items():
         yield from _limit_faults(name, response, names)
 

@@ -10,6 +10,7 @@ from rbdyn.base.faults import (
     Consistent,
     Figure,
     InputError,
+    Name,
     NonNegative,
     Number,
     Positive,
@@ -18,8 +19,6 @@ from rbdyn.base.faults import (
     read_toml,
 )
 
-# A name that heads a column of a table, and is one field of CSV for any reader.
-Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
 # Smallest ratio of a step to its value, and of a resolution to its step; a finer one is lost in rounding.
 FINEST = 1e-9
 

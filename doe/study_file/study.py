@@ -17,14 +17,15 @@ from pydantic import Field, model_validator
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.study_file.decimal_marks import is_like_number
-from doe.study_file.duty import DutyPoint, OverDuty, alike, at_point, duty_faults, shares_of
-from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Name, Robust, StudyChain, Tolerances
+from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
+from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Robust, StudyChain, Tolerances
 from doe.study_file.table import COUNT, DATE, LABELS, Column, Sheet, listed, quoted, read_sheet, table_of
 from doe.study_file.workbook import split_path
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
     InputError,
+    Name,
     Number,
     Strict,
     assignment_faults,
@@ -33,6 +34,7 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
+from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 FORMER_TABLE = (

@@ -83,6 +83,15 @@ def question_of(question: Question) -> str:
     return digest_of(json.dumps(content, sort_keys=True))
 
 
+def _temperature_faults(path: Path, data: Path, outputs: Sequence[str], scene: Scene) -> list[str]:
+    """A sentence for each measured temperature of a scene without a heat balance."""
+    return [
+        f"{data}: column {name}: {path} has no [thermal], which computes temperatures; add that table there or remove the column"
+        for name in outputs
+        if name in clearance.TEMPERATURES and scene.thermal is None
+    ]
+
+
 def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
     """The question about a scene and a rig's table; ``free``: keys of the targets, by default all unknown ones.
 
@@ -93,8 +102,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     base = Scene.from_dict(tables, str(path))
     uncertain = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is a result of calibration; leave it out"] if uncertain.sample else [])
-    documented_keys = {entry.key for entry in documented()}
-    law_keys = set(uncertain.laws)
+    documented_keys, law_keys = {entry.key for entry in documented()}, set(uncertain.laws)
     override_claims = Claims({key_path(override): override for override in uncertain.set})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
@@ -114,8 +122,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             if override_claims.on(tuple(key.split(".")))
         ]
     )
-    estimated_keys = [key for key in free if key not in law_keys]
-    changes = {"estimated": [*uncertain.estimated, *estimated_keys], "defaults": "documented"}
+    estimated = [*uncertain.estimated, *(key for key in free if key not in law_keys)]
+    changes = {"estimated": estimated, "defaults": "documented"}
     declared = uncertain.model_copy(update=changes if free else {})
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
     case = case_of(str(path), tables, rig.outputs, declared, fixed)
@@ -141,7 +149,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {candidate.key for candidate in case.every}
     )
-    refuse([] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"])
+    idle = [] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"]
+    refuse([*idle, *_temperature_faults(path, data, rig.outputs, case.scene)])
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
@@ -361,7 +370,9 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     turns = np.array([result.counted_turns * result.replicates for result in results])
     records = [result.as_dict() for result in results]
     numerical = [
-        (records[condition][rows.outputs[name]]["numerical_error"] or 0.0) / NORMAL / np.exp(value)
+        (clearance.quantity_of(records[condition], rows.outputs[name])["numerical_error"] or 0.0)
+        / NORMAL
+        / np.exp(value)
         for (condition, name), value in zip(rows.cells, values[0], strict=True)
     ]
     return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2

@@ -25,7 +25,11 @@ from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
 from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+from rbdyn.scene.thermal import simulated_scene
 
+# Key of the only scene of a study without a duty.
+EVERYWHERE = ""
 LEVEL = 0.95  # probability that a stated interval holds the truth
 
 
@@ -95,6 +99,10 @@ class Confirmed:
     ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
     likeliest point and its probability; ``jitter_points``: those at which alone the cage trembles. They are empty
     without a duty.
+
+    ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 90 % of them over the inputs of the heat
+    balance; both None without a balance, and over a duty. ``hot``: scenes at the temperatures of their runs by point of
+    the duty, or under EVERYWHERE without a duty; empty without a balance.
     """
 
     point: Array
@@ -108,6 +116,9 @@ class Confirmed:
     friction_check: Mapping[str, float | None] | None = None
     at_points: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
     worst: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    temperatures: Mapping[str, Quantity] | None = None
+    temperature_ranges: Mapping[str, Sequence[float]] | None = None
+    hot: Mapping[str, Scene] = field(default_factory=dict)
     jitter_points: tuple[str, ...] = ()
 
     @property
@@ -183,7 +194,7 @@ def confirm(
 def confirmed_from(study: Study, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
     record = result.as_dict()
-    quantities = [record[name] for name in study.responses]
+    quantities = [clearance.quantity_of(record, name) for name in study.responses]
     values, statistical, numerical = (
         np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
         for key in ("value", "statistical_error", "numerical_error")
@@ -192,10 +203,17 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     errors = statistical, numerical
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
-    point = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
-    if not isinstance(result, DutyResult):
-        return point
-    return replace(point, at_points=result.at_points, worst=result.worst, jitter_points=result.jitter_points)
+    confirmed = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    if isinstance(result, DutyResult):
+        hot = {name: simulated_scene(one) for name, one in result.points.items() if one.thermal is not None}
+        return replace(
+            confirmed, at_points=result.at_points, worst=result.worst, jitter_points=result.jitter_points, hot=hot
+        )
+    if result.thermal is None:
+        return confirmed
+    ranges = (result.thermal["input_range"] or {}).get("temperatures_C")
+    hot = {EVERYWHERE: simulated_scene(result)}
+    return replace(confirmed, temperatures=result.temperatures_C, temperature_ranges=ranges, hot=hot)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

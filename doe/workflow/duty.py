@@ -6,10 +6,13 @@ the study's pick to that, on these surfaces, is what the compromise costs at the
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from doe import clearance
+from doe.duty import scenes_of
 from doe.study_file import Study
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
@@ -19,7 +22,10 @@ from doe.workflow.runs import Runs, rounded_within
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.base.records import finite
+from rbdyn.life.duty import DutyLife
 from rbdyn.result import Quantity
+from rbdyn.scene import Scene
 
 Figures = Mapping[str, Quantity]
 
@@ -69,13 +75,14 @@ class DutyAnswer:
     """The points of a duty in the order of the study, and how each response follows from them.
 
     ``worst``: by simulated point, then by response that is a worst one, the likeliest worst point of the duty and the
-    probability that it is.
+    probability that it is. ``life``: life over the duty at "baseline" and "pick", by static loads.
     """
 
     study: Study
     points: list[AtPoint]
     aggregate: Mapping[str, str]
     worst: Mapping[str, Mapping[str, tuple[str, float]]]
+    life: Mapping[str, DutyLife]
 
     def as_dict(self) -> dict[str, Any]:
         """JSON."""
@@ -89,6 +96,15 @@ class DutyAnswer:
                 }
                 for name, worst in self.worst.items()
             },
+            "life": {name: self._life(life) for name, life in self.life.items()},
+        }
+
+    def _life(self, life: DutyLife) -> dict[str, Any]:
+        names = [point.name for point in self.points]
+        return {
+            **life.as_record(),
+            "point_hours": dict(zip(names, map(finite, life.point_hours), strict=True)),
+            "damage": dict(zip(names, life.damage, strict=True)),
         }
 
     def _point(self, point: AtPoint) -> dict[str, Any]:
@@ -132,7 +148,25 @@ def duty_answer(study: Study, runs: Runs, confirmed: Mapping[str, Confirmed]) ->
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)
     }
     worst = {"baseline": baseline.worst, "pick": pick.worst}
-    return DutyAnswer(study, points, aggregate, worst)
+    life = lives(study, {"baseline": baseline.point, "pick": pick.point}, {"baseline": baseline.hot, "pick": pick.hot})
+    return DutyAnswer(study, points, aggregate, worst, life)
+
+
+def lives(
+    study: Study, ends: Mapping[str, Array], hot: Mapping[str, Mapping[str, Scene]] = MappingProxyType({})
+) -> dict[str, DutyLife]:
+    """Life over the duty of the original design, "baseline", and of others, points (k,) by name.
+
+    ``hot``: scenes at the temperatures of a heat balance by name of the design and point.
+    """
+    from rbdyn.dynamics.duty import roller_duty_life
+
+    names, life = [point.name for point in study.file.duty], {}
+    for name, place in ends.items():
+        run = clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, place)
+        by_name = {**dict(zip(study.shares, scenes_of(run), strict=True)), **hot.get(name, {})}
+        life[name] = roller_duty_life([by_name[point] for point in names], [study.shares[point] for point in names])
+    return life
 
 
 def study_at(study: Study, name: str) -> Study:

@@ -1,35 +1,26 @@
-"""Input sets of a scene with unknown inputs: which inputs vary, the scenes at their values, and the runs of these.
-
-Columns of tables that are named by keys of a scene hold values of these keys.
-"""
+"""Input sets of a scene with unknown inputs: which inputs vary, the scenes at their values, and the runs of these."""
 
 import copy
-import difflib
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, get_args
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, TypeAdapter, ValidationError
-from pydantic.fields import FieldInfo
 from scipy.stats import t as student
 
 from doe import clearance
 from doe.clearance import Simulations, work_of
 from doe.duty import Duty, Run, Simulated, over_points
 from doe.running.store import Failure, sentence
-from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column, read_sheet
-from doe.study_file.table import is_number as is_numeral
+from doe.study_file.table import read_sheet
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
+from doe.workflow.key_columns import key_values, unknown_keys
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import (
-    LONGEST_NAME,
-    MOST_FAULTS,
     Claims,
     InputError,
     RunError,
@@ -46,101 +37,6 @@ from rbdyn.result import read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
-
-LARGEST_BITS = 63  # of whole numbers, as in TOML
-
-
-def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
-    """Values (n,) of the scene's key that names a column, and a sentence for each cell without one.
-
-    A cell that is one of the law's ``choices`` has that value. Otherwise the key's type in a scene decides between number,
-    boolean and text.
-    """
-    adapter, values = _adapter(column.name), dict[str, Any]()
-    faults = []
-    for row, text in enumerate(column.texts):
-        if text not in values:
-            values[text] = next(_accepted(text, column.plain[row], adapter, choices), None)
-        if values[text] is None:
-            faults.append(column.fault(row, column.doubt(row) or _fault(column.name, text)))
-    return [values[text] for text in column.texts], faults
-
-
-def unknown_keys(keys: Iterable[str]) -> list[str]:
-    """A sentence for each column whose name is no key of a scene; the first ones name the nearest key."""
-    sentences = list[str]()
-    for key in keys:
-        table, _, name = key.rpartition(".")
-        names = _fields(key)
-        if name not in names:
-            # The search for the nearest name is slow, and only the first sentences are shown.
-            near = difflib.get_close_matches(name[:LONGEST_NAME], names, n=1) if len(sentences) < MOST_FAULTS else []
-            fix = f"did you mean {table}.{near[0]}?" if near else "rename or remove it"
-            sentences.append(f"column {one_line(key, LONGEST_NAME)}: unknown key; {fix}")
-    return sentences
-
-
-def _readings(text: str, plain: str) -> list[Any]:
-    """Values that a text may denote, the narrowest type first; ``plain``: the text with a decimal point, if it is a number."""
-    readings: list[Any] = [text.lower() == "true"] if text.lower() in ("true", "false") else []
-    if is_numeral(plain) and math.isfinite(float(plain)):
-        is_whole = WHOLE.fullmatch(plain) and int(plain).bit_length() <= LARGEST_BITS
-        readings += [int(plain), float(plain)] if is_whole else [float(plain)]
-    return [*readings, text]
-
-
-def _accepted(text: str, plain: str, adapter: TypeAdapter[Any], choices: Sequence[Any]) -> Iterator[Any]:
-    """Values of the key that a text may denote, the likeliest first."""
-    readings = _readings(text, plain)
-    matches = [choice for choice in choices if any(_alike(choice, reading) for reading in readings)]
-    if len(matches) == 1:
-        yield matches[0]
-    for reading in matches or readings:
-        try:
-            yield adapter.validate_python(reading, strict=True)
-        except ValidationError:
-            continue
-
-
-def _alike(choice: Any, reading: Any) -> bool:
-    """Whether a reading is a choice: of one type, or both numbers."""
-    if isinstance(choice, str) and isinstance(reading, str):
-        return choice.strip() == reading
-    kinds = {type(choice), type(reading)}
-    return (len(kinds) == 1 or kinds == {int, float}) and bool(choice == reading)
-
-
-def _fault(key: str, text: str) -> str:
-    """The fault of a text that is no value of its key, with the fix."""
-    if not text:
-        return "is empty; fill it in or remove the row"
-    if len(text) > LONGEST_NUMBER:
-        return f"is longer than {LONGEST_NUMBER} characters; write a shorter value"
-    return f"is no value of that key; rbdyn keys {key} lists which are"
-
-
-def _adapter(key: str) -> TypeAdapter[Any]:
-    """Validator of the values of a dotted key of a scene."""
-    field = _fields(key)[key.rpartition(".")[2]]
-    limited: Any = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
-    return TypeAdapter(limited)
-
-
-def _fields(key: str) -> dict[str, FieldInfo]:
-    """Fields of the table of a dotted key; none if no scene has that table."""
-    models: list[type[BaseModel]] = [Scene]
-    for part in key.split(".")[:-1]:
-        fields = [model.model_fields[part] for model in models if part in model.model_fields]
-        models = [inner for field in fields for inner in _models(field.annotation)]
-    return {name: field for model in models for name, field in model.model_fields.items()}
-
-
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Tables that an annotation allows."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for argument in get_args(annotation) for model in _models(argument)]
-
 
 HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
@@ -299,9 +195,10 @@ def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> C
     return case
 
 
-def check_overrides(
-    overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = MappingProxyType({})
-) -> None:
+NOTHING: Mapping[str, str] = MappingProxyType({})
+
+
+def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
     """Raises InputError for overrides that no run has: of inputs, unless their laws multiply them, and of ``fixed`` keys."""
     claims = {
         unknown_input.key: (
@@ -352,7 +249,7 @@ def case_of(
     data: dict[str, Any],
     outputs: Sequence[str],
     declared: Uncertain | None = None,
-    fixed: Mapping[str, str] = MappingProxyType({}),
+    fixed: Mapping[str, str] = NOTHING,
     stated_in: Path | None = None,
 ) -> Case:
     """Tables of a scene with its unknown inputs.
@@ -368,6 +265,9 @@ def case_of(
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # Runs do not depend on declarations, and checking these again at every input set would be slow.
     plain = {table: keys for table, keys in data.items() if table != "uncertain"}
+    if scene.thermal is not None:
+        # A viscosity that varies holds at a stated temperature: the first guess of the heat balance.
+        plain["lubricant"] = {"temperature_C": scene.lubricant.temperature_C, **plain["lubricant"]}
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
     inputs = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))

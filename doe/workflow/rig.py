@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from doe.clearance import TEMPERATURES
 from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, gap_notes, listed, read_sheet
-from doe.workflow.input_sets import key_values, unknown_keys
+from doe.workflow.key_columns import key_values, unknown_keys
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.words import counted
 
-# Outputs of a simulation that can be measured; the others are not positive throughout.
+# Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
 PULSE_OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")
 OUTPUTS = (
     "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", *PULSE_OUTPUTS,
+    *TEMPERATURES,
 )  # fmt: skip
 SD, TURNS, HOLD = "_sd", "turns", "hold"
 FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
@@ -204,7 +206,9 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
                 name, place, "has no use in this row; leave it out, or add the measurement that it belongs to"
             )
     for name in measured:
-        if not (cells.states(name + SD, place) or cells.states(TURNS, place)):
+        if name in TEMPERATURES and not cells.states(name + SD, place):
+            yield cells.fault(name + SD, place, "is missing; give the standard deviation of the thermometer [K]")
+        elif not (cells.states(name + SD, place) or cells.states(TURNS, place)):
             yield cells.fault(
                 name + SD, place, f"is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
             )

@@ -59,6 +59,22 @@ class RigTable(Strict):
     """Measured mean integral of the force over a pulse; a trace of force or acceleration gives it too."""
     pulse_impulse_N_s_sd: Positive | None = None  # noqa: N815
     """Standard deviation of the measured impulse; or give turns."""
+    oil_temperature_C: Positive | None = None  # noqa: N815
+    """Measured temperature of the oil that leaves the bearing, of a scene with [thermal]."""
+    oil_temperature_C_sd: Positive | None = None  # noqa: N815
+    """Standard deviation of the measured temperature of the oil; turns do not replace it."""
+    outer_temperature_C: Positive | None = None  # noqa: N815
+    """Measured temperature of the outer ring, of a scene with [thermal]."""
+    outer_temperature_C_sd: Positive | None = None  # noqa: N815
+    """Standard deviation of the measured temperature of the outer ring; turns do not replace it."""
+    inner_temperature_C: Positive | None = None  # noqa: N815
+    """Measured temperature of the inner ring, of a scene with [thermal]."""
+    inner_temperature_C_sd: Positive | None = None  # noqa: N815
+    """Standard deviation of the measured temperature of the inner ring; turns do not replace it."""
+    roller_temperature_C: Positive | None = None  # noqa: N815
+    """Measured temperature of the rollers, of a scene with [thermal]."""
+    roller_temperature_C_sd: Positive | None = None  # noqa: N815
+    """Standard deviation of the measured temperature of the rollers; turns do not replace it."""
     turns: Positive | None = None
     """Shaft turns of the measurement: its scatter is that of a run as long, where no standard deviation is stated."""
     hold: Literal["1", "yes", "true", "0", "no", "false"] | None = None

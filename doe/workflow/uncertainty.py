@@ -1,10 +1,10 @@
 """Ranges of a scene's outputs over its unknown inputs, and the share of each input: ``doe uncertainty``."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from doe.clearance import Simulations, work_of
+from doe.clearance import TEMPERATURES, Simulations, quantity_of, work_of
 from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -38,6 +38,7 @@ from rbdyn.base.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
+# Outputs of every scene; those with a heat balance also have their temperatures.
 OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 # Fresh input sets of the emulator, and most input sets that run.
 FRESH, MOST = 8192, 512
@@ -98,7 +99,7 @@ def find_uncertainty(
     standard errors of the ends of every range are below ``target`` of its width. If noise is more than a tenth of an
     output's variance, all sets get more replicates. Raises InputError, RunError, KeyboardInterrupt.
     """
-    case = read_case(path, OUTPUTS, overrides)
+    case = _case_of(path, overrides)
     count = case.uncertain.points if points is None else points
     (nominal,) = simulations.run([case.scene], ["as the scene says"], simulations.progress("as the scene says"))
     if isinstance(nominal, Failure):
@@ -107,7 +108,7 @@ def find_uncertainty(
     fresh_sets = joint.sets(FRESH, seed + 1)
     while True:
         sets = replicated_sets(case, joint.sets(count, seed), simulations, effort)
-        fitted = [_emulated(case, sets, nominal, place) for place in range(len(OUTPUTS))]
+        fitted = [_emulated(case, sets, nominal, place) for place in range(len(case.outputs))]
         spreads = [spread_of(runs, emulator, fresh_sets, seed) for runs, emulator in fitted]
         if effort < MOST_EFFORT and any(spread.variance["simulation"] > NOISY for spread in spreads):
             effort *= 2
@@ -117,7 +118,7 @@ def find_uncertainty(
             break
     outputs = {
         name: _output(case, _quantity(nominal, name), spread, emulator, fresh_sets)
-        for name, spread, (_, emulator) in zip(OUTPUTS, spreads, fitted, strict=True)
+        for name, spread, (_, emulator) in zip(case.outputs, spreads, fitted, strict=True)
     }
     covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
     outside_shares = shares_outside(case, covered_places, sets.quantiles, sets.signals)
@@ -131,15 +132,21 @@ def find_uncertainty(
     return Uncertainty(path, case.every, outside_shares, outputs, sets, seed, notes)
 
 
+def _case_of(path: Path, overrides: Sequence[str]) -> Case:
+    """The scene with its unknown inputs and outputs. Raises InputError."""
+    case = read_case(path, OUTPUTS, overrides)
+    return case if case.scene.thermal is None else replace(case, outputs=(*OUTPUTS, *TEMPERATURES))
+
+
 def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
-    numerical = _quantity(nominal, OUTPUTS[place]).numerical_error or 0.0
+    numerical = _quantity(nominal, case.outputs[place]).numerical_error or 0.0
     samples = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
     runs = Runs(sets.quantiles, *samples, (numerical / NORMAL) ** 2)
     return runs, emulated(runs, case.uncertain.inputs, declared(case))
 
 
 def _quantity(nominal: SimulationResult, name: str) -> Quantity:
-    return Quantity.from_dict(nominal.as_dict()[name])
+    return Quantity.from_dict(dict(quantity_of(nominal.as_dict(), name)))
 
 
 def _output(case: Case, nominal: Quantity, spread: Spread, fitted: Emulated, fresh_sets: Array) -> OutputRange:
@@ -194,7 +201,7 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
 
     The sets and their replicates may double later.
     """
-    case = read_case(path, OUTPUTS, overrides)
+    case = _case_of(path, overrides)
     count = case.uncertain.points if points is None else points
     return [
         Stage.of("as the scene says", 1, work_of(case.scene)),

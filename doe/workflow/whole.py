@@ -18,7 +18,7 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
-from doe.duty import scene_at
+from doe.duty import Duty, scene_at
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
@@ -28,6 +28,7 @@ from doe.study_file.sections import chain_table
 from doe.threads import one_thread
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
+    EVERYWHERE,
     Confirmed,
     Gain,
     Limit,
@@ -261,10 +262,17 @@ class StudyResult:
         return self.confirmed["pick"]
 
     @cached_property
+    def scenes(self) -> dict[str, Scene]:
+        """Scenes of baseline and pick; those with a heat balance at the temperatures of their runs."""
+        scenes = scenes_of(self.study, self.baseline.point, self.pick.point)
+        duty = Duty.of(self.study)
+        point = EVERYWHERE if duty is None else duty.main
+        return {name: self.confirmed[name].hot.get(point, scene) for name, scene in scenes.items()}
+
+    @cached_property
     def clearances(self) -> OperatingClearances:
         """Clearances among the factors in operation, at baseline and pick."""
-        points = scenes_of(self.study, self.baseline.point, self.pick.point)
-        return operating_clearances(self.study, points)
+        return operating_clearances(self.study, self.scenes)
 
     @cached_property
     def clearances_at_points(self) -> dict[str, OperatingClearances]:
@@ -272,7 +280,9 @@ class StudyResult:
         ends = {"baseline": (self.study.with_levels(()), self.baseline), "pick": (self.study, self.pick)}
         runs = {name: clearance.confirmation_run(study, end.point) for name, (study, end) in ends.items()}
         return {
-            point: operating_clearances(self.study, {name: scene_at(run, point) for name, run in runs.items()})
+            point: operating_clearances(
+                self.study, {name: ends[name][1].hot.get(point, scene_at(run, point)) for name, run in runs.items()}
+            )
             for point in self.study.shares
         }
 

@@ -66,10 +66,14 @@ def study_name(name: str | None, scene: Scene | BallScene) -> str:
 def study(name: str | None, scene: Scene | BallScene, progress: "Reporter" = None) -> "Report":
     """Run a study by name, by default the first of the kind of bearing; ``progress(done, total)`` is called as it goes on.
 
-    Raises InputError where the kind of bearing lacks the study or the scene has nothing to study; RunError; KeyboardInterrupt.
+    A scene with [thermal] is studied at its steady temperatures. Raises InputError where the kind of bearing lacks the study or the scene has nothing to study; RunError; KeyboardInterrupt.
     """
     homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
     module, _, function = homes[study_name(name, scene)].partition(":")
+    if not isinstance(scene, BallScene) and scene.thermal is not None:
+        from rbdyn.dynamics.simulate import steady_scene
+
+        scene = steady_scene(scene)
     report: Report = getattr(import_module(module), function)(scene, progress)
     return report
 

@@ -13,9 +13,18 @@ from datetime import date, time
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Generic, Self, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 
 def _not_vanishing(value: float) -> float:
@@ -36,6 +45,8 @@ Figure = Annotated[float, Field(ge=-1e60, le=1e60)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Share = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
+# A name that heads a column of a table, and is one field of CSV for any reader.
+Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
 
 
 N = TypeVar("N")
@@ -154,6 +165,25 @@ class Consistent(Strict):
     @model_validator(mode="after")
     def _without_faults(self) -> Self:
         return or_refuse(self, self.faults())
+
+
+class Sparse(Consistent):
+    """A table that leaves out of its saved form those keys of ``UNSAVED`` that have the value there.
+
+    A table that gains such a key is saved as before, so results that are stored under it stay valid.
+    """
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {}
+
+    def unsaved(self) -> Mapping[str, Any]:
+        """Keys that the table does not save where they have these values."""
+        return self.UNSAVED
+
+    @model_serializer(mode="wrap")
+    def _without_unsaved(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        saved: dict[str, Any] = handler(self)
+        unsaved = self.unsaved()
+        return {key: value for key, value in saved.items() if key not in unsaved or value != unsaved[key]}
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:

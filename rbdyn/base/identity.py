@@ -137,7 +137,7 @@ def point_words(scene: Mapping[str, Any], swept: Mapping[str, Sequence[float]] =
                 f"outer ring {_number(outer)} rpm" if outer else "",
                 _loads(operation),
                 "speed or load over time by a schedule" if scheduled else "",
-                _oil(scene.get("lubricant") or {}),
+                _oil(scene.get("lubricant") or {}, scene.get("thermal")),
                 *(_range(key, values) for key, values in swept.items()),
             ),
         )
@@ -169,13 +169,18 @@ def _range(key: str, values: Sequence[float]) -> str:
     return f"{name} {ends} {unit}".rstrip()
 
 
-def _oil(lubricant: Mapping[str, Any]) -> str:
-    """The oil and its temperature; empty where the scene has none."""
+def _oil(lubricant: Mapping[str, Any], thermal: Mapping[str, Any] | None) -> str:
+    """The oil and its temperature, or what cools it where a heat balance computes that; empty where the scene has none."""
     if not lubricant:
         return ""
     name = lubricant.get("oil")
     oil = "oil by data sheet" if name in (None, "data_sheet") else str(name)
-    return f"{oil} at {_number(lubricant['temperature_C'])} °C"
+    if thermal is None:
+        return f"{oil} at {_number(lubricant['temperature_C'])} °C"
+    flow, inlet = lubricant.get("oil_flow_l_min"), lubricant.get("oil_inlet_temperature_C")
+    if flow is None or inlet is None:
+        return f"{oil}, heat balance at {_number(thermal['ambient_C'])} °C around"
+    return f"{oil}, heat balance with {_number(flow)} L/min at {_number(inlet)} °C"
 
 
 def _number(value: float) -> str:

@@ -1,9 +1,10 @@
 """The command ``rbdyn``: simulate, map, accuracy and show; other modules have ``ball``, ``new``, ``keys`` and ``manual``."""
 
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +20,7 @@ from rbdyn.cli.manual import describe_keys, manual
 from rbdyn.cli.new import new
 
 if TYPE_CHECKING:
+    from rbdyn.cli.duty import MapDuty
     from rbdyn.dynamics.slip_map import SlipMap
     from rbdyn.scene import Scene
 
@@ -84,8 +86,10 @@ def simulate(
 
         with command.progress_bar("simulating", quiet or as_json, workers) as progress:
             result = run_scene(loaded, workers, progress, target=aim, notice=command.notice(quiet))
-        loaded = type(loaded).from_dict(result.scene)
         from rbdyn.cli import simulation_output
+        from rbdyn.scene.thermal import simulated_scene
+
+        loaded = simulated_scene(result)
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
         blocks = partial(simulation_output.blocks, result)
@@ -95,6 +99,8 @@ def simulate(
         command.hand_over(
             result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), folder, files
         )
+    if result.status != "ok":
+        raise typer.Exit(command.FAILED)
 
 
 @app.command(cls=command.refusing(FORMER))
@@ -131,26 +137,33 @@ def accuracy(
         raise typer.Exit(command.FAILED)
 
 
-def map_blocks(mapped: "SlipMap") -> list[Block]:
-    """Cage slip over speed and load, and what it cost."""
+def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
+    """Cage slip over speed and load, what it cost, and the points of a duty."""
     header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     spent = f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}"
-    return [Table("Cage slip", header, rows), Paragraph(spent)]
+    return [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks() if duty else [])]
 
 
-def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
-    """Write map.json, map.csv and map.png; returns the file names."""
+def _write_map(mapped: "SlipMap", folder: Path, duty: "MapDuty | None" = None) -> list[str]:
+    """Write map.json, map.csv and map.png, with a duty also duty.csv; returns the file names."""
     from rbdyn.plots.roller import draw_slip_map
     from rbdyn.result import write_json
 
-    write_json(folder / "map.json", mapped.as_dict())
+    write_json(folder / "map.json", _map_record(mapped, duty))
     save_table(mapped.table(), folder / "map.csv")
-    draw_slip_map(mapped, folder / "map.png")
-    return ["map.json", "map.csv", "map.png"]
+    draw_slip_map(mapped, folder / "map.png", duty.marks if duty else {})
+    if duty is None:
+        return ["map.json", "map.csv", "map.png"]
+    save_table(duty.table(), folder / "duty.csv")
+    return ["map.json", "map.csv", "duty.csv", "map.png"]
+
+
+def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
+    return mapped.as_dict() | ({} if duty is None else {"duty": duty.as_record()})
 
 
 @app.command("map")
@@ -158,6 +171,10 @@ def slip_map(
     scene: command.SceneFile,
     speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
+    duty: Annotated[
+        Path | None,
+        command.valued("FILE.toml", "Mark its points of operation, such as the duty of a study.", "no marks", "--duty"),
+    ] = None,
     assignments: command.Set = None,
     turns: command.Turns = None,
     replicates: command.Replicates = None,
@@ -177,21 +194,41 @@ def slip_map(
         from rbdyn.dynamics import slip_map as study
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
+        marked = _map_duty(loaded, duty, *axes)
         points = folder / study.POINTS if folder else None
         with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
             mapped = study.slip_map(loaded, *axes, workers, progress, points, command.notice(quiet))
         swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
-        identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), [scene], swept=swept)
-        write = partial(_write_map, mapped)
-        blocks = partial(map_blocks, mapped)
-        files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
+        inputs = [scene] if duty is None else [scene, duty]
+        identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept)
+        blocks = partial(map_blocks, mapped, marked)
+        write = partial(_write_map, mapped, duty=marked)
+        files = write_with_report(folder, identity, blocks, lambda: write(folder)) if folder else []
         command.hand_over(
-            mapped.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()]), folder, files
+            partial(_map_record, mapped, marked),
+            as_json,
+            lambda: show_blocks([identity_line(identity), *blocks()]),
+            folder,
+            files,
         )
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:
         raise typer.Exit(command.FAILED)
+
+
+def _map_duty(
+    scene: "Scene",
+    path: Path | None,
+    speeds_rpm: Sequence[float],
+    loads_N: Sequence[float],  # noqa: N803
+) -> "MapDuty | None":
+    """The duty of a file on a map; None without a file. Raises InputError."""
+    if path is None:
+        return None
+    from rbdyn.cli.duty import map_duty
+
+    return map_duty(scene, path, speeds_rpm, loads_N)
 
 
 def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":

@@ -98,7 +98,8 @@ def ball(
         )
     if not result.is_equilibrium:
         if not as_json:
-            print(f"no equilibrium: {result.status}", file=sys.stderr)
+            subject = "no equilibrium" if result.thermal is None else "temperatures"
+            print(f"{subject}: {result.status}", file=sys.stderr)
         raise typer.Exit(FAILED)
 
 

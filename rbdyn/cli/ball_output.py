@@ -15,9 +15,11 @@ if TYPE_CHECKING:
 
 
 def blocks(result: BallResult) -> list[Block]:
-    """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; nothing without an equilibrium."""
+    """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; without an equilibrium nothing but the
+    temperatures of the search for steady ones."""
     if not result.is_equilibrium:
-        return []
+        thermal = result.thermal or {}
+        return [_search_table(thermal)] if "path_heat_W" in thermal else []
     titles = {name: f"{name} row" if name else "" for name in result.row_reports}
     rows: list[Block] = []
     for name, row in result.row_reports.items():
@@ -34,6 +36,8 @@ def blocks(result: BallResult) -> list[Block]:
         )
     if result.fits is not None:
         sentences.append(_fits(result.fits))
+    if result.temperatures_C is not None and result.thermal is not None:
+        sentences += _temperatures(result.temperatures_C, result.thermal)
     if result.runout is not None:
         sentences.append(_runout(result.runout))
     from rbdyn.compiled.kernel import compiler_notes
@@ -139,6 +143,38 @@ def _fits(fits: dict[str, Any]) -> str:
     when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
     pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
     return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
+
+
+PARTS = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": "balls"}
+
+
+def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]:
+    """Steady temperatures with their ranges, heat and its ways out, clearance and contact angle in operation."""
+    spans = thermal["input_range"]["temperatures_C"]
+    parts = ", ".join(
+        f"{part} {nodes[node]:.1f} ({spans[node][0]:.0f} to {spans[node][1]:.0f})" for node, part in PARTS.items()
+    )
+    friction = thermal["friction_W"]
+    ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
+    clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
+    return [
+        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; gain of the loop {thermal['gain']:.2g}",
+        f"heat by SKF's friction model: {sum(friction.values()):.4g} W, rolling {friction['rolling']:.4g} and sliding "
+        f"{friction['sliding']:.4g}; carried off by {ways}",
+        f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "
+        f"{angle['operating']:.4g} deg of {angle['drawn']:.4g}",
+    ]
+
+
+def _search_table(thermal: dict[str, Any]) -> Table:
+    """Temperatures, heat and clearance of the states visited."""
+    header = (*(f"{part} [°C]" for part in PARTS.values()), "heat [W]", "clearance [µm]")
+    states = zip(thermal["path_C"], thermal["path_heat_W"], thermal["path_clearance_um"], strict=True)
+    rows = [
+        [*(f"{state[node]:.1f}" for node in PARTS), f"{heat:.4g}", f"{clearance:.4g}"]
+        for state, heat, clearance in states
+    ]
+    return Table("search for steady temperatures", header, rows)
 
 
 def _runout(runout: dict[str, Any]) -> str:

@@ -118,6 +118,8 @@ SWEPT = {
     "clearance": (over_clearance, "um", 1e-6),
     "wear": (over_wear, "um", 1e-6),
 }
+# Keys by which ``--sweep`` does the same.
+SWEPT_KEYS = {"preload": "operation.preload_N", "clearance": "bearing.radial_clearance_mm"}
 # Figures of a point in its record, by column of the table.
 SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
 # Bearings of a lot that are solved in full to set the limits of race errors.
@@ -213,6 +215,11 @@ def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, see
 
 
 def _single(scene: BallScene, option: str) -> SingleRowScene:
+    if scene.thermal is not None:
+        other = f"; --sweep {SWEPT_KEYS[option]} follows them" if option in SWEPT_KEYS else ""
+        raise InputError(
+            [f"--{option}: is a study at stated temperatures; state them in [mounting], not [thermal]{other}"]
+        )
     try:
         return single_row(scene)
     except InputError:

@@ -16,6 +16,7 @@ from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, quantity, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import simulated_scene
 
 if TYPE_CHECKING:
     from rbdyn.base.forecast import Notice
@@ -60,7 +61,7 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     from rbdyn.dynamics.motion import most_turns
 
     result = SimulationResult.load(path)
-    scene = Scene.from_dict(result.scene, f"{path}: scene")
+    scene = simulated_scene(result, f"{path}: scene")
     numerics, faults = scene.numerics, []
     fewest = FEWEST_SAMPLES / numerics.samples_per_turn
     most = min(most_turns(scene), numerics.turns)

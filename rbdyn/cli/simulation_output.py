@@ -28,6 +28,7 @@ def blocks(result: SimulationResult) -> list[Block]:
         Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
+        *_temperatures(result),
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
         *(_clearances(result.clearance_um) if result.scene.get("mounting") else ()),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
@@ -114,6 +115,43 @@ def _race_sentence(race: str, contact: dict[str, float]) -> str:
         f"{race} race at its largest load: {contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} "
         f"µm each way{film}"
     )
+
+
+# Nodes of the heat balance in words.
+PARTS = {
+    "oil": "oil",
+    "outer": "outer ring and housing",
+    "inner": "inner ring and shaft",
+    "rollers": "rollers and cage",
+}
+
+
+def _temperatures(result: SimulationResult) -> list[Block]:
+    """Temperatures with what the inputs of the balance leave open first, and the heat of each node; nothing without a balance."""
+    balance, figures = result.thermal, result.temperatures_C
+    if balance is None or figures is None:
+        return []
+    ranges = (balance["input_range"] or {}).get("temperatures_C", {})
+    rows = [
+        (
+            PARTS[node],
+            figure.value_text,
+            " to ".join(f"{end:.0f}" for end in ranges[node]) if node in ranges else "",
+            "" if figure.statistical_error is None else _error(figure.statistical_error),
+            "" if figure.numerical_error is None else _error(figure.numerical_error),
+            f"{balance['heat_W'][node]:.3g}",
+        )
+        for node, figure in figures.items()
+    ]
+    header = ("temperature [°C]", "value", "inputs (90 %)", "statistical (95 %)", "numerical (95 %)", "heat [W]")
+    ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance["carried_off_W"].items())
+    state = "steady state" if balance["status"] == "steady" else balance["status"]
+    inputs = ", ".join((balance["input_range"] or {}).get("inputs", ()))
+    return [
+        Table("", header, rows),
+        Paragraph(f"{state}; gain of heat and temperature {balance['gain']:+.2f}; carried off: {ways}"),
+        *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
+    ]
 
 
 def _clearances(clearance: dict[str, Any]) -> list[Block]:

@@ -163,13 +163,17 @@ def history(
     notice: Notice = log,
     overrides: Iterable[str] = (),
 ) -> History:
-    """History of one replicate, counted from 0, over the first ``turns`` counted turns.
+    """History of one replicate, counted from 0, over the first ``turns`` counted turns, with [thermal] at steady temperatures.
 
     ``scene``: also the path of its file; ``overrides`` of its keys, such as ``["cage.mass_g=50"]``. ``samples_per_turn``: by
     default that of the scene. ``notice``: called with a sentence on a long run, as in ``simulate``. Raises RunError, and
     InputError for a faulty scene, another kind of bearing and for impossible turns, replicates or samples.
     """
     scene = rollers_only(scene, overrides)
+    if scene.thermal is not None:
+        from rbdyn.dynamics.simulate import steady_scene
+
+        scene = steady_scene(scene, stop=stop)
     per_turn = scene.numerics.samples_per_turn if samples_per_turn is None else samples_per_turn
     refuse(_request_faults(scene, turns, replicate, per_turn))
     bearing = roller_bearing(scene)

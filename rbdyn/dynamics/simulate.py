@@ -79,6 +79,30 @@ def simulate(
 
         return reach(scene, target, partial(simulate, notice=notice), workers, progress, stop, notice)
     stop = Stop(outer=stop)
+    run = partial(_ensemble, workers=workers, stop=stop)
+    if scene.thermal is not None:
+        from rbdyn.dynamics.temperatures import with_temperatures
+
+        return with_temperatures(scene, run, _gather, progress, notice)
+    return _gather(scene, *run(scene, progress, notice))
+
+
+def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None) -> Scene:
+    """The scene at its steady temperatures where it has [thermal], else the scene itself.
+
+    Raises RunError where it has none, and InputError where it is impossible even at the temperature of its surroundings.
+    """
+    if scene.thermal is None:
+        return scene
+    from rbdyn.dynamics import temperatures
+
+    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=Stop(outer=stop)))
+
+
+def _ensemble(
+    scene: Scene, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
+) -> tuple[Ensemble, dict[str, float]]:
+    """Replicates of a scene, and the time [s] that they took and were stated to take."""
     bearing = roller_bearing(scene)
     compile_s = 0.0
     method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
@@ -90,10 +114,9 @@ def simulate(
     turns = numerics.warm_up_turns + (whole_windows(scene) if scene.extends else numerics.turns)
     growth = numerics.extend_limit if scene.extends else 1.0
     pace = Pace(scene, notice, numerics.replicates, turns, threads_of(workers), growth, numerics.companions)
-
     ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)})
+    return ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)}
 
 
 def _prediction(pace: Pace) -> dict[str, float]:
@@ -113,7 +136,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
-    pulses = pulse_figures(scene, runs, companions, ensemble.plan.share)
+    pulses: dict[str, Any] = pulse_figures(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",

@@ -1,6 +1,6 @@
 """Cage slip, loss, whirl and impact over speed and load: where a bearing skids.
 
-Every point is the same scene at another inner speed and radial load. A point that cannot go on becomes a record of the
+Every point is the same scene at another inner speed and radial load, with [thermal] at its own steady temperatures. A point that cannot go on becomes a record of the
 cause, and the others go on. A file may keep finished points, so that an interrupted map goes on there.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rbdyn.base.faults import MOST_VALUES, InputError
+from rbdyn.base.faults import MOST_VALUES, InputError, RunError
 from rbdyn.base.forecast import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
 from rbdyn.base.storage import Checkpoint, code_version, run_key
@@ -22,6 +22,7 @@ from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
 from rbdyn.result import Quantity, versions
@@ -171,10 +172,19 @@ def slip_map(
     store, version = Checkpoint(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
     keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
     points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := store.get(key))}
+    numerics, stop = scene.numerics, Stop()
+    for place, point in enumerate(scenes if scene.thermal is not None else ()):
+        hot = _at_temperatures(point, workers, stop) if place not in points else point
+        if isinstance(hot, str):
+            points[place] = Point(
+                point.operation.inner_speed_rpm, point.operation.radial_load_N, f"failed: {hot}", {}, None
+            )
+            store.put(keys[place], points[place].as_dict())
+        else:
+            scenes[place] = hot
     bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}
     for place in list(bearings)[:1]:
         prepare(scenes[place], bearings[place])
-    numerics, stop = scene.numerics, Stop()
     total, ended = len(bearings) * (numerics.replicates + numerics.companions), 0
     turns, runs = numerics.warm_up_turns + numerics.turns, len(bearings) * numerics.replicates
     pace = Pace(scene, notice, runs, turns, threads_of(workers), companions=total - runs, scatter=UNLIKE)
@@ -198,6 +208,14 @@ def slip_map(
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
+
+
+def _at_temperatures(scene: Scene, workers: int | None, stop: Stop) -> Scene | str:
+    """The scene at its steady temperatures, or why it has none."""
+    try:
+        return steady_scene(scene, workers, stop)
+    except (InputError, RunError) as error:
+        return str(error)
 
 
 def _scene_at(scene: Scene, speed: float, load: float) -> Scene:

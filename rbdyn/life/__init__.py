@@ -1,7 +1,9 @@
 """Fatigue life, and makers' rules on friction and minimum load.
 
 - ``rollers``, ``balls``: ratings from dimensions (ISO 281, ISO 76) and life from the loads of each rolling element (ISO/TS 16281)
+- ``duty``: life over points with shares of the time (Palmgren and Miner), and the equivalent load
 - ``rollers`` also: minimum loads, SKF's friction model and the heat of ISO 15312
+- ``friction``: what SKF's model has in common for all kinds, and its moments of ball bearings
 
 This file has what both kinds of bearing share: the life in turns of one ring against the other and in hours, with the loads and
 capacities of the races behind it.

@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, MethodError
 from rbdyn.life import Life, Turning
+from rbdyn.life.friction import FrictionMoments, inlet_heating_factor, sliding_friction, starvation_factor
 from rbdyn.properties.catalogue import Envelope
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
@@ -213,6 +214,76 @@ def _lamina_loads(loads: Array, race: str) -> Array:
     return array
 
 
+LINE_EXPONENT = 10.0 / 9.0
+# Newton's steps, with bisection where one leaves its bracket, and the relative error of the sum of forces at which they end.
+BALANCE_STEPS, BALANCE_ERROR = 200, 1e-13
+
+
+class RollerContacts(NamedTuple):
+    """Contacts of a row of rollers for its static loads: K of Q = K delta^(10/9) of one race [N/m^(10/9)], roller to race.
+
+    ``relief``: approach that a lamina lacks at a race because of profile and tilt [m], of the inner and the outer race, each
+    (rollers, slices) or (1, slices).
+    """
+
+    stiffness: float
+    relief: tuple[Array, Array]
+
+
+def static_loads(
+    contacts: RollerContacts, rollers: int, load: float, clearance: float, centrifugal: float = 0.0
+) -> tuple[Array, Array]:
+    """Loads [N] of the laminae on the inner and the outer race, each (1, rollers, slices), under a radial ``load`` [N].
+
+    ISO/TS 16281: the ring is displaced by d along the load, so the races approach at azimuth phi by d cos(phi) - s/2, with the
+    diametral operating ``clearance`` s [m]. One roller is under the load. Both contacts of a roller share the approach. The
+    outer race bears also its ``centrifugal`` force [N], which the standard leaves out.
+    """
+    from scipy.optimize import brentq
+
+    angle = 2.0 * math.pi * np.arange(rollers) / rollers
+    most = max(float(np.max(relief)) for relief in contacts.relief)
+    solid = sum((force / contacts.stiffness) ** (1.0 / LINE_EXPONENT) for force in (load, centrifugal))
+    reach = 0.5 * max(clearance, 0.0) + 2.0 * (solid + most)
+
+    def balance(displacement: float) -> float:
+        inner, _ = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
+        return float(inner.sum(axis=1) @ np.cos(angle)) - load
+
+    displacement = brentq(balance, -reach, reach, xtol=1e-15, rtol=1e-13) if load > 0.0 else 0.0
+    inner, outer = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
+    return inner[None], outer[None]
+
+
+def _race_loads(contacts: RollerContacts, approach: Array, centrifugal: float) -> tuple[Array, Array]:
+    """Loads of the laminae (rollers, slices) on both races where these approach by ``approach`` (rollers,) [m].
+
+    The approach at the outer race is the root of Q_o - Q_i - F_c, which rises with it.
+    """
+    inner_relief, outer_relief = contacts.relief
+    lamina = contacts.stiffness / inner_relief.shape[1]
+
+    def loads(approach: Array, relief: Array) -> Array:
+        return np.asarray(lamina * np.clip(approach[:, None] - relief, 0.0, None) ** LINE_EXPONENT)
+
+    low = np.full(approach.shape, float(np.min(outer_relief)))
+    thrown = (centrifugal / contacts.stiffness) ** (1.0 / LINE_EXPONENT)
+    high = np.maximum(approach - np.min(inner_relief), np.max(outer_relief) + thrown)
+    high = np.maximum(high, low)
+    outside = 0.5 * (low + high)
+    for _ in range(BALANCE_STEPS):
+        inner, outer = loads(approach - outside, inner_relief), loads(outside, outer_relief)
+        excess = outer.sum(axis=1) - inner.sum(axis=1) - centrifugal
+        if np.all(np.abs(excess) <= BALANCE_ERROR * (outer.sum(axis=1) + centrifugal)):
+            break
+        # dQ/d delta = K^0.9 (10/9) Q^0.1
+        slope = LINE_EXPONENT * lamina**0.9 * (outer**0.1 + inner**0.1).sum(axis=1)
+        low, high = np.where(excess < 0.0, outside, low), np.where(excess < 0.0, high, outside)
+        newton = outside - np.divide(excess, slope, out=np.full(excess.shape, np.inf), where=slope > 0.0)
+        outside = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+    return inner, outer
+
+
 class SeriesFactors(NamedTuple):
     """Factors of one dimension series: R1 and S1 of SKF's friction model, and k_r of its minimum load."""
 
@@ -231,48 +302,11 @@ SERIES = {
 }
 RADIAL_SLIDING = 0.0015  # S2
 ROLLER_GEOMETRY = 5.1  # K_Z of cylindrical roller bearings with a cage
-# K_rs: 3e-8 for baths and jets, 6e-8 for grease and oil-air; SKF has no drop feed, which is treated as a bath.
-STARVATION, SCARCE_STARVATION = 3e-8, 6e-8
-SCARCE = ("grease", "oil_air")
-# mu_bl of a rotating bearing: 0.12 in the catalogue of 2018 (from memory); that of 2013 has 0.15 for all.
-BOUNDARY_FRICTION, FILM_FRICTION = 0.12, 0.02
+FILM_FRICTION = 0.02
 # ISO 15312: heat flow density at 50 K above the surroundings, up to a seat of 50 000 mm^2; above it falls with the power
 # -0.34 of the seat (from memory) [W/mm^2], [mm^2].
 HEAT_FLOW, LARGE_SEAT, LARGE_SEAT_EXPONENT = 0.016, 5e4, -0.34
-
-
-class FrictionMoments(NamedTuple):
-    """Rolling and sliding frictional moment [N m], without drag of a bath and without seals."""
-
-    rolling: float
-    sliding: float
-
-
-def inlet_heating_factor(mean_diameter: float, speed: float, viscosity: float) -> float:
-    """phi_ish, reduction of the rolling moment by inlet shear heating: 1/(1 + 1.84e-9 (n d_m)^1.28 nu^0.64).
-
-    Mean diameter [m], speed [rad/s], kinematic viscosity [m^2/s].
-    """
-    fast = abs(speed) / RPM * mean_diameter * 1e3
-    return 1.0 / (1.0 + 1.84e-9 * fast**1.28 * (viscosity * 1e6) ** 0.64)
-
-
-def starvation_factor(bore: float, outside: float, speed: float, viscosity: float, supply: str | None = None) -> float:
-    """phi_rs, reduction of the rolling moment by starvation: exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))).
-
-    Bore and outside diameter [m], speed [rad/s], kinematic viscosity [m^2/s]; ``supply`` as ``lubricant.supply``.
-    """
-    constant = SCARCE_STARVATION if supply in SCARCE else STARVATION
-    inner, outer = bore * 1e3, outside * 1e3
-    room = math.sqrt(ROLLER_GEOMETRY / (2.0 * (outer - inner)))
-    return math.exp(-constant * viscosity * 1e6 * abs(speed) / RPM * (inner + outer) * room)
-
-
-def sliding_friction(mean_diameter: float, speed: float, viscosity: float) -> float:
-    """mu_sl = phi_bl mu_bl + (1 - phi_bl) mu_EHL with phi_bl = exp(-2.6e-8 (n nu)^1.4 d_m); units as above."""
-    flow = abs(speed) / RPM * viscosity * 1e6
-    boundary = math.exp(-2.6e-8 * flow**1.4 * mean_diameter * 1e3)
-    return boundary * BOUNDARY_FRICTION + (1.0 - boundary) * FILM_FRICTION
+SEAT_RISE = 50.0  # [K]
 
 
 def skf_moments(
@@ -293,12 +327,12 @@ def skf_moments(
     """
     factors, mean = SERIES[series], 0.5 * (bore + outside)
     diameter, flow = mean * 1e3, abs(speed) / RPM * viscosity * 1e6
-    reduction = inlet_heating_factor(mean, speed, viscosity) * starvation_factor(
-        bore, outside, speed, viscosity, supply
-    )
+    starved = starvation_factor(ROLLER_GEOMETRY, bore, outside, speed, viscosity, supply)
+    reduction = inlet_heating_factor(mean, speed, viscosity) * starved
     rolling = reduction * factors.rolling * diameter**2.41 * radial_load**0.31 * flow**0.6
     sliding = factors.sliding * diameter**0.9 * axial_load + RADIAL_SLIDING * diameter * radial_load
-    return FrictionMoments(1e-3 * rolling, 1e-3 * sliding * sliding_friction(mean, speed, viscosity))
+    slides = sliding_friction(FILM_FRICTION, mean, speed, viscosity)
+    return FrictionMoments(1e-3 * rolling, 1e-3 * sliding * slides)
 
 
 def iso_15312_heat(sizes: Envelope) -> float:
@@ -306,5 +340,14 @@ def iso_15312_heat(sizes: Envelope) -> float:
 
     The conditions of the reference speed: 0.05 C0, 12 mm^2/s at 70 C, a bath to the middle of the lowest roller.
     """
-    seat = math.pi * sizes.width * (sizes.bore + sizes.outside)
+    return _heat_of_seat(math.pi * sizes.width * (sizes.bore + sizes.outside))
+
+
+def seat_heat(seat: float) -> float:
+    """Heat flow of ISO 15312 through a seat [m^2] that is ``SEAT_RISE`` warmer than the surroundings [W]."""
+    return _heat_of_seat(1e6 * seat)
+
+
+def _heat_of_seat(seat: float) -> float:
+    """Heat flow [W] through a seat [mm^2]."""
     return HEAT_FLOW * seat * max(seat / LARGE_SEAT, 1.0) ** LARGE_SEAT_EXPONENT

@@ -128,6 +128,21 @@ def mounted_of(scene: BallScene) -> MountedRings | None:
     return mounted_rings(scene.mounting, scene.bearing, *materials, *scene.operation.speeds)
 
 
+def race_film_temperature(scene: BallScene, race: str) -> float:
+    """Temperature of the film between balls and the "inner" or "outer" race of a single row [C].
+
+    That of the oil, or with ``film_temperature = "parts"`` the mean of both surfaces.
+    """
+    lubricant, mounting = scene.lubricant, scene.mounting
+    assert lubricant is not None
+    if lubricant.film_temperature == "oil" or mounting is None:
+        return lubricant.temperature_C
+    rings = mounted_of(scene)
+    assert rings is not None
+    ring = rings.inner_ring if race == "inner" else rings.outer_ring
+    return mounting.reference_temperature_C + 0.5 * (ring.temperature_rise + rings.element_temperature_rise)
+
+
 def row_change(scene: SingleRowScene) -> GrooveChange:
     """Changes of a single row by growth."""
     if not changes(scene):

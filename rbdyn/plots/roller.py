@@ -5,6 +5,7 @@ Also cage slip over speed and load, and a moving picture of the bearing with its
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -242,8 +243,17 @@ PANELS = (
 )
 
 
-def draw_slip_map(slip_map: "SlipMap", path: Path) -> None:
-    """A panel a figure, values written into the cells; failed points stay white."""
+# Of a row.
+BELOW = 0.25
+
+
+def draw_slip_map(
+    slip_map: "SlipMap", path: Path, marks: Mapping[str, tuple[float, float]] = MappingProxyType({})
+) -> None:
+    """A panel a figure, values written into the cells; failed points stay white.
+
+    ``marks``: speed [rpm] and load [N] of points to mark, by their names; between cells they are at their places by straight lines.
+    """
     speeds, loads = slip_map.speeds_rpm, slip_map.loads_N
     width = max(4.2, 0.85 * len(speeds) + 2.0)
     figure, axes = plt.subplots(2, 2, figsize=(2.0 * width, 2.0 * max(3.2, 0.5 * len(loads) + 1.8)))
@@ -254,12 +264,33 @@ def draw_slip_map(slip_map: "SlipMap", path: Path) -> None:
         for (row, column), value in np.ndenumerate(values):
             text = f"{value:.3g}" if np.isfinite(value) else "failed"
             colour = "white" if np.isfinite(value) and value < middle else "black"
-            axis.text(column, row, text, ha="center", va="center", fontsize=8, color=colour)
+            # A value is below its place where that may be marked.
+            axis.text(column, row - BELOW * bool(marks), text, ha="center", va="center", fontsize=8, color=colour)
         axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
         axis.set_yticks(range(len(loads)), [f"{load:g}" for load in loads])
         axis.set(xlabel="inner speed [rpm]", ylabel="radial load [N]", title=label)
         figure.colorbar(image, ax=axis)
+        _mark_points(axis, slip_map, marks)
     save(figure, path)
+
+
+def _mark_points(axis: Axes, slip_map: "SlipMap", marks: Mapping[str, tuple[float, float]]) -> None:
+    """Diamonds with names at speeds and loads of a map; points at one place share a diamond."""
+    names: dict[tuple[float, float], list[str]] = {}
+    for name, place in marks.items():
+        names.setdefault(place, []).append(name)
+    for (speed, load), together in names.items():
+        column = float(np.interp(speed, slip_map.speeds_rpm, range(len(slip_map.speeds_rpm))))
+        row = float(np.interp(load, slip_map.loads_N, range(len(slip_map.loads_N))))
+        axis.plot(
+            [column], [row], marker="D", markersize=6.0, color=VERMILION, markeredgecolor="white", linestyle="none"
+        )
+        # The name is on the side with more room.
+        side, shift = ("right", -7.0) if column > 0.5 * (len(slip_map.speeds_rpm) - 1) else ("left", 7.0)
+        axis.annotate(
+            ", ".join(together), (column, row), (shift, 9.0), textcoords="offset points", ha=side, va="center",
+            fontsize=8, color="black", bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": VERMILION, "lw": 0.8},
+        )  # fmt: skip
 
 
 TURNS = 2.0

@@ -275,6 +275,28 @@ def envelope(named: Designation, remedy: str = "add --bore, --outside and --widt
     raise MethodError(f"is not in the tables here; {remedy}")
 
 
+# D - d of diameter series 4 over that of series 3, whose geometric mean separates them: 2.56/1.92 by the general plan of ISO 15
+# (from memory).
+HEAVY_RATIO = 2.56 / 1.92
+
+
+def diameter_series(bore: float, outside: float) -> str:
+    """Diameter series of ISO 15 nearest to a ball bearing of this bore and outside diameter [mm]: "8", "9", "0", "2", "3" or "4".
+
+    The nearest is that of the closest D/d - 1 at the listed bore next to this one. Series 4 is not listed: it lies above 3.
+    """
+    nearest: dict[str, tuple[float, float]] = {}
+    for row in table("ball_bearings"):
+        listed, across = float(row["bore"]), float(row["outside"])
+        distance = abs(math.log(listed / bore))
+        if distance < nearest.get(row["diameter_series"], (math.inf, 0.0))[0]:
+            nearest[row["diameter_series"]] = distance, across / listed - 1.0
+    height = outside / bore - 1.0
+    if height > nearest["3"][1] * math.sqrt(HEAVY_RATIO):
+        return "4"
+    return min(nearest, key=lambda series: abs(math.log(nearest[series][1] / height)))
+
+
 def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
     """Limits of a class of ISO 5753-1 [um] of a cylindrical roller or a deep groove ball bearing. Raises MethodError."""
     if name not in CLEARANCE_CLASSES:

@@ -6,6 +6,7 @@ Under inner or half raceway control several equilibria may share a load; ``other
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,15 +66,23 @@ def equilibrium(
 
     ``scene``: a scene of balls or the path of its file; ``overrides`` of its keys, such as ``["operation.axial_load_N=500"]``.
     ``start``: a result nearby, or the solutions of its rows, to save time. Without an equilibrium the ``status`` of the result states the cause. Raises InputError for another kind of scene
-    or a start that does not fit.
+    or a start that does not fit. A scene with [thermal] has its equilibrium at its steady temperatures.
     """
     scene = balls_only(scene, overrides)
     starts = _solutions(start, 2 if isinstance(scene, DoubleDeckerScene) else 1)
     if isinstance(scene, DoubleDeckerScene):
         return _double_decker(scene, starts)
     assert isinstance(scene, SingleRowScene)
+    single = partial(_single_row, warm=starts[0] if starts else None)
+    if scene.thermal is not None:
+        from rbdyn.quasistatic.temperatures import with_temperatures
+
+        return with_temperatures(scene, single)
+    return single(scene)
+
+
+def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     model = row_of(scene)
-    warm = starts[0] if starts else None
     began = time.perf_counter()
     solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), constraint_of(scene), warm)
     seconds = time.perf_counter() - began

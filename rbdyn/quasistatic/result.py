@@ -20,6 +20,7 @@ from rbdyn.contact.hertz_line import BALLS, dent_sentence
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning, turning_rings
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL, dynamic_capacity, rated_capacities, row_life
+from rbdyn.mounting.fits import race_film_temperature
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
@@ -265,7 +266,10 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     ``scene``: resolved input. ``status``: "ok", or the cause of the failure. ``report``: figures of the equilibrium, None
     without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
     equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
-    computed it. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
+    computed it. ``temperatures_C``: of "oil", "outer" ring, "inner" ring and balls ("rollers"), where the scene has a heat balance.
+    ``thermal``: the balance: its "status" ("steady", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+    first, the "gain" of the loop, heat by node, friction and its loads, heat by way out, conductances, ranges of the temperatures
+    over the documented inputs, and the "path_C" of the search. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
     ``max_stress_MPa``, and ``inner`` and ``outer`` of a double-decker bearing. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
     loaded result or without an equilibrium. ``ratings``: data of their pressures and lives.
     """
@@ -284,6 +288,8 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     versions: dict[str, str]
     scene: dict[str, Any]
     runout: dict[str, float] | None = None
+    temperatures_C: dict[str, float] | None = None  # noqa: N815
+    thermal: dict[str, Any] | None = None
     rows: tuple[Solution, ...] = outside_json(default=())
     ratings: tuple[Rating, ...] = outside_json(default=())
 
@@ -445,7 +451,7 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
     ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
     gamma = drawing.gamma
     entrainment = point_contact.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
-    oil, films = lubricant.in_service, {}
+    films = {}
     for race, contact, ring, side, loads in (
         ("inner", model.inner_contact, inner, gamma, solution.inner_load),
         ("outer", model.outer_contact, outer, -gamma, solution.outer_load),
@@ -453,6 +459,7 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         load = float(loads.max())
         if entrainment == 0.0 or load == 0.0:
             continue
+        oil = lubricant.at(race_film_temperature(scene, race))
         radius = point_contact.rolling_radius(drawing.ball_diameter, side)
         rolling = point_contact.RollingBall(contact, radius, equivalent_modulus(ball, ring), entrainment)
         heat = float(point_contact.thermal_factor(rolling, oil, load))

@@ -391,6 +391,9 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
     figures = {name: float(value[0]) for name, value in columns.items()}
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+    if result.temperatures_C is not None and result.thermal is not None:
+        figures |= {f"{node}_temperature_C": value for node, value in result.temperatures_C.items()}
+        figures |= {"thermal_gain": result.thermal["gain"], "friction_W": sum(result.thermal["friction_W"].values())}
     return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, notes
 
 

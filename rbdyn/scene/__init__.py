@@ -6,7 +6,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
 - ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
-- ``geometry``: radii, masses and speeds; ``notes``: suspicious values
+- ``thermal``: heat balance; ``geometry``: radii, masses and speeds; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys
 """
 
@@ -15,12 +15,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast
 
 from pydantic import BaseModel, Field, model_validator
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
-from rbdyn.properties.materials import Material, equivalent_modulus
+from rbdyn.properties.materials import Material, Oil, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import (
     STIFFNESS,
@@ -41,10 +41,18 @@ from rbdyn.scene.laws import (
     Numerics,
     with_bar_stiffness_of_cage,
 )
-from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
+from rbdyn.scene.lubricant import (
+    RHEOLOGY_OILS,
+    Lubricant,
+    Traction,
+    fraction_faults,
+    with_fraction_of_flow,
+    with_traction_of_oil,
+)
 from rbdyn.scene.notes import catalogue_notes, unit_notes
 from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
+from rbdyn.scene.thermal import FilmTemperatures, Thermal, film_temperatures, thermal_faults, with_first_guess
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 if TYPE_CHECKING:
@@ -66,9 +74,11 @@ class Scene(SceneFile):
     returns its motion, ``rbdyn.equilibrium(scene)`` is for balls; each of them also takes the path of a file.
 
     bearing, cage, lubricant, operation : drawings, oil, speeds and loads; required.
-    mounting, support : fits and temperatures, a flexible housing; optional.
+    mounting, support, thermal : fits and temperatures, a flexible housing, a heat balance; optional.
     materials, traction, model, numerics : with defaults.
     """
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None}
 
     bearing: Bearing
     """The drawing of the bearing."""
@@ -82,6 +92,8 @@ class Scene(SceneFile):
     """Fits, temperatures, shaft and housing; without it the stated clearances are those in operation."""
     support: Support | None = None
     """Flexible, damped support of the outer ring; without it the ring is fixed."""
+    thermal: Thermal | None = None
+    """Heat balance that computes the temperatures; without it they are those of lubricant and mounting."""
     materials: Materials = Materials()
     """Material of each part."""
     traction: Traction = Traction()
@@ -112,13 +124,19 @@ class Scene(SceneFile):
             name: table.model_dump(exclude_unset=True) if isinstance(table, BaseModel) else table
             for name, table in data.items()
         }
-        return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(with_traction_of_oil(tables)))
+        warm = with_first_guess(with_fraction_of_flow(with_traction_of_oil(tables)))
+        return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(warm))
 
     def faults(self) -> list[str]:
         """Contradictions of the scene, each with a slip of the unit that may be its cause."""
         faults = list(self._misfits())
         faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
         faults += self._overload_faults()
+        faults += thermal_faults(self.thermal, self.lubricant, self.mounting, self.bearing.designation)
+        if self.thermal is not None and self.operation.schedule is not None:
+            faults.append(
+                "operation.schedule: [thermal] balances the heat of a steady speed and load; leave out one of them"
+            )
         if not faults and (seizures := list(self._seizures())):
             temperature_notes = [note for note in self.unit_notes if note.startswith("mounting.")]
             return ["; ".join([seizure, *temperature_notes]) for seizure in seizures]
@@ -171,6 +189,7 @@ class Scene(SceneFile):
                 "or take 'limiting_shear'"
             )
         yield from self._tilt_faults()
+        yield from fraction_faults(self.lubricant, self.bearing.pitch_diameter_mm, *self.operation.speeds_rpm)
         land = self.land_diameter_mm
         inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
         outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
@@ -404,6 +423,20 @@ class Scene(SceneFile):
         material = self.material("rings")
         rings = mounted_rings(self.mounting, self.bearing, material, material, 0.0)
         return self.mounting.reference_temperature_C + cage_temperature_rise(self.mounting, self.cage.guidance, rings)
+
+    @cached_property
+    def film_temperatures_C(self) -> FilmTemperatures:  # noqa: N802
+        """Temperatures of the oil in the cavity and in the films [C]."""
+        if self.mounting is None or self.lubricant.film_temperature == "oil":
+            return film_temperatures(self, None)
+        from rbdyn.mounting.fits import mounted_rings
+
+        material = self.material("rings")
+        return film_temperatures(self, mounted_rings(self.mounting, self.bearing, material, material, 0.0))
+
+    def oil(self, place: str = "cavity") -> Oil:
+        """The oil in the "cavity", or in the films of the "outer" and "inner" race, of the "pocket" and of the "land"."""
+        return self.lubricant.at(getattr(self.film_temperatures_C, place))
 
     @property
     def turn_s(self) -> float:

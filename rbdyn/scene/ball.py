@@ -1,10 +1,10 @@
 """Scene of a ball bearing, single row or double-decker: drawing, form errors of grooves and balls, load and model."""
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, cast
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rbdyn.base.faults import SI, Consistent, NonNegative, NotVanishing, OptionalSI, Positive, Strict
 from rbdyn.base.words import counted
@@ -14,6 +14,7 @@ from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.operation import BallOperation, Mounting, Speed
 from rbdyn.scene.operation import misfits as mounting_faults
 from rbdyn.scene.reading import SceneFile
+from rbdyn.scene.thermal import NO_MOUNTING, Thermal, thermal_faults, with_first_guess
 
 if TYPE_CHECKING:
     from rbdyn.base.arrays import Array
@@ -412,6 +413,8 @@ class BallMaterials(Strict):
 class BallScene(SceneFile):
     """Input of the equilibrium of a ball bearing; built, validated, changed and read like ``Scene``."""
 
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None}
+
     bearing: BallBearing | DoubleDecker
     """The drawing: one row, or two rows with a ring between them."""
     operation: BallOperation
@@ -426,9 +429,17 @@ class BallScene(SceneFile):
     """Form errors of grooves and balls, from which runout is computed; the equilibrium is that of the perfect bearing."""
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
+    thermal: Thermal | None = None
+    """Heat balance that computes the temperatures of a single row; without it they are those of lubricant and mounting."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_guess(cls, data: Any) -> Any:
+        return with_first_guess(data) if isinstance(data, Mapping) and data.get("thermal") is not None else data
 
     def faults(self) -> Iterable[str]:
         """One sentence for each missing diameter or oil, and for each contradiction."""
+        yield from _thermal_faults(self)
         if self.mounting is not None:
             yield from _mounted_faults(self.mounting, self)
         elif self.model.ring_expansion:
@@ -545,3 +556,31 @@ def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
             )
     if scene.model.ring_expansion and scene.model.ring_expansion_form == "paper":
         yield "model.ring_expansion_form = 'paper' has no fits; remove [mounting] or set 'thick_ring'"
+
+
+def _thermal_faults(scene: BallScene) -> Iterator[str]:
+    """Contradictions of the heat balance of a ball bearing, one sentence each."""
+    thermal, (inner, outer) = scene.thermal, scene.outermost_rows
+    if scene.lubricant is not None:
+        yield from thermal_faults(None if inner is not outer else thermal, scene.lubricant, scene.mounting, None)
+        if inner is not outer and scene.lubricant.film_temperature == "parts":
+            yield "lubricant.film_temperature = 'parts': is for a single row of balls; write 'oil'"
+    if thermal is None:
+        return
+    if inner is not outer:
+        yield "[thermal]: balances the heat of a single row of balls, not of two; remove the table"
+        return
+    if scene.lubricant is None:
+        yield "lubricant: missing; [thermal] needs the oil, whose viscosity decides the friction; add the table"
+        if scene.mounting is None:
+            yield NO_MOUNTING
+    if scene.operation.inner_speed_rpm == scene.operation.outer_speed_rpm:
+        yield f"operation.inner_speed_rpm = {scene.operation.inner_speed_rpm:g}: [thermal] needs rings that turn against each other"
+    for key, value, usual in (
+        ("cage_offset_K", thermal.cage_offset_K, 0.0),
+        ("cage_ceiling_C", thermal.cage_ceiling_C, None),
+    ):
+        if value != usual:
+            yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"
+    if scene.errors is not None:
+        yield "[thermal] and [errors]: runout is computed at stated temperatures; leave out one of them"

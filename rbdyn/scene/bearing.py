@@ -5,7 +5,15 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+)
 from pydantic_core import PydanticKnownError
 
 from rbdyn.base.faults import (
@@ -21,7 +29,7 @@ from rbdyn.base.faults import (
 )
 from rbdyn.base.words import counted
 from rbdyn.properties.catalogue import ROLLERS, envelope, read_designation
-from rbdyn.properties.materials import MATERIALS, Material
+from rbdyn.properties.materials import MATERIALS, SOFTEST_METAL, Material
 
 if TYPE_CHECKING:
     from rbdyn.contact.cage_bar import CageSection
@@ -29,6 +37,13 @@ if TYPE_CHECKING:
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
+
+
+# Conductivity [W/(m K)] and heat capacity [J/(kg K)] of a material that states none: PA66 and PEEK have 0.25, PA66 1500 to 1700.
+STEEL_CONDUCTION = MATERIALS["bearing_steel"].conductivity, MATERIALS["bearing_steel"].heat_capacity
+POLYMER_CONDUCTION = 0.25, 1500.0
+# Keys of a material that a scene without them does not save.
+CONDUCTION_KEYS = ("conductivity_W_mK", "heat_capacity_J_kgK")
 
 
 # Keys of [cage], without their unit, that make a section together.
@@ -313,6 +328,15 @@ class CustomMaterial(Strict):
     """Density of the material."""
     thermal_expansion_1e_6_K: Annotated[float, Field(ge=0.0, le=200.0)] = 12.0  # noqa: N815
     """Coefficient of linear thermal expansion in 1e-6 per K. Default: steel."""
+    conductivity_W_mK: Annotated[float, Field(ge=0.01, le=2000.0)] | None = None  # noqa: N815
+    """Thermal conductivity, uncertain by 15 %. Default: 46, bearing steel; for an elastic modulus below 20 GPa 0.25, a polymer."""
+    heat_capacity_J_kgK: Annotated[float, Field(ge=50.0, le=10000.0)] | None = None  # noqa: N815
+    """Specific heat capacity, uncertain by 15 %. Default: 470, bearing steel; for an elastic modulus below 20 GPa 1500, a polymer."""
+
+    @model_serializer(mode="wrap")
+    def _without_default_conduction(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        saved: dict[str, Any] = handler(self)
+        return {key: value for key, value in saved.items() if value is not None or key not in CONDUCTION_KEYS}
 
 
 MaterialName = Literal[
@@ -336,7 +360,10 @@ def material_of(material: MaterialName | CustomMaterial) -> Material:
     """A material in SI, from its name or its properties."""
     if isinstance(material, CustomMaterial):
         modulus, expansion = material.elastic_modulus_GPa * 1e9, material.thermal_expansion_1e_6_K * 1e-6
-        return Material(modulus, material.poisson_ratio, material.density_kg_m3, expansion)
+        conductivity, capacity = POLYMER_CONDUCTION if modulus < SOFTEST_METAL else STEEL_CONDUCTION
+        conductivity = conductivity if material.conductivity_W_mK is None else material.conductivity_W_mK
+        capacity = capacity if material.heat_capacity_J_kgK is None else material.heat_capacity_J_kgK
+        return Material(modulus, material.poisson_ratio, material.density_kg_m3, expansion, conductivity, capacity)
     return MATERIALS[material]
 
 

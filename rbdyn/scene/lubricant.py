@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BeforeValidator, ConfigDict, Field
 
-from rbdyn.base.faults import SI, Consistent, Fraction, NonNegative, NotVanishing, Positive, Share
+from rbdyn.base.faults import RPM, SI, Consistent, Fraction, NonNegative, NotVanishing, Positive, Share, Sparse
 from rbdyn.properties.materials import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -25,7 +25,9 @@ HOTTEST_C = 350.0
 THICKEST = 1e7
 # Keys of a grade or a data sheet, which a scene without them does not save.
 DATA_KEYS = ("base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3")
-SAVED_IF_GIVEN = (*DATA_KEYS, "supply")
+# Keys that only some scenes need, with the default that a scene does not save.
+UNSAVED = dict.fromkeys((*DATA_KEYS, "supply", "oil_flow_l_min", "oil_inlet_temperature_C"))
+UNSAVED |= {"film_temperature": "oil", "oil_fraction_factor": 1.0}
 # Keys of [traction] for one curve at all loads.
 CURVE_KEYS = ("mu_0", "mu_m", "mu_inf", "u_m_m_s", "constants")
 # Models whose traction follows pressure and temperature.
@@ -45,8 +47,12 @@ def _four_numbers(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-class Lubricant(Consistent):
+class Lubricant(Sparse):
     """The oil, its temperature and its supply."""
+
+    # A heat balance has a first guess of temperature_C where that is left out.
+    model_config = ConfigDict(json_schema_extra=lambda schema: schema["required"].remove("temperature_C"))
+    UNSAVED: ClassVar[Mapping[str, Any]] = UNSAVED
 
     oil: OilName
     """Name of the oil, or of the base oil of a grease, which decides viscosity and pressure coefficient. "data_sheet" needs
@@ -61,7 +67,10 @@ class Lubricant(Consistent):
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
     """Density of the oil at 15 C."""
     temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
-    """Temperature of the oil in the contacts."""
+    """Temperature of the oil in the contacts. With [thermal] the first guess, which may be left out."""
+    film_temperature: Literal["oil", "parts"] = "oil"
+    """Temperature of the films. oil: all have temperature_C; parts: each has the mean temperature of its surfaces by [mounting],
+    and temperature_C is that of the oil between them, which drags the rollers. With [thermal] the films follow the parts."""
     viscosity_mPas: Positive | None = None  # noqa: N815
     """Dynamic viscosity at temperature_C. Default: that of the oil."""
     pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
@@ -69,8 +78,16 @@ class Lubricant(Consistent):
     supply: Supply | None = None
     """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. It sets the starvation of the maker's friction model and
     the documented ranges of inlet_distance and oil_fraction. It changes no law of motion."""
+    oil_flow_l_min: Positive | None = None
+    """Flow of oil to the bearing. It gives oil_fraction, and with [thermal] it carries off heat. Above D B/12 500 L/min, with
+    outside diameter and width in mm, it hardly cools further (SKF)."""
+    oil_inlet_temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)] | None = None  # noqa: N815
+    """Temperature of the oil that flows to the bearing."""
     oil_fraction: Fraction = 0.02
-    """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication."""
+    """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication. Default with oil_flow_l_min: 1e5
+    W^0.37/(n d_m^1.7) of a flow of W cm3/min, at most 0.15, unverified outside of 1 to 4 million n d_m (rbdyn/thermal)."""
+    oil_fraction_factor: Positive = 1.0
+    """Factor on the oil fraction that follows from oil_flow_l_min."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
     """Root-mean-square roughness of the rollers, 0.03 to 0.1 for honed rollers of aircraft bearings. In the bearing of Chen et
     al. 2022 at 100 C, 0.05 on rollers and races gives Lambda = 2.4 to 2.9, and 0.1 gives 1.2 to 1.45."""
@@ -83,6 +100,11 @@ class Lubricant(Consistent):
     with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
     together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
     roller_roughness, race_roughness = SI("um"), SI("um")
+
+    def unsaved(self) -> Mapping[str, Any]:
+        """Also the oil fraction that follows from a flow, because it would contradict another speed."""
+        follows = {} if self.oil_flow_l_min is None else {"oil_fraction": self.oil_fraction}
+        return {**self.UNSAVED, **follows}
 
     def faults(self) -> Iterator[str]:
         """Whether the oil is stated once: by name, by grade with base oil and index, or by a data sheet."""
@@ -104,11 +126,6 @@ class Lubricant(Consistent):
                     f"lubricant.viscosities_C_mm2_s = {points}: viscosity must fall with temperature, within -60 to {HOTTEST_C:g} C "
                     f"and 0.5 to {THICKEST:g} mm2/s; fix the points"
                 )
-
-    @model_serializer(mode="wrap")
-    def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        saved: dict[str, Any] = handler(self)
-        return {key: value for key, value in saved.items() if value is not None or key not in SAVED_IF_GIVEN}
 
     def _base(self) -> BaseOil:
         return BASE_OILS[self.base_oil or "mineral"]
@@ -150,18 +167,24 @@ class Lubricant(Consistent):
     @property
     def in_service(self) -> Oil:
         """The oil at its temperature, with the properties that the scene states."""
-        oil = (
-            oil_at(self.oil, self.temperature_C)
-            if self.oil in OILS
-            else self._fluid().at_temperature(self.temperature_C)
-        )
+        return self.at(self.temperature_C)
+
+    def at(self, temperature: float) -> Oil:
+        """The oil at a temperature [C]; a stated viscosity follows it as that of the named oil does."""
+        oil = self._named_at(temperature)
         if self.viscosity_mPas is not None:
             viscosity = self.viscosity_mPas * 1e-3
+            if temperature != self.temperature_C:
+                viscosity *= oil.viscosity / self._named_at(self.temperature_C).viscosity
             slope = oil.viscosity_slope * viscosity / oil.viscosity
             oil = replace(oil, viscosity=viscosity, viscosity_slope=slope)
         if self.pressure_coefficient_1_GPa is not None:
             oil = replace(oil, pressure_coefficient=self.pressure_coefficient_1_GPa * 1e-9)
         return oil
+
+    def _named_at(self, temperature: float) -> Oil:
+        """The named oil at a temperature [C], without the properties that the scene states."""
+        return oil_at(self.oil, temperature) if self.oil in OILS else self._fluid().at_temperature(temperature)
 
 
 def with_traction_of_oil(scene: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -182,6 +205,45 @@ def with_traction_of_oil(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     if any(key in traction for key in CURVE_KEYS):
         default.pop("model", None)
     return {**scene, "traction": {**default, **traction}} if default else scene
+
+
+def with_fraction_of_flow(scene: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Tables of a scene, with the oil fraction of its flow where [lubricant] states a flow and no fraction."""
+    oil, bearing, operation = (scene.get(table, {}) for table in ("lubricant", "bearing", "operation"))
+    if not all(isinstance(table, Mapping) for table in (oil, bearing, operation)) or "oil_fraction" in oil:
+        return scene
+    numbers = [
+        oil.get("oil_flow_l_min"), bearing.get("pitch_diameter_mm"), operation.get("inner_speed_rpm"),
+        operation.get("outer_speed_rpm", 0.0), oil.get("oil_fraction_factor", 1.0),
+    ]  # fmt: skip
+    if not all(isinstance(number, int | float) and number == number for number in numbers):
+        return scene
+    flow, pitch, inner, outer, factor = map(float, numbers)
+    if not (flow > 0.0 and pitch > 0.0 and factor > 0.0):
+        return scene
+    return {**scene, "lubricant": {**oil, "oil_fraction": fraction_of_flow(flow, pitch, inner - outer, factor)}}
+
+
+def fraction_of_flow(flow_l_min: float, pitch_mm: float, speed_rpm: float, factor: float) -> float:
+    """Oil fraction of a flow; the largest at rest."""
+    from rbdyn.thermal.oil_fraction import LARGEST, oil_fraction
+
+    if speed_rpm == 0.0:
+        return LARGEST
+    return oil_fraction(flow_l_min / 60e3, abs(speed_rpm) * RPM, 1e-3 * pitch_mm, factor)
+
+
+def fraction_faults(oil: Lubricant, pitch_mm: float, inner_rpm: float, outer_rpm: float) -> Iterator[str]:
+    """The fault of a stated oil fraction next to a flow that gives another."""
+    flow = oil.oil_flow_l_min
+    if flow is None:
+        return
+    of_flow = fraction_of_flow(flow, pitch_mm, inner_rpm - outer_rpm, oil.oil_fraction_factor)
+    if oil.oil_fraction != of_flow:
+        yield (
+            f"lubricant.oil_fraction = {oil.oil_fraction:g}: contradicts lubricant.oil_flow_l_min = {flow:g}, which gives "
+            f"{of_flow:.3g}; leave out one of them"
+        )
 
 
 class Traction(Consistent):

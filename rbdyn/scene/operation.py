@@ -1,13 +1,13 @@
 """Operating conditions of roller and ball bearings: speeds and loads, support of the outer ring, mounting with fits and temperatures."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
-from rbdyn.base.faults import LIGHTEST_RING_KG, SI, Consistent, InSI, NonNegative, Positive, Strict
+from rbdyn.base.faults import LIGHTEST_RING_KG, SI, Consistent, InSI, NonNegative, OptionalSI, Positive, Sparse, Strict
 from rbdyn.base.words import counted
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
@@ -76,6 +76,11 @@ class Operation(Consistent):
                 f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run needs shaft turns; give at least {SLOWEST_RPM:g}, or "
                 "set operation.outer_speed_rpm"
             )
+
+    @property
+    def speeds_rpm(self) -> tuple[float, float]:
+        """Nominal speeds of inner and outer ring [rpm]."""
+        return self.inner_speed_rpm, self.outer_speed_rpm
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -245,17 +250,21 @@ def raceway_radii(bearing: Raceways) -> tuple[float, float]:
     return 0.5e-3 * inner, 0.5e-3 * outer
 
 
-class Mounting(Consistent):
+class Mounting(Sparse):
     """Fits, temperatures, shaft and housing.
 
     With this table, bearing.radial_clearance_mm is the clearance before mounting and the clearances of the cage are those of
     its drawing. Fits, temperature and rotation change all of them. Each part has one temperature.
     """
 
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"width_mm": None}
+
     bore_mm: Positive
     """Bore of the inner ring."""
     outside_diameter_mm: Positive
     """Outside diameter of the outer ring."""
+    width_mm: Positive | None = None
+    """Width of the rings, through whose seats [thermal] carries off heat. Default: that of bearing.designation."""
     shaft_bore_mm: NonNegative = 0.0
     """Bore of the shaft; 0 is a solid shaft."""
     housing_diameter_mm: Positive
@@ -286,6 +295,7 @@ class Mounting(Consistent):
     rotation: bool = True
     """Whether rotation widens the rings and the cage."""
 
+    width = OptionalSI("mm")
     bore, outside_diameter, shaft_bore, housing_diameter = SI("mm"), SI("mm"), SI("mm"), SI("mm")
     inner_interference, outer_interference = SI("um"), SI("um")
 

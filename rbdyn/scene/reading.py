@@ -5,7 +5,17 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
-from rbdyn.base.faults import LONGEST_NAME, Consistent, InputError, one_line, put_key, read_toml, set_key, validated
+from rbdyn.base.faults import (
+    LONGEST_NAME,
+    Consistent,
+    InputError,
+    Sparse,
+    one_line,
+    put_key,
+    read_toml,
+    set_key,
+    validated,
+)
 from rbdyn.base.records import plain
 from rbdyn.base.words import html_table
 
@@ -33,7 +43,7 @@ class Validation(ModelMetaclass):
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
-class SceneFile(Consistent, metaclass=Validation):
+class SceneFile(Sparse, metaclass=Validation):
     """A scene from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod

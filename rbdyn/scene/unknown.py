@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 from pydantic import BaseModel
 
-from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, one_line, refuse
+from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, refuse
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
@@ -225,13 +225,21 @@ def value_of(scene: Scene | None, key: str) -> Any:
 
 
 def plain_values(scene: Scene) -> dict[str, Any]:
-    """Value by dotted key of all tables; "left out" for a key without a value."""
-    return {
+    """Value by dotted key of all tables; "left out" for a key without a value.
+
+    Keys that a scene saves only where they differ from None are not among them.
+    """
+    values = {
         f"{table}.{key}": LEFT_OUT if value is None else value
         for table, keys in scene.model_dump(mode="json").items()
         if isinstance(keys, dict)
         for key, value in keys.items()
     }
+    for name in type(scene).model_fields:
+        table = getattr(scene, name)
+        if isinstance(table, Sparse):
+            values |= {f"{name}.{key}": usual for key, usual in table.UNSAVED.items() if usual is not None} | values
+    return values
 
 
 def documented_of(scene: Scene) -> list[Documented]:

@@ -91,8 +91,9 @@ def test_keys_are_those_of_a_scene_that_gives_all():
     for table in tables:
         of_table = {name.split(".")[1].removesuffix("[]") for name in listed if name.startswith(f"{table}.")}
         # A scene saves what tells its oil, and how that comes in, only where it is given.
-        oil = {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3", "supply"}
-        outside_json = oil if table == "lubricant" else set()
+        oil = {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3", "supply", "film_temperature",
+               "oil_flow_l_min", "oil_inlet_temperature_C", "oil_fraction_factor"}  # fmt: skip
+        outside_json = {"lubricant": oil, "mounting": {"width_mm"}}.get(table, set())
         assert of_table - outside_json == set(scene[table]) - outside_json
 
 
@@ -123,20 +124,20 @@ UNITS = {
     "mm": """axial_offset ball_diameter bar_length bar_thickness bar_width bore crown_radius effective_length fit guide_clearance half_width housing_diameter
         inner_shoulder_height interference_change land_diameter land_width lower mean narrowest nominal outer_shoulder_height outside_diameter outside pitch_diameter
         pocket_clearance pocket_contact_length pocket_radial_clearance raceway radial_clearance resolution roller_diameter roller_length
-        shaft_bore side_ring_width upper widest x y z""",
+        shaft_bore side_ring_width upper widest width x y z""",
     "um": """amplitude ball_diameter_errors ball_diameter_spread clearance_change height imbalance inner_interference
         land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
         roller_diameter_errors roller_diameter_spread roller_roughness""",
     "N": "axial_load dynamic_capacity load lundberg_load preload pulse_threshold radial_load rotating_load static_capacity",
-    "C": "housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature",
-    "K": "lower temperature_rise upper",
+    "C": "ambient cage_ceiling oil_ceiling oil_inlet_temperature housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature",
+    "K": "cage_offset lower temperature_rise upper",
     "deg": "contact_angle gravity_direction phase tilt_direction",
     "mrad": "tilt tilt_x tilt_y",
     "rpm": "inner_speed outer_speed speed",
     "m_s": "blend_speed land_restitution_speed pocket_restitution_speed u_m",
     "s_m": "land_damping_alpha pocket_damping_alpha race_damping_alpha",
     "GPa": "bore_modulus elastic_modulus shaft_modulus",
-    "hz": "pulse_bandwidth whirl_cutoff whirl_notches", "ms": "pulse_dead_time",
+    "l_min": "oil_flow", "hz": "pulse_bandwidth whirl_cutoff whirl_notches", "ms": "pulse_dead_time",
     "N_m": "pocket_bar_stiffness stiffness",
     "kg": "inner_ring_mass outer_ring_mass",
     "turns": "discard impact_window",
@@ -144,12 +145,14 @@ UNITS = {
     "s": "time", "Nm": "moment", "N_s_m": "damping", "m_s2": "gravity", "g": "mass", "g_mm": "unbalance", "kg_mm2": "inertia",
     "kg_m3": "density", "MPa": "eyring_stress", "1_GPa": "pressure_coefficient", "mPas": "viscosity", "C_mm2_s": "viscosities",
     "mm_um": "profile_table", "per_K": "expansion", "1e_6_K": "thermal_expansion", "percent": "smallest_difference",
+    "W_mK": "conductivity", "J_kgK": "heat_capacity",
 }  # fmt: skip
 SHOWN = {
-    "percent": "%",
+    "percent": "%", "l_min": "L/min",
     "um": "µm", "C": "°C", "m_s": "m/s", "s_m": "s/m", "hz": "Hz", "N_m": "N/m", "turns": "shaft turns", "per_turn": "per shaft turn",
     "Nm": "N m", "N_s_m": "N s/m", "m_s2": "m/s²", "g_mm": "g mm", "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "1_GPa": "1/GPa", "mPas": "mPa s",
     "C_mm2_s": "°C, mm²/s", "mm_um": "mm, µm", "per_K": "1/K", "1e_6_K": "1e-6/K",
+    "W_mK": "W/(m K)", "J_kgK": "J/(kg K)",
 }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -91,6 +92,65 @@ def test_invariant_the_notebook_runs_on_the_simulation_itself(tmp_path):
     assert set(left["study"].table("gains")["response"]) == {"impact_force_N", "whirl_deviation_ratio", "power_loss_W"}
     assert left["result"].impact_force_N.value > 0.0
     plt.close("all")
+
+
+def test_literature_the_flight_has_its_points_and_its_life():
+    """Literature: idle, cruise and take-off, whose life by ISO/TS 16281, Palmgren and Miner is 92 000 h, 7 tenths of the damage
+    at cruise; a map reads the same points."""
+    from doe.study_file import Study
+    from doe.workflow.duty import lives
+    from rbdyn.scene.duty import read_duty
+
+    study = Study.load(EXAMPLES / "duty_study.toml")
+    assert study.shares == {"cruise": 0.8, "idle": 0.15, "take-off": 0.05}
+    assert read_duty(study.path) == study.file.duty
+    assert study.responses[-1] == "idle: cage_slip"
+    life = lives(study, {"baseline": study.baseline})["baseline"]
+    assert life.hours == pytest.approx(92_024.0, rel=1e-4)
+    assert life.damage == pytest.approx((0.001, 0.703, 0.296), abs=0.001)
+
+
+def flight(folder):
+    """The study of a flight in a folder of its own, with a short search."""
+    for name in ("cylindrical_roller.toml", "duty_study.toml"):
+        shutil.copy(EXAMPLES / name, folder)
+    with (folder / "duty_study.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[front]\ngenerations = 10\ndraws = 100\n")
+    return folder / "duty_study.toml"
+
+
+def test_invariant_the_flight_runs_on_simulations_that_take_no_time(tmp_path, monkeypatch):
+    """Invariant: each run and each confirmed point is simulated at idle, cruise and take-off; all are answered."""
+    import doe
+
+    ran = instantly(monkeypatch.setattr)
+    unillustrated(monkeypatch.setattr)
+    answer = doe.study(flight(tmp_path), tmp_path / "out")
+    points = answer["duty"]["points"]
+    assert [point["name"] for point in points] == ["idle", "cruise", "take-off"]
+    assert answer["duty"]["aggregate"]["impact_force_N"] == "worst_relative"
+    assert answer["confirmation"]["baseline"]["responses"]["impact_force_N"]["value"] == 1.0
+    assert len(answer["design"]["points"]) == 18 and len(ran) >= 3 * 18 + 3 * 2
+    table = answer.table("duty")
+    assert len(table) == 9 and set(table["limit_verdict"]) == {"", "kept"}
+    text = (tmp_path / "out" / "answer.txt").read_text(encoding="utf-8")
+    assert "duty of idle 15 %, cruise 80 %, take-off 5 %" in text and "Life over the duty, L10r: 92024 h" in text
+    assert (tmp_path / "out" / "duty_points.csv").read_text(encoding="utf-8").count("\n") == 10
+
+
+@pytest.mark.slow
+def test_trend_the_flight_is_better_at_every_point(tmp_path):
+    """Trend: the pick hits the cage less and loses less at idle, cruise and take-off alike; cruise is the worst point for the cage."""
+    import doe
+
+    answer = doe.study(EXAMPLES / "duty_study.toml", tmp_path)
+    assert answer["status"] == "ok"
+    for point in answer["duty"]["points"]:
+        assert {gain["verdict"] for gain in point["gains"].values()} == {"better"}, point["name"]
+    worst = answer["duty"]["worst"]["pick"]
+    assert worst["impact_force_N"]["point"] == "cruise" and worst["impact_force_N"]["probability"] > 0.9
+    assert worst["cage_slip"]["point"] == "idle"
+    assert answer["gains"]["impact_force_N"]["percent"] == pytest.approx(11.6, abs=3.0)
 
 
 def test_unit_published_checks_are_whole():

@@ -12,7 +12,7 @@ from rbdyn import Scene
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.validity import friction_check, friction_notes, light_load_notes
-from rbdyn.life import rollers
+from rbdyn.life import friction, rollers
 from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.catalogue import Envelope, envelope, read_designation
 
@@ -78,14 +78,16 @@ def test_literature_friction_check_at_the_reference_speed(bearing, make_scene):
 def test_unit_limits_of_the_factors():
     """Unit: slow bearings are neither heated nor starved and slide at the boundary, fast ones in the film; axial load slides."""
     slow, thick = 1e-6 * RPM, 1e-4
-    assert rollers.inlet_heating_factor(0.07, slow, thick) == pytest.approx(1.0, abs=1e-9)
-    assert rollers.starvation_factor(0.05, 0.09, slow, thick, "grease") == pytest.approx(1.0, abs=1e-9)
-    assert rollers.sliding_friction(0.07, slow, thick) == pytest.approx(0.12)
-    assert rollers.sliding_friction(0.07, 1e5 * RPM, thick) == pytest.approx(0.02)
+    rollers_geometry, rollers_film = rollers.ROLLER_GEOMETRY, rollers.FILM_FRICTION
+    sizes = rollers_geometry, 0.05, 0.09
+    assert friction.inlet_heating_factor(0.07, slow, thick) == pytest.approx(1.0, abs=1e-9)
+    assert friction.starvation_factor(*sizes, slow, thick, "grease") == pytest.approx(1.0, abs=1e-9)
+    assert friction.sliding_friction(rollers_film, 0.07, slow, thick) == pytest.approx(0.12)
+    assert friction.sliding_friction(rollers_film, 0.07, 1e5 * RPM, thick) == pytest.approx(0.02)
     fast = 8500.0 * RPM, 11e-6
-    bath = rollers.starvation_factor(0.05, 0.09, *fast, "bath")
-    assert rollers.starvation_factor(0.05, 0.09, *fast, "grease") == pytest.approx(bath**2)
-    assert rollers.inlet_heating_factor(0.07, *fast) < 1.0 and bath < 1.0
+    bath = friction.starvation_factor(*sizes, *fast, "bath")
+    assert friction.starvation_factor(*sizes, *fast, "grease") == pytest.approx(bath**2)
+    assert friction.inlet_heating_factor(0.07, *fast) < 1.0 and bath < 1.0
     radial, both = (rollers.skf_moments("2", 0.05, 0.09, *fast, 3e3, axial) for axial in (0.0, 500.0))
     assert both.rolling == radial.rolling
     assert both.sliding - radial.sliding == pytest.approx(1e-3 * 0.16 * 70.0**0.9 * 500.0 * 0.02, rel=1e-3)

@@ -242,7 +242,17 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
     figures = ["cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio"]
     for name, *call in (
         ("simulate", rollers, *brief),
-        ("map", rollers, "--speed", "20000:24000:2", "--load", "1300:1500:2", *brief),
+        (
+            "map",
+            rollers,
+            "--speed",
+            "20000:24000:2",
+            "--load",
+            "1300:1500:2",
+            "--duty",
+            EXAMPLES / "duty_study.toml",
+            *brief,
+        ),
         ("ball", balls),
         ("ball", balls, "--sweep", "operation.inner_speed_rpm=1000:2000:2"),
         ("ball", balls, "--preload", "100:300:3"),

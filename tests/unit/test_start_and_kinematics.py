@@ -18,7 +18,7 @@ from rbdyn.dynamics.forces.cage import InnerGuide, NoFilm, NoGuide, OuterGuide
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.parameters import state as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.state import scales, start_state, static_share
+from rbdyn.dynamics.parameters.state import load_distribution, scales, start_state, static_share
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.run import Run
 from rbdyn.mounting import fits
@@ -108,6 +108,24 @@ def test_oracle_static_share_of_an_imperfect_bearing(everything):
     found = static_share(bearing, angles, motion.cage_speed, everything.operation.radial_load_N, radii)
     assert found == pytest.approx(expected, rel=1e-9)
     assert 2 <= np.count_nonzero(loads) < 10
+
+
+def test_oracle_load_distribution(outer, everything):
+    """Oracle: loads at each place are those of nested bracketing; the outer race bears the centrifugal force on top."""
+    for scene in (outer, everything):
+        bearing, geometry = roller_bearing(scene), scene.geometry
+        load, count = scene.operation.radial_load_N, scene.bearing.rollers
+        found = load_distribution(scene, bearing, load, positions=3)
+        assert found.outer.shape == found.inner.shape == (3, count)
+        for row in (0, 2):
+            angles = 2.0 * np.pi * (np.arange(count) + (row + 0.5) / 3) / count
+            _, loads = equilibrium(scene, angles, geometry.motion.cage_speed)
+            assert found.inner[row] == pytest.approx(loads, rel=1e-4, abs=1e-3)
+            along = found.inner[row] @ np.cos(angles)
+            assert along == pytest.approx(load, rel=1e-3)
+        # The contact normals of the two races differ by the ring's displacement over its radius.
+        extra = found.outer - found.inner
+        assert extra == pytest.approx(np.full_like(extra, geometry.centrifugal_force), rel=0.01)
 
 
 def test_literature_both_rings_turn(make_scene):

@@ -246,7 +246,7 @@ def test_unit_inputs_of_a_film_reach_the_law():
 
 def test_unit_film_report():
     """Unit: film, Lambda and pressure of each race at a load; the outer film is the thicker; nothing if nothing rolls."""
-    report = film_report(scene(), OIL, 674.0, 674.0)
+    report = film_report(scene(), 674.0, 674.0)
     assert set(report) == {"outer", "inner"}
     assert report["inner"]["hertz_pressure_Pa"] == pytest.approx(1.39e9, rel=5e-3)
     assert 0.16e-6 < report["inner"]["central_film_m"] < report["outer"]["central_film_m"] < 0.24e-6

@@ -8,22 +8,29 @@ from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
 
+from doe.clearance import TEMPERATURES
 from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
+from doe.report.sections.duty import at_points
 from doe.report.sections.record import (
+    LIMITS,
     SENSES,
+    SIGNS_NOTE,
+    VERDICTS,
     Factor,
     Record,
     change,
     dimension,
     factors,
-    half_width,
     moved,
     nearest,
     of_hundred,
     part,
     responses,
     share_with_interval,
+    sign_of,
+    signed,
     sizes,
+    value_text,
 )
 from doe.study_file import Study
 from doe.study_file.duty import OverDuty
@@ -60,10 +67,7 @@ CLEARANCES = {
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
 SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
-SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
-VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
-LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -72,13 +76,17 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def first_screen(summary: Record) -> list[Block]:
-    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point."""
+    """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point.
+
+    Over a duty the verdicts at each of its points follow the gains.
+    """
     identity = part(summary, "identity")
     return [
         *([identity_line(Identity.from_dict(identity))] if identity else ()),
         *_clearances(summary),
         *_judged(summary),
         *_gained(summary),
+        *at_points(summary),
         *_parts_to_make(summary),
         *_reasons(summary),
     ]
@@ -182,9 +190,32 @@ def _clearances(summary: Record) -> list[Block]:
         Tiles("Chosen clearances", "pick", tiles),
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
+        *_temperatures(summary),
         Paragraph(part(summary, "tolerances_warning") or "", "warning"),
         Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
+
+
+def _temperatures(summary: Record) -> list[Block]:
+    """Steady temperatures at baseline and pick, and what the inputs of the heat balance leave open; nothing without a balance."""
+    baseline, pick = (part(summary, "confirmation", name, "temperatures_C") or {} for name in ("baseline", "pick"))
+    rows = [
+        (quantity(name)[0], _plain(baseline.get(name)), _plain(figure), _range(figure.get("input_range")))
+        for name, figure in pick.items()
+    ]
+    header = ("steady state [°C]", "baseline", "pick", "pick over inputs (90 %)")
+    note = (
+        "Inputs: factors on surfaces, housing and contacts, and the share of the oil. Errors: of the simulation (95 %)."
+    )
+    return [Table("Temperatures", header, rows, note)] if rows else []
+
+
+def _plain(figure: Record | None) -> str:
+    return with_error(figure["value"], figure["error"]) if figure else ""
+
+
+def _range(ends: Sequence[float] | None) -> str:
+    return "" if ends is None else f"{ends[0]:.0f} to {ends[1]:.0f}"
 
 
 def _robust_points(summary: Record) -> Table:
@@ -245,10 +276,12 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
     rows = [
-        (label(name), _value(before.get(name)), _value(after.get(name)), _signed(gain)) for name, gain in gains.items()
+        (label(name), value_text(before.get(name)), value_text(after.get(name)), signed(gain))
+        for name, gain in gains.items()
     ]
     header = ("response", "baseline", "pick", "change")
-    return Table("Changes confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
+    where = " over the duty" if part(summary, "duty") else ""
+    return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
 
 
 def limits(summary: Record) -> Table:
@@ -297,11 +330,6 @@ def _verdict(limit: Record) -> tuple[str, str]:
     """The verdict with its sign, and the probability of keeping the limit."""
     probability = limit.get("probability")
     return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
-
-
-def sign_of(gain: Record) -> str:
-    """The verdict of a gain with a sign that needs no colour."""
-    return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -381,7 +409,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         [
             point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in inputs),
-            *(_value(part(point, "responses", response)) for response in names),
+            *(value_text(part(point, "responses", response)) for response in names),
         ]
         for name, point in points.items()
     ]
@@ -415,7 +443,7 @@ def changes(summary: Record) -> Table:
         [
             point_words(name),
             *(factor.text(part(point, "factors", factor.name)) for factor in factors(summary)),
-            *(_signed(point["gains"].get(response)) for response in names),
+            *(signed(point["gains"].get(response)) for response in names),
         ]
         for name, point in (part(summary, "confirmation") or {}).items()
         if point.get("gains")
@@ -423,15 +451,6 @@ def changes(summary: Record) -> Table:
     caption = "Changes from the baseline at every confirmed point"
     header = ("point", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names))
     return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
-
-
-def _signed(gain: Record | None) -> str:
-    """A gain with the sign of its verdict."""
-    return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
-
-
-def _value(quantity: Record | None) -> str:
-    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
 
 
 def tolerances(summary: Record) -> Table:
@@ -475,12 +494,23 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
             ],
         }
         | ({} if point.friction_check is None else {"friction_check": dict(point.friction_check)})
+        | ({} if point.temperatures is None else {"temperatures_C": temperatures_record(point)})
         | {
             key: record(outcome.gains[name])
             for key, record in (("gains", gains_record), ("statement", statement))
             if name in outcome.gains
         }
         for name, point in outcome.confirmed.items()
+    }
+
+
+def temperatures_record(point: Confirmed) -> dict[str, Any]:
+    """Steady temperatures by response, each with its value, its 95 % error, and 90 % of it over the inputs of the heat balance."""
+    ranges = point.temperature_ranges or {}
+    figures = point.temperatures or {}
+    return {
+        name: {"value": figures[node].value, "error": figures[node].stated_error, "input_range": ranges.get(node)}
+        for name, node in TEMPERATURES.items()
     }
 
 

@@ -5,18 +5,21 @@ Names and plain numbers are written by ``rbdyn.base.words``; here are gains, tol
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from doe.dimension_chain.links import size_text
 from doe.pareto.manufacture import Interval, percent
-from rbdyn.base.blocks import Block, Bullets, Note, Paragraph, Table, says
-from rbdyn.base.words import improvement, label, quantity, shown
+from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Note, Paragraph, Table, says
+from rbdyn.base.words import improvement, label, quantity, shown, with_error
 
 Record = Mapping[str, Any]
 # Limits by their sense in a record.
 SENSES = {"<=": "≤", ">=": "≥"}
+VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
+SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
+LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 # Characters above which a value is a sentence, which may take several lines.
 LONG = 40
 # The efficiencies of a design are named by a capital letter.
@@ -145,11 +148,49 @@ def drop_undefined(value: Any) -> Any:
 
 
 def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
-    """Blocks with something to say: quantities by their words in sentences, tables without empty columns."""
+    """Blocks with something to say: quantities by their words in sentences, tables without empty columns.
+
+    A response that is a ratio to the baseline over a duty has no unit in tables and pictures.
+    """
     names = [*(factor.name for factor in factors(summary)), *(response["name"] for response in responses(summary))]
     # The longest first, for a name may begin with another.
     words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
-    return [_spelt(block, words) for block in blocks if says(block)]
+    ratios = {label(name): response_label(summary, name) for name in names if is_ratio(summary, name)}
+    return [_without_unit(_spelt(block, words), ratios) for block in blocks if says(block)]
+
+
+def is_ratio(summary: Record, name: str) -> bool:
+    """Whether a response is the worst ratio to the baseline over a duty."""
+    return bool(part(summary, "duty", "aggregate", name) == "worst_relative")
+
+
+def response_label(summary: Record, name: str) -> str:
+    """'impact force [N]' of a response; over a duty 'impact force, worst ratio' where it is one."""
+    return f"{quantity(name)[0]}, worst ratio" if is_ratio(summary, name) else label(name)
+
+
+def _without_unit(block: Block, ratios: Mapping[str, str]) -> Block:
+    """The block with these labels replaced in its captions, cells and pictures, but not as figures at a point."""
+
+    def plain(text: str) -> str:
+        for with_unit, words in ratios.items():
+            text = re.sub(rf"(?<!: ){re.escape(with_unit)}", words, text)
+        return text
+
+    def drawn(picture: str | Callable[[], str]) -> str | Callable[[], str]:
+        return plain(picture) if isinstance(picture, str) else lambda: plain(picture())
+
+    match block:
+        case _ if not ratios:
+            return block
+        case Heading(text):
+            return replace(block, text=plain(text))
+        case Table():
+            rows = [[plain(cell) for cell in row] for row in block.rows]
+            return replace(block, caption=plain(block.caption), header=[*map(plain, block.header)], rows=rows)
+        case Figures():
+            return replace(block, pictures=[*map(drawn, block.pictures)], caption=plain(block.caption))
+    return block
 
 
 def _spelt(block: Block, words: Mapping[str, str]) -> Block:
@@ -196,6 +237,21 @@ def half_width(record: Mapping[str, Any]) -> float | None:
         return float(record["error"])
     statistical = record.get("statistical_error")
     return None if statistical is None else math.hypot(statistical, record.get("numerical_error") or 0.0)
+
+
+def sign_of(gain: Record) -> str:
+    """The verdict of a gain with a sign that needs no colour."""
+    return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
+
+
+def signed(gain: Record | None) -> str:
+    """A gain with the sign of its verdict."""
+    return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
+
+
+def value_text(quantity: Record | None) -> str:
+    """A quantity with its 95 % half-width; nothing where there is none."""
+    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
 
 
 def change(gain: Mapping[str, Any]) -> str:

@@ -445,3 +445,10 @@ def static_share(bearing, angles, orbit_speed, load, radii):
             break
         low, below, high, above, moved = narrowed(low, below, high, above, moved, middle, force)
     return middle
+
+
+@entry
+def static_loads(bearing, angles, ring_x, radii, outer, inner):
+    """Fill the loads [N] of rollers at ``angles`` and ``radii`` on the outer and the inner race, as of ``static_share``."""
+    for j in range(angles.size):
+        outer[j], inner[j] = race_loads(bearing, j, radii[j], angles[j], ring_x)

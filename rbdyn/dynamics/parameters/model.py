@@ -73,10 +73,12 @@ LARGEST_PRESSURE = 4e9
 LARGEST_ERROR = 0.01
 
 
-def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
-    """Traction law of a race by one of its contacts.
+def race_traction(
+    scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float, race: str = "outer"
+) -> Any:
+    """Traction law of a race, "outer" or "inner", by one of its contacts.
 
-    ``oil``: of the scene, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of pure
+    ``oil``: at the temperature of that film; a table covers loads up to ``largest_load`` [N]. The film is that of pure
     rolling. Raises InputError where a model needs a film and nothing rolls.
     """
     table = scene.traction
@@ -87,7 +89,7 @@ def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil
     if not contact.entrainment_speed > ROLLING:
         key = f"traction.model = '{table.model}'" if table.model in RHEOLOGIES else "traction.friction = 'mixed'"
         raise InputError([f"{key}: needs a film, but the races do not roll; choose another"])
-    law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
+    law = _surface(scene, race, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
 
@@ -101,7 +103,7 @@ def rolling_contacts(scene: Scene) -> dict[str, film_thickness.RollingContact]:
     }
 
 
-def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
+def film_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
     """Films at the loads [N] > 0 of an inner and an outer contact, in pure rolling at the nominal speed.
 
     For each of "inner" and "outer": load_N, hertz_pressure_Pa, central_film_m and minimum_film_m (both with inlet
@@ -112,6 +114,7 @@ def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) ->
     for (race, contact), load in zip(rolling_contacts(scene).items(), (outer_load, inner_load), strict=True):
         if contact.entrainment_speed == 0.0:
             continue
+        oil = scene.oil(race)
         factor = film_thickness.thermal_factor(contact, oil, load)
         film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
         ratio = _lambda(scene, film)
@@ -147,10 +150,10 @@ def _load_independent(scene: Scene) -> Any:
     return traction.FourConstantTraction(a, b, c, d)
 
 
-def _surface(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
+def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
     from rbdyn.contact.rheology import traction_coefficient, with_body_creep
 
-    rheology = _rheology(scene, oil)
+    rheology = _rheology(scene, oil, race)
 
     def coefficient(slip: Any, load: Any) -> Any:
         film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
@@ -172,13 +175,14 @@ def _surface(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, lar
     return fit.surface
 
 
-def _rheology(scene: Scene, oil: Oil) -> "Rheology":
+def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Rheology":
     from rbdyn.contact.rheology import Eyring, LimitingShear, thermal_newtonian
 
     table = scene.traction
     if table.model == "thermal_newtonian":
         name = table.rheology_oil or scene.lubricant.oil
-        return thermal_newtonian(name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio)
+        temperature = getattr(scene.film_temperatures_C, race)
+        return thermal_newtonian(name, temperature, oil.conductivity, table.largest_shear_ratio)
     if table.model == "eyring":
         stress = table.eyring_stress
         return Eyring(oil.viscosity, oil.pressure_coefficient, stress, table.largest_shear_ratio)
@@ -216,20 +220,19 @@ def roller_bearing(scene: Scene) -> RollerBearing:
     drawing, geometry = scene.bearing, scene.geometry
     mass, radii = geometry.roller_mass, geometry.roller_radii
     angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
-    oil = scene.lubricant.in_service
     return RollerBearing(
         rollers=drawing.rollers,
         sizes=EqualRollers(geometry.roller_radius) if radii is None else unequal_rollers(radii),
         roller_mass=mass,
         roller_inertia=mass * drawing.roller_diameter**2 / 8.0,
-        outer=_race(scene, oil, "outer"),
-        inner=_race(scene, oil, "inner"),
-        open_film=_open_film(scene, oil),
-        pocket=_pocket(scene, oil),
+        outer=_race(scene, "outer"),
+        inner=_race(scene, "inner"),
+        open_film=_open_film(scene, scene.oil("inner")),
+        pocket=_pocket(scene, scene.oil("pocket")),
         pocket_cos=np.cos(angles),
         pocket_sin=np.sin(angles),
-        guide=_guide(scene, oil),
-        drag=_drag(scene, oil),
+        guide=_guide(scene, scene.oil("land")),
+        drag=_drag(scene, scene.oil("cavity")),
         cage=_cage(scene),
         outer_ring=_outer_ring(scene),
         inner_ring_mass=drawing.inner_ring_mass_kg,
@@ -242,7 +245,7 @@ def _modulus(scene: Scene, first: str, second: str) -> float:
     return equivalent_modulus(scene.material(first), scene.material(second))
 
 
-def _race(scene: Scene, oil: Oil, which: str) -> Race:
+def _race(scene: Scene, which: str) -> Race:
     place, geometry = ("outer", "inner").index(which), scene.geometry
     radius, reduced, radii = geometry.raceways[place], geometry.reduced_radii[place], geometry.roller_radii
     form = _form(getattr(scene.bearing, f"{which}_waviness"))
@@ -256,8 +259,8 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
         form=form,
         contact=race_contact_law(scene, which),
         damping=_race_damping(scene),
-        traction=race_traction(scene, rolling_contacts(scene)[which], oil, largest_load),
-        rolling=rolling_law(scene, oil, reduced),
+        traction=race_traction(scene, rolling_contacts(scene)[which], scene.oil(which), largest_load, which),
+        rolling=rolling_law(scene, scene.oil(which), reduced),
         tangential=_tangential(scene, place),
     )
 

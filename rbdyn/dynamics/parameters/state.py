@@ -13,7 +13,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.bodies import action
-from rbdyn.dynamics.forces.equations import RollerBearing, static_share
+from rbdyn.dynamics.forces.equations import RollerBearing, static_loads, static_share
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X, Layout, layout
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
@@ -168,6 +168,28 @@ def increments(scene: Scene, bearing: RollerBearing) -> Array:
     size = layout.values(lambda part: spin if (part.body, part.unit) == ("roller", "rad/s") else sizes[part.unit])
     scale = np.minimum(absolute_tolerance(scene, bearing, 1.0, "rosenbrock"), size)
     return np.sqrt(np.finfo(float).eps * size * scale)
+
+
+class LoadDistribution(NamedTuple):
+    """Static loads of the rollers on the outer and the inner race [N], (positions, rollers)."""
+
+    outer: Array
+    inner: Array
+
+
+def load_distribution(scene: Scene, bearing: RollerBearing, load: float, positions: int = 8) -> LoadDistribution:
+    """Loads of rollers in static equilibrium of the inner ring under a ``load`` [N] along x, with clearance and centrifugal force.
+
+    The cage stands at ``positions`` angles, which divide a pitch evenly: the mean over them is the mean over a turn.
+    """
+    count, speed = bearing.rollers, scene.geometry.motion.cage_speed
+    outer, inner = np.empty((positions, count)), np.empty((positions, count))
+    radii = np.empty(count)
+    for row in range(positions):
+        angles = 2.0 * np.pi * (np.arange(count) + (row + 0.5) / positions) / count
+        ring_x = static_share(bearing, angles, speed, load, radii)
+        static_loads(bearing, angles, ring_x, radii, outer[row], inner[row])
+    return LoadDistribution(outer, inner)
 
 
 def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> Array:

@@ -31,7 +31,7 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     too. With a profile or a tilt the pressure is that of the most loaded slice, of a roller where the tilt is largest.
     """
     loads = max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
-    films = film_report(scene, scene.lubricant.in_service, *loads)
+    films = film_report(scene, *loads)
     count = scene.slices
     contacts = rolling_contacts(scene)
     report = {}
@@ -94,7 +94,7 @@ def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] |
         return None
     named, sizes = listed
     inner, outer = scene.operation.speeds
-    oil, load = scene.lubricant.in_service, scene.operation.largest_load_N
+    oil, load = scene.oil(), scene.operation.largest_load_N
     lengths = 1e-3 * sizes.bore, 1e-3 * sizes.outside
     viscosity, supply = oil.viscosity / oil.density, scene.lubricant.supply
     moments = skf_moments(named.series, *lengths, inner - outer, viscosity, load, supply=supply)
@@ -185,7 +185,7 @@ def spin_windage(scene: Scene) -> float:
     of the oil.
     """
     drawing, cage, motion = scene.bearing, scene.cage, scene.geometry.motion
-    oil, share = scene.lubricant.in_service, scene.lubricant.oil_fraction
+    oil, share = scene.oil(), scene.lubricant.oil_fraction
     mixture = share * oil.density + (1.0 - share) * AIR_DENSITY, oil.viscosity
     spin, turning = abs(motion.roller_spin - motion.cage_speed), abs(motion.cage_speed)
     radius, length = scene.geometry.roller_radius, drawing.roller_length
@@ -211,7 +211,7 @@ def open_inner_films(scene: Scene) -> float:
     approach = 2.0 * (load / palmgren(modulus, length).stiffness) ** 0.9
     angle = (np.arange(2000) + 0.5) * math.pi / 2000
     gap = clearance - (clearance + approach) * np.cos(angle)
-    speed, oil = scene.geometry.motion.entrainment, scene.lubricant.in_service
+    speed, oil = scene.geometry.motion.entrainment, scene.oil("inner")
     powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
     return count * float(powers.sum()) / angle.size
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError
 from rbdyn.contact.point_contact import PointContact, ball_on_race
 from rbdyn.mounting.fits import row_change
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
@@ -110,7 +111,14 @@ def control_of(
 
 
 def row_of(scene: SingleRowScene) -> RowModel:
-    """The row of a single-row scene, with the ring growth that the scene states."""
+    """The row of a single-row scene, with the ring growth that the scene states.
+
+    Raises InputError for a scene whose heat balance would have to decide the growth first.
+    """
+    if scene.thermal is not None:
+        raise InputError(
+            ["[thermal]: is for the equilibrium and for --sweep alone; state temperatures in [mounting] instead"]
+        )
     ball, inner, outer = (scene.material(part) for part in ("ball", "inner_ring", "outer_ring"))
     return row_model(scene.bearing, scene.model, ball, inner, outer, *scene.operation.speeds, row_change(scene))
 

@@ -1,0 +1,63 @@
+"""Life of a roller bearing over a duty, from the static loads of ISO/TS 16281 at each point; nothing is simulated for it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.contact.hertz_line import iso_16281
+from rbdyn.contact.profile import slice_centres
+from rbdyn.dynamics.parameters.model import roller_relief
+from rbdyn.life import turning_rings
+from rbdyn.life.duty import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life
+from rbdyn.life.rollers import ReferenceLife, RollerContacts, reference_life, static_loads
+from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.scene import Scene
+
+
+def static_life(scene: Scene) -> ReferenceLife:
+    """Reference life of ISO/TS 16281 at the operating clearance, by its laminae and its own line contact.
+
+    The load is the steady one in line with the rotating one, of a schedule the largest. Gravity, form errors and a flexible support
+    are left out. Edge stresses count where the roller has a profile, as in ``motion.rating_life``.
+    """
+    drawing, geometry = scene.bearing, scene.geometry
+    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
+    contacts = RollerContacts(
+        iso_16281(modulus, drawing.effective_length).stiffness, (_relief(scene, "inner"), _relief(scene, "outer"))
+    )
+    inner, outer = static_loads(
+        contacts, drawing.rollers, scene.operation.largest_load_N, geometry.clearance, geometry.centrifugal_force
+    )
+    return reference_life(
+        inner,
+        outer,
+        capacity=drawing.rated_capacity,
+        gamma=drawing.diameter_ratio,
+        turning=turning_rings(*scene.operation.speeds),
+        edges=drawing.roller_profile != "cylinder",
+    )
+
+
+def _relief(scene: Scene, race: str) -> Array:
+    """Profile drop less the rise by tilt at the slice centres [m], (1, slices), or (rollers, slices) with a tilt."""
+    drawing, slices = scene.bearing, scene.slices
+    drop = roller_relief(scene, slices)[None]
+    if drawing.tilt == 0.0:
+        return drop
+    share = drawing.inner_tilt_share if race == "inner" else 1.0 - drawing.inner_tilt_share
+    angle = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
+    tilt = drawing.tilt * share * np.cos(angle - drawing.tilt_direction)
+    return np.asarray(drop - tilt[:, None] * slice_centres(slices, drawing.effective_length))
+
+
+def roller_duty_life(scenes: Sequence[Scene], shares: Sequence[float]) -> DutyLife:
+    """Life over a duty from the scene at each point and its share of time; loads are the radial ones.
+
+    Raises MethodError for shares that do not sum to 1.
+    """
+    cases = []
+    for scene, share in zip(scenes, shares, strict=True):
+        inner, outer = scene.operation.speeds
+        cases.append(LoadCase(share, inner - outer, scene.operation.largest_load_N, static_life(scene)))
+    return duty_life(cases, ROLLER_EXPONENT)

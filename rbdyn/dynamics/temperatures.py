@@ -1,0 +1,335 @@
+"""A roller bearing at the temperatures that its own friction keeps up: heat balance, simulation and clearances in one loop.
+
+A state is a set of temperatures of oil, rings and rollers. The scene at these temperatures is simulated, the network carries off
+the heat of the losses, and the temperatures that this gives are compared with those assumed (``rbdyn.thermal.fixed_point``). Short
+runs come first; a run of the scene's own length at the end gives the figures, whose temperatures it also corrects by the last
+small step. All runs have the seed of the scene.
+
+Errors of the temperatures are those of the heat, divided by 1 - dM/dT of the loop, as for any other figure: each temperature is
+a weighted sum of the losses. The gain of the loop comes from two more short runs, with all nodes 5 K warmer and with the inner
+ring alone 5 K warmer. Ranges over the documented inputs of the balance, which are far wider than these errors, follow from 256
+sets with the heat linear in the temperatures.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.forecast import Notice
+from rbdyn.dynamics.ensemble import Reporter
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING
+from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of
+from rbdyn.dynamics.run import with_numerics
+from rbdyn.dynamics.settling import Ensemble
+from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
+from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean, quantity, work_done
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, inlet_temperature
+from rbdyn.thermal.fixed_point import TOLERANCE, State, gain, learned, steady_state
+from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
+from rbdyn.thermal.network import NODES, carried_off, matrix
+
+# Replicates of a short run, and its counted turns as a share of those of the scene.
+SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
+# Warmer nodes of the runs that measure the gain [K].
+WARMER = 5.0
+# Runs of the scene's own length at most: the last deviates by less than the tolerance after one or two.
+MOST_WHOLE_RUNS = 3
+# Exponents of the viscosity in losses, with which slopes start. Any others give the same state.
+ROLLING_POWER, POCKET_POWER, LAND_POWER = 0.7, 0.5, 1.0
+# Share of the last step that counts as error: its slopes of about 0.3 are known within a third.
+LAST_STEP = 0.1
+
+# Simulates a scene: replicates, and the time that they took.
+Simulate = Callable[[Scene, Reporter, Notice], tuple[Ensemble, dict[str, float]]]
+# The result of simulated replicates.
+Gather = Callable[[Scene, Ensemble, dict[str, float]], SimulationResult]
+
+
+class Trial(NamedTuple):
+    """A simulated state: the scene at its temperatures, its network, and its replicates with their time [s]."""
+
+    hot: Scene
+    network: Network
+    ensemble: Ensemble
+    clock: dict[str, float]
+
+
+def temperature_figures(state: Array, network: Network, slopes: Array) -> list[Figure]:
+    """Steady temperature of each node [C] as a figure of the replicates of a state (4,).
+
+    T + (1 - dM/dT)^-1 (M - T), with M = offset + weights times the powers. With slopes of 0 it is M, which balances the heat.
+    """
+    response = np.linalg.inv(np.eye(len(state)) - slopes)
+    constants = state + response @ (network.offset - state)
+    return [
+        _weighted(weights, constant) for weights, constant in zip(response @ network.weights, constants, strict=True)
+    ]
+
+
+def _weighted(weights: Array, constant: float) -> Figure:
+    """Constant plus weighted sum of the mean powers."""
+
+    def moments(run: Replicate) -> Array:
+        return np.column_stack((run.durations, run.work @ weights + constant * run.durations))[run.first :]
+
+    return Figure(moments, mean)
+
+
+def powers_of(runs: Sequence[Replicate]) -> Array:
+    """Mean powers [W] in the order of ``equations.LOSSES`` and what follows there."""
+    work = np.sum([run.work[run.first :].sum(axis=0) for run in runs], axis=0)
+    return np.asarray(work / sum(run.duration for run in runs))
+
+
+def short(scene: Scene) -> Scene:
+    """The scene with runs long enough for its heat alone."""
+    numerics = scene.numerics
+    return with_numerics(
+        scene,
+        turns=max(SHORT_SHARE * numerics.turns, min(numerics.turns, 5.0)),
+        replicates=min(SHORT_REPLICATES, numerics.replicates),
+        companion=False,
+        extend=False,
+        whirl_cutoff_hz=None,
+        whirl_notches_hz=[],
+        pulse_threshold_N=None,
+        pulse_bandwidth_hz=None,
+    )
+
+
+class Balance:
+    """Map from temperatures to those that balance their heat, by short runs or by those of the scene."""
+
+    def __init__(self, scene: Scene, simulate: Simulate) -> None:
+        assert scene.thermal is not None
+        self.scene, self.simulate, self.thermal = scene, simulate, scene.thermal
+        self.compile_s, self.wall_s = 0.0, 0.0
+        self.runs: list[Replicate] = []
+
+    @property
+    def turns(self) -> float:
+        """Shaft turns of all runs."""
+        return sum(float(run.durations.sum()) for run in self.runs) / self.scene.turn_s
+
+    @property
+    def cold(self) -> Array:
+        """Temperatures before any heat [C]."""
+        return np.full(len(NODES), inlet_temperature(self.thermal, self.scene.lubricant))
+
+    def at(self, temperatures: Array, whole: bool = False, progress: Reporter = None, notice: Notice = None) -> State:
+        """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt."""
+        hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()))
+        network = network_of(hot, self.thermal)
+        ensemble, clock = self.simulate(hot if whole else short(hot), progress, notice)
+        self.compile_s += clock["compile_s"]
+        self.wall_s += clock["wall_s"]
+        self.runs += [*ensemble.runs, *ensemble.companions]
+        flat = np.zeros((len(NODES), len(NODES)))
+        figures = [
+            quantity(figure, ensemble.runs, [], 0.0, 0.0) for figure in temperature_figures(temperatures, network, flat)
+        ]
+        image = np.array([figure.value for figure in figures])
+        noise = np.array([figure.statistical_error or 0.0 for figure in figures])
+        return State(temperatures, image, noise, Trial(hot, network, ensemble, clock))
+
+
+def viscous_slopes(state: State) -> Array:
+    """Slopes dM/dT (4, 4) at a state by the viscosity of the films alone, with which a search begins."""
+    hot, network = state.run.hot, state.run.network
+    powers, shares = powers_of(state.run.ensemble.runs), network.shares
+    race_and_rollers = {"outer": (0.0, 0.5, 0.0, 0.5), "inner": (0.0, 0.0, 0.5, 0.5), "roller": (0.0, 0.0, 0.0, 1.0)}
+    films = [
+        ("outer", "outer", ROLLING_POWER, powers[ROLLING] - powers[INNER_ROLLING], shares[ROLLING]),
+        ("inner", "inner", ROLLING_POWER, powers[INNER_ROLLING], shares[ROLLING] + shares[INNER_ROLLING]),
+        ("pocket", "roller", POCKET_POWER, powers[POCKET_FILM], shares[POCKET_FILM]),
+        ("land", hot.cage.guidance, LAND_POWER, powers[LAND_FILM], shares[LAND_FILM]),
+    ]
+    heat = np.zeros((len(NODES), len(NODES)))
+    for place, surface, exponent, power, nodes in films:
+        oil = hot.oil(place)
+        slope = -exponent * power * oil.viscosity_slope / oil.viscosity
+        heat += np.outer(nodes, slope * np.array(race_and_rollers[surface]))
+    return np.asarray(np.linalg.solve(matrix(network.conductances), heat))
+
+
+def measured_slopes(balance: Balance, state: State, slopes: Array) -> Array:
+    """Slopes after two more short runs at a steady state: all nodes warmer, and the inner ring alone.
+
+    A warmer inner ring that makes the bearing impossible is replaced by a colder one.
+    """
+    steps, changes = [], []
+    for direction in (np.ones(len(NODES)), np.eye(len(NODES))[NODES.index("inner")]):
+        for step in (WARMER * direction, -WARMER * direction):
+            try:
+                moved = balance.at(state.temperatures + step)
+            except InputError:
+                continue
+            steps.append(step)
+            changes.append(moved.image - state.image)
+            break
+    return learned(slopes, np.array(steps), np.array(changes)) if steps else slopes
+
+
+def corrected(state: State, slopes: Array) -> Array:
+    """Steady temperatures [C] by one Newton step from a state."""
+    return np.asarray(state.temperatures + np.linalg.solve(np.eye(len(NODES)) - slopes, state.deviation))
+
+
+class Verdict(NamedTuple):
+    """What short runs say: status and reason of the search, slopes dM/dT, states visited, and where to run at length [C]."""
+
+    status: str
+    reason: str
+    slopes: Array
+    path: list[State]
+    temperatures: Array
+
+    @property
+    def steady(self) -> bool:
+        """Whether there is a steady state."""
+        return self.status == "steady"
+
+
+def verdict_of(balance: Balance) -> Verdict:
+    """Search by short runs, and the gain of the loop where it ends.
+
+    Raises InputError where the bearing is impossible even at the temperature of its surroundings, RunError, KeyboardInterrupt.
+    """
+    first = np.full(len(NODES), balance.scene.lubricant.temperature_C)
+    search = steady_state(balance.at, first, viscous_slopes, balance.cold)
+    path, last = [*search.states], search.last
+    if search.status != "steady":
+        return Verdict(search.status, search.reason, search.slopes, path, last.temperatures)
+    slopes = measured_slopes(balance, last, search.slopes)
+    if gain(slopes) >= 1.0:
+        reason = (
+            f"the gain of the loop is {gain(slopes):.2g}, so heat grows faster with temperature than it is carried off"
+        )
+        return Verdict("no steady state", reason, slopes, path, last.temperatures)
+    return Verdict("steady", "", slopes, path, corrected(last, slopes))
+
+
+def with_temperatures(
+    scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None, notice: Notice = None
+) -> SimulationResult:
+    """The result of a scene with [thermal], at its steady temperatures or at the last possible ones. Raises as ``verdict_of``."""
+    balance = Balance(scene, simulate)
+    verdict = verdict_of(balance)
+    path, temperatures = verdict.path, verdict.temperatures
+    for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
+        state = balance.at(temperatures, True, progress, notice)
+        path.append(state)
+        temperatures = corrected(state, verdict.slopes)
+        if np.all(np.abs(temperatures - state.temperatures) <= np.maximum(TOLERANCE, state.noise)):
+            break
+    return _result(balance, path, verdict.slopes, verdict.status, verdict.reason, gather)
+
+
+def steady_scene(scene: Scene, simulate: Simulate) -> Scene:
+    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none."""
+    verdict = verdict_of(Balance(scene, simulate))
+    if not verdict.steady:
+        raise RunError(f"temperatures: {verdict.status}: {verdict.reason}")
+    return at_temperatures(scene, Temperatures(*verdict.temperatures.tolist()))
+
+
+def _result(
+    balance: Balance, path: Sequence[State], slopes: Array, status: str, reason: str, gather: Gather
+) -> SimulationResult:
+    scene, state = balance.scene, path[-1]
+    trial: Trial = state.run
+    steady = status == "steady"
+    step = corrected(state, slopes) - state.temperatures
+    temperatures = _quantities(trial, state, slopes if steady else np.zeros_like(slopes), steady)
+    values = {node: figure.value for node, figure in temperatures.items()}
+    if steady and (excess := _over_ceilings(scene, values)):
+        status, reason = "too hot", excess
+    result = gather(
+        trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s}
+    )
+    network = trial.network
+    heat = powers_of(trial.ensemble.runs) @ network.shares + network.windage
+    sized = network.conductances, network.boundaries
+    ranges = None
+    if steady:
+        slopes_of_heat = matrix(network.conductances) @ slopes
+        ranges = input_ranges(
+            _unknown_factors(scene), *sized, corrected(state, slopes), heat + slopes_of_heat @ step, slopes_of_heat
+        )
+    record = {
+        "status": status,
+        **({"reason": reason} if reason else {}),
+        "gain": gain(slopes),
+        "heat_W": dict(zip(NODES, heat.tolist(), strict=True)),
+        "windage_W": float(network.windage.sum()),
+        "carried_off_W": carried_off(*sized, state.image),
+        "conductances_W_K": network.conductances._asdict(),
+        "input_range": None if ranges is None else ranges.as_dict(),
+        "oil_fraction": trial.hot.lubricant.oil_fraction,
+        "path_C": [dict(zip(NODES, visited.temperatures.tolist(), strict=True)) for visited in path],
+    }
+    return replace(
+        result,
+        status="ok" if status == "steady" else status,
+        temperatures_C=temperatures,
+        thermal=record,
+        scene=scene.model_dump(mode="json"),
+        cost={**result.cost, **work_done(balance.runs), "balance_turns": balance.turns, "states": len(path)},
+        notes=(*_notes(trial.hot, status, reason, ranges), *result.notes),
+    )
+
+
+def _unknown_factors(scene: Scene) -> dict[str, Array]:
+    """Unknown inputs of the scene's heat balance, as of ``factors_of``."""
+    thermal, uncertain = scene.thermal, scene.uncertain
+    assert thermal is not None
+    estimated = [] if uncertain is None else uncertain.estimated
+    return factors_of(thermal, scene.lubricant.oil_flow_l_min is not None, estimated)
+
+
+def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict[str, Quantity]:
+    """Temperatures of the nodes with their errors; those of the state itself where none is steady."""
+    ensemble = trial.ensemble
+    moving = drifting(ensemble.runs)
+    step = LAST_STEP * np.abs(corrected(state, slopes) - state.temperatures)
+    figures = {}
+    for place, figure in enumerate(temperature_figures(state.temperatures, trial.network, slopes)):
+        slow = slow_change(figure, figure, ensemble.runs, ensemble.since, moving=moving)
+        node = quantity(figure, ensemble.runs, ensemble.companions, ensemble.plan.share, slow)
+        numerical = math.hypot(node.numerical_error or 0.0, float(step[place]))
+        figures[NODES[place]] = (
+            replace(node, numerical_error=numerical)
+            if steady
+            else replace(node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None)
+        )
+    return figures
+
+
+def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
+    """A sentence on the oil or the cage above its ceiling; empty where both are below."""
+    thermal = scene.thermal
+    assert thermal is not None
+    parts = {"oil": temperatures["oil"], "cage": temperatures["rollers"] + thermal.cage_offset_K}
+    excesses = [
+        f"the {part} reaches {parts[part]:.0f} C, above its ceiling of {ceiling:g} C (thermal.{part}_ceiling_C)"
+        for part, ceiling in ceilings(scene).items()
+        if parts[part] > ceiling
+    ]
+    return "; ".join(excesses)
+
+
+def _notes(hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple[str, ...]:
+    """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
+    notes = [] if status == "steady" else [f"temperatures: {status}: {reason}"]
+    if ranges is not None and ranges.unsteady > 0.0:
+        notes.append(
+            f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
+        )
+    return (*notes, *flow_notes(hot))

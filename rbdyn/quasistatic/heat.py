@@ -1,0 +1,244 @@
+"""Heat balance of a row of balls: heat by SKF's friction model, ways out, and the temperatures that follow from these.
+
+The loads of the friction are those of the equilibrium at the temperatures of the nodes: a ring that warms changes clearance,
+contact angle and, where it is fixed axially, its preload. A ball's own losses are not computed; SKF's rolling and sliding moment
+are split over the nodes as those of rollers are (``rbdyn.thermal.heat``), half of each to either race.
+
+SKF's model is for normal clearance. In a deep groove bearing the ball loads beyond those that carry the load count as preload;
+angular contact bearings relieve a radial growth by their axial load, which the model has.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError
+from rbdyn.contact import point_contact
+from rbdyn.contact.point_contact import PointContact
+from rbdyn.life.balls import static_capacity
+from rbdyn.life.friction import (
+    DEEP_GROOVE,
+    MINERAL_FILM,
+    SYNTHETIC_FILM,
+    FrictionMoments,
+    angular_contact_moments,
+    deep_groove_angle,
+    deep_groove_moments,
+)
+from rbdyn.mounting.fits import race_film_temperature
+from rbdyn.properties.catalogue import diameter_series
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus
+from rbdyn.quasistatic.result import Rating, overloads, reference_capacities
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
+from rbdyn.quasistatic.row.model import RowModel, cage_speed, constraint_of, load_of, row_of
+from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.operation import raceway_radii
+from rbdyn.scene.thermal import Temperatures, Thermal, base_oil_of, inlet_temperature, part_temperatures
+from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, surface_coefficient
+from rbdyn.thermal.fixed_point import State
+from rbdyn.thermal.heat import Effusivities, power_vector, shares
+from rbdyn.thermal.network import NODES, Boundaries, Conductances, temperatures
+
+# Series of SKF's table 3a by the diameter series of ISO 15.
+SERIES = {"8": "618", "9": "619", "0": "60", "2": "62", "3": "63", "4": "64"}
+# Sum of the ball loads over the radial load of a half load zone: J_a/J_r of Sjövall for point contacts.
+HALF_ZONE = 0.2782 / 0.2288
+# Integral of (1 - x^2)^(1/4) over 0 to 1: what an ellipse conducts over a rectangle of its axes, since strips at its ends are short.
+ELLIPSE = 0.8740
+MINERAL = ("mineral", "naphthenic")
+LITRE_A_MINUTE = 1e-3 / 60.0  # [m^3/s]
+
+
+def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> SingleRowScene:
+    """The scene with stated temperatures in place of its heat balance.
+
+    It is a copy without validation: temperatures are numbers of the balance, and an impossible bearing shows in its equilibrium.
+    """
+    thermal, lubricant, mounting = scene.thermal, scene.lubricant, scene.mounting
+    assert thermal is not None and lubricant is not None and mounting is not None
+    oil: dict[str, Any] = {"temperature_C": temperatures.oil, "film_temperature": "parts"}
+    if lubricant.viscosity_mPas is not None:
+        oil["viscosity_mPas"] = 1e3 * lubricant.at(temperatures.oil).viscosity
+    parts = part_temperatures(thermal, temperatures, cage=False)
+    tables = {
+        "thermal": None,
+        "lubricant": lubricant.model_copy(update=oil),
+        "mounting": mounting.model_copy(update=parts),
+    }
+    return scene.model_copy(update=tables)
+
+
+class Loads(NamedTuple):
+    """Loads of the friction model [N]: radial, axial, and the sum of the ball loads of a radial preload."""
+
+    radial: float
+    axial: float
+    preload: float
+
+
+class Heat(NamedTuple):
+    """A row at temperatures: its equilibrium, loads, friction moments [N m], heat of each node [W], (4,), and its network."""
+
+    scene: SingleRowScene
+    model: RowModel
+    solution: Solution
+    loads: Loads
+    moments: FrictionMoments
+    heat: Array
+    conductances: Conductances
+    boundaries: Boundaries
+
+
+def static_capacity_of(scene: SingleRowScene, model: RowModel) -> float:
+    """C_0 of the row [N], from the catalogue or else by ISO 76."""
+    stated = scene.bearing.static_capacity_N
+    if stated is not None:
+        return stated
+    return static_capacity(scene.bearing.balls, scene.bearing.contact_angle, (model.inner_contact, model.outer_contact))
+
+
+def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Loads:
+    """Loads of the friction model from an equilibrium.
+
+    The preload of a deep groove bearing is what the ball loads sum to beyond 1.22 F_r + F_a/sin alpha_F: no load zone without
+    preload has more, if its clearance is normal.
+    """
+    x, y, z = np.abs(solution.reaction[:3]).tolist()
+    radial = math.hypot(x, y)
+    if scene.bearing.kind != "deep_groove_ball":
+        return Loads(radial, z, 0.0)
+    carries = HALF_ZONE * radial
+    if z > 0.0:
+        carries += z / math.sin(min(deep_groove_angle(z, static_capacity_of(scene, model)), 0.5 * math.pi))
+    return Loads(radial, z, max(float(solution.inner_load.sum()) - carries, 0.0))
+
+
+def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> FrictionMoments:
+    """SKF's moments [N m] of a row at the temperature of its oil."""
+    lubricant, mounting = scene.lubricant, scene.mounting
+    assert lubricant is not None and mounting is not None
+    oil, (inner, outer) = lubricant.in_service, scene.operation.speeds
+    sizes = mounting.bore, mounting.outside_diameter
+    at = *sizes, inner - outer, oil.viscosity / oil.density
+    film = MINERAL_FILM if base_oil_of(lubricant) in MINERAL else SYNTHETIC_FILM
+    if scene.bearing.kind == "deep_groove_ball":
+        series = SERIES[diameter_series(*(1e3 * size for size in sizes))]
+        assert series in DEEP_GROOVE
+        capacity = static_capacity_of(scene, model)
+        return deep_groove_moments(
+            series,
+            *at,
+            loads.radial,
+            loads.axial,
+            capacity,
+            preload=loads.preload,
+            film_friction=film,
+            supply=lubricant.supply,
+        )
+    ratio = scene.material("ball").density / MATERIALS["bearing_steel"].density
+    return angular_contact_moments(
+        *at, loads.radial, loads.axial, density_ratio=ratio, film_friction=film, supply=lubricant.supply
+    )
+
+
+def heat_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
+    """Heat of each node [W], (4,): half of each moment's power at either race, split like the losses of rollers."""
+    inner, outer = scene.operation.speeds
+    rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
+    ball, heat = scene.material("ball").effusivity, np.zeros(len(NODES))
+    for race in ("outer", "inner"):
+        ring = scene.material(f"{race}_ring").effusivity
+        power = power_vector({f"{race}_race_traction": sliding}, {race: rolling})
+        heat += power @ shares(Effusivities(ring, ball, ring), "roller")
+    return heat
+
+
+def contact_conductance(scene: SingleRowScene, contact: PointContact, race: str, loads: Array) -> float:
+    """Conductance of all balls to a race [W/K]: of each 1/G = h/(pi a b k_oil) + 1/G of two half-spaces that meet over an ellipse.
+
+    The film h is that of pure rolling at the temperature of its surfaces, reduced by inlet heating; the oil in it conducts as
+    at ambient pressure.
+    """
+    drawing, lubricant = scene.bearing, scene.lubricant
+    assert lubricant is not None
+    oil = lubricant.at(race_film_temperature(scene, race))
+    ball, ring = scene.material("ball"), scene.material(f"{race}_ring")
+    gamma = drawing.gamma if race == "inner" else -drawing.gamma
+    speed = point_contact.entrainment_speed(drawing.pitch_diameter, drawing.gamma, *scene.operation.speeds)
+    loaded = loads[loads > 0.0]
+    if loaded.size == 0:
+        return 0.0
+    radius = point_contact.rolling_radius(drawing.ball_diameter, gamma)
+    rolling = point_contact.RollingBall(contact, radius, equivalent_modulus(ball, ring), speed)
+    film = point_contact.central_film(rolling, oil, loaded) * point_contact.thermal_factor(rolling, oil, loaded)
+    across, along = contact.semi_major * np.cbrt(loaded), contact.semi_minor * np.cbrt(loaded)
+    bodies = half_space_contact(along, 2.0 * ELLIPSE * across, speed, ring.effusivity, ball.effusivity)
+    resistance = film / (math.pi * across * along * oil.conductivity) + 1.0 / bodies
+    return float((1.0 / resistance).sum())
+
+
+def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, solution: Solution) -> Conductances:
+    """Network of a row at temperatures. Its surfaces are the cylinders of the raceways over the width, and the balls; no cage."""
+    lubricant, mounting, drawing = scene.lubricant, scene.mounting, scene.bearing
+    assert lubricant is not None and mounting is not None and mounting.width is not None
+    oil, width = lubricant.in_service, mounting.width
+    inner, outer = raceway_radii(drawing)
+    cage = cage_speed(drawing, *scene.operation.speeds)
+    transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
+    flow = lubricant.oil_flow_l_min
+    to_ambient = [thermal.housing_factor * each for each in seats(mounting.bore, mounting.outside_diameter, width)]
+    return Conductances(
+        flow=0.0 if flow is None else oil_flow(flow * LITRE_A_MINUTE, oil, thermal.oil_share),
+        oil_outer=transfer * 2.0 * math.pi * outer * width,
+        oil_inner=transfer * 2.0 * math.pi * inner * width,
+        oil_rollers=transfer * drawing.balls * math.pi * drawing.ball_diameter**2,
+        outer_rollers=thermal.contact_factor
+        * contact_conductance(scene, model.outer_contact, "outer", solution.outer_load),
+        inner_rollers=thermal.contact_factor
+        * contact_conductance(scene, model.inner_contact, "inner", solution.inner_load),
+        outer_ambient=to_ambient[0],
+        inner_ambient=to_ambient[1],
+    )
+
+
+def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
+    """The row of a scene with [thermal] at temperatures of its nodes (4,) [C].
+
+    Raises InputError where it has no equilibrium or is overloaded there.
+    """
+    thermal = scene.thermal
+    assert thermal is not None and scene.lubricant is not None
+    hot = at_temperatures(scene, Temperatures(*nodes.tolist()))
+    model = row_of(hot)
+    solution = solve(model.row, model.control, load_of(hot), constraint_of(hot))
+    status = solution.status
+    if solution.is_equilibrium:
+        rating = Rating(hot.bearing, model, reference_capacities(hot.bearing), hot.operation.speeds)
+        status = overloads(solution.figures[np.newaxis], [rating]).get(0, status)
+    if status != solution.status or not solution.is_equilibrium:
+        places = ", ".join(f"{node} {value:.4g}" for node, value in zip(NODES, nodes, strict=True))
+        raise InputError([f"the bearing at {places} C: {status}"])
+    loads = loads_of(hot, model, solution)
+    moments = friction_of(hot, model, loads)
+    boundaries = Boundaries(inlet_temperature(thermal, scene.lubricant), thermal.ambient_C)
+    return Heat(
+        hot,
+        model,
+        solution,
+        loads,
+        moments,
+        heat_of(hot, moments),
+        conductances_of(hot, thermal, model, solution),
+        boundaries,
+    )
+
+
+def balance(scene: SingleRowScene, nodes: Array) -> State:
+    """The map of the fixed point: temperatures [C], and those at which the network carries off their heat.
+
+    Raises InputError as ``heat_at``.
+    """
+    found = heat_at(scene, nodes)
+    return State(nodes, temperatures(found.conductances, found.boundaries, found.heat), np.zeros(len(NODES)), found)

@@ -1,0 +1,199 @@
+"""A row of balls at the temperatures that its own friction keeps up: heat balance and equilibrium in one loop.
+
+The map from temperatures to those that balance their heat is exact to round-off, so Newton's method with central differences
+finds the fixed point to ``TOLERANCE`` (``rbdyn.thermal.fixed_point``). Its slopes also give the gain of the loop, and the
+ranges of the temperatures over the documented inputs of the balance.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RPM, InputError
+from rbdyn.quasistatic.heat import Heat, at_temperatures, balance
+from rbdyn.quasistatic.result import BallResult
+from rbdyn.quasistatic.row.model import row_of
+from rbdyn.quasistatic.row.ring import Row
+from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.thermal import Temperatures, inlet_temperature, oil_ceiling
+from rbdyn.thermal.fixed_point import Search, State, gain, steady_state
+from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
+from rbdyn.thermal.network import NODES, carried_off, matrix
+
+UNSTABLE = "the temperatures balance, but any disturbance grows"
+# Deviation from the balance that counts as none [K]; half of the difference of temperatures that gives slopes [K].
+TOLERANCE, DIFFERENCE = 1e-9, 0.01
+# Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
+FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
+# SKF's friction over the heat of ISO 15312 at the reference speeds of 8 deep groove and 6 angular contact bearings of series 60 to
+# 64, 72 and 73 in that catalogue.
+LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}
+
+
+def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
+    """dM/dT (4, 4) by central differences. Raises InputError where the bearing is impossible next to these temperatures [C]."""
+    columns = []
+    for step in DIFFERENCE * np.eye(len(NODES)):
+        above, below = (balance(scene, temperatures + sign * step).image for sign in (1.0, -1.0))
+        columns.append((above - below) / (2.0 * DIFFERENCE))
+    return np.array(columns).T
+
+
+def steady_temperatures(scene: SingleRowScene) -> tuple[Search, Array]:
+    """Search for steady temperatures of a scene with [thermal], and the slopes dM/dT (4, 4) at its last state.
+
+    It starts at the first guess of the oil's temperature, and where that leads to no stable state also at that of the cold bearing.
+    Raises InputError where the bearing is impossible even when cold.
+    """
+    assert scene.thermal is not None and scene.lubricant is not None
+    cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
+    guess = np.full(len(NODES), scene.lubricant.temperature_C)
+    outcomes = []
+    for start in (guess, cold):
+        search = steady_state(
+            partial(balance, scene),
+            start,
+            lambda state: _slopes_or(scene, state, np.zeros((len(NODES), len(NODES)))),
+            cold,
+            TOLERANCE,
+        )
+        slopes = _slopes_or(scene, search.last, search.slopes)
+        if search.status == "steady" and gain(slopes) >= 1.0:
+            search = search._replace(status="no steady state", reason=UNSTABLE)
+        outcomes.append((search, slopes))
+        if search.status == "steady":
+            break
+    return outcomes[-1]
+
+
+def _slopes_or(scene: SingleRowScene, state: State, otherwise: Array) -> Array:
+    """Slopes at a state, or others where a neighbour of it is impossible."""
+    try:
+        return slopes_at(scene, state.temperatures)
+    except InputError:
+        return otherwise
+
+
+def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
+    """The result of a scene with [thermal], at its steady temperatures; without such, its temperatures and the path alone.
+
+    ``solve`` gives the result of a scene at stated temperatures.
+    """
+    try:
+        search, slopes = steady_temperatures(scene)
+    except InputError as error:
+        return _seized_cold(scene, str(error.faults[0]), solve)
+    last = search.last
+    found: Heat = last.run
+    nodes = dict(zip(NODES, last.temperatures.tolist(), strict=True))
+    status, reason = str(search.status), f"{search.reason}; gain of the loop {gain(slopes):.2g}"
+    if status == "steady":
+        status, reason = ceiling_verdict(scene, nodes)
+    hot = solve(at_temperatures(scene, Temperatures(**nodes)))
+    ranges = ranges_of(scene, last, slopes) if search.status == "steady" else None
+    steady = status == "steady"
+    return replace(
+        hot,
+        status=hot.status if steady else f"{status}: {reason}",
+        report=hot.report if steady else None,
+        temperatures_C=nodes,
+        thermal=_record(scene, search, slopes, found, ranges)
+        | {"status": status}
+        | ({} if steady else {"reason": reason}),
+        notes=[*_notes(scene, ranges), *(hot.notes or [])] if hot.is_equilibrium else None,
+        rows=hot.rows if steady else (),
+        scene=scene.model_dump(mode="json"),
+    )
+
+
+def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
+    """The result of a bearing that is impossible before any heat."""
+    assert scene.thermal is not None and scene.lubricant is not None
+    nodes = dict.fromkeys(NODES, inlet_temperature(scene.thermal, scene.lubricant))
+    cold = solve(at_temperatures(scene, Temperatures(**nodes)))
+    thermal = {"status": "seizure", "reason": reason, "gain": None, "path_C": [nodes]}
+    input_scene = scene.model_dump(mode="json")
+    return replace(cold, status=f"seizure: {reason}", temperatures_C=nodes, thermal=thermal, scene=input_scene)
+
+
+def ceiling_verdict(scene: SingleRowScene, nodes: dict[str, float]) -> tuple[str, str]:
+    """Status and reason of steady temperatures [C]: "too hot" with oil above its ceiling."""
+    assert scene.thermal is not None and scene.lubricant is not None
+    ceiling = oil_ceiling(scene.thermal, scene.lubricant)
+    if nodes["oil"] <= ceiling:
+        return "steady", ""
+    return (
+        "too hot",
+        f"the oil reaches {nodes['oil']:.0f} C, above its ceiling of {ceiling:g} C (thermal.oil_ceiling_C)",
+    )
+
+
+def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
+    """Ranges of steady temperatures over the documented inputs of the balance, with the heat linear in the temperatures."""
+    assert scene.thermal is not None and scene.lubricant is not None
+    found: Heat = state.run
+    factors = factors_of(scene.thermal, scene.lubricant.oil_flow_l_min is not None, ())
+    heat_slopes = matrix(found.conductances) @ slopes
+    return input_ranges(factors, found.conductances, found.boundaries, state.temperatures, found.heat, heat_slopes)
+
+
+def _record(scene: SingleRowScene, search: Search, slopes: Array, found: Heat, ranges: Ranges | None) -> dict[str, Any]:
+    inner, outer = found.scene.operation.speeds
+    speed = abs(inner - outer)
+    return {
+        "status": "",
+        "gain": gain(slopes),
+        "heat_W": dict(zip(NODES, found.heat.tolist(), strict=True)),
+        **_geometry(scene, found),
+        "friction_W": {"rolling": speed * found.moments.rolling, "sliding": speed * found.moments.sliding},
+        "friction_loads_N": found.loads._asdict(),
+        "carried_off_W": carried_off(found.conductances, found.boundaries, search.last.image),
+        "conductances_W_K": found.conductances._asdict(),
+        "input_range": None if ranges is None else ranges.as_dict(),
+        "path_C": [dict(zip(NODES, state.temperatures.tolist(), strict=True)) for state in search.states],
+        "path_heat_W": [float(state.run.heat.sum()) for state in search.states],
+        "path_clearance_um": [1e6 * clearance_of(state.run.model.row)[0] for state in search.states],
+    }
+
+
+def clearance_of(row: Row) -> tuple[float, float]:
+    """Diametral clearance [m] of a row with its growth, and its unloaded contact angle [rad], 0 for an interference."""
+    reach, radial = float(row.inner_reach[0] + row.outer_reach[0]), float(row.radial[0])
+    return 2.0 * (reach - radial), math.acos(min(radial / reach, 1.0))
+
+
+def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
+    """Diametral clearance and unloaded contact angle, drawn and in operation."""
+    drawn = row_of(scene.model_copy(update={"mounting": None, "thermal": None}))
+    sizes = {"drawn": clearance_of(drawn.row), "operating": clearance_of(found.model.row)}
+    return {
+        "clearance_um": {name: 1e6 * clearance for name, (clearance, _) in sizes.items()},
+        "unloaded_angle_deg": {name: math.degrees(angle) for name, (_, angle) in sizes.items()},
+    }
+
+
+def _notes(scene: SingleRowScene, ranges: Ranges | None) -> list[str]:
+    """What the heat balance leaves open."""
+    kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
+    assert mounting is not None
+    notes = [
+        f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
+        "range includes"
+    ]
+    fast = abs(inner - outer) * 0.5 * (mounting.bore + mounting.outside_diameter)
+    if fast > FASTEST[kind]:
+        notes.append(
+            f"temperatures: n d_m = {1e-3 * fast / RPM:.2g} million mm/min is above the reference speeds of such bearings, where SKF's "
+            "friction was not verified"
+            + ("; at 1.4 million it was 2.9 times the loss in NASA TP-2275" if kind == "angular_contact_ball" else "")
+        )
+    if ranges is not None and ranges.unsteady > 0.0:
+        notes.append(
+            f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
+        )
+    return notes

@@ -1,0 +1,283 @@
+"""Roller bearings at the temperatures of their own friction: heat and energy, feedback, verdicts, bad input, nothing when off."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rbdyn import Scene, history, simulate
+from rbdyn.base.faults import InputError, read_toml
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.result import SimulationResult
+from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
+from rbdyn.scene.unknown import documented_of
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SHORT = {
+    "turns": 10.0,
+    "discard_turns": 5.0,
+    "replicates": 2,
+    "extend": False,
+    "companion": True,
+    "impact_window_turns": 5.0,
+}
+MOUNTING = {
+    "bore_mm": 27.0,
+    "outside_diameter_mm": 60.0,
+    "width_mm": 16.0,
+    "housing_diameter_mm": 90.0,
+    "inner_interference_um": 10.0,
+}
+FLOW = {"oil": "MIL-L-7808", "oil_flow_l_min": 1.0, "oil_inlet_temperature_C": 80.0}
+
+
+def _tables(**changes: dict[str, Any]) -> dict[str, Any]:
+    tables = read_toml(EXAMPLES / "cylindrical_roller.toml") | {
+        "lubricant": FLOW,
+        "mounting": MOUNTING,
+        "thermal": {},
+        "numerics": SHORT,
+    }
+    return {name: {**tables.get(name, {}), **changes.get(name, {})} for name in {**tables, **changes}}
+
+
+def _scene(**changes: dict[str, Any]) -> Scene:
+    return Scene.from_dict(_tables(**changes))
+
+
+@pytest.fixture(scope="module")
+def hot() -> SimulationResult:
+    return simulate(_scene(), workers=1, notice=None)
+
+
+def test_unit_heat_in_is_heat_out(hot):
+    """Unit: losses and windage heat the nodes, all of it leaves, and the temperatures are those of a plain iteration."""
+    balance = hot.thermal
+    assert hot.status == "ok" and balance["status"] == "steady"
+    heat = sum(balance["heat_W"].values())
+    assert heat == pytest.approx(sum(hot.power_terms_W.values()) + balance["windage_W"], rel=1e-12)
+    assert sum(balance["carried_off_W"].values()) == pytest.approx(heat, rel=1e-12)
+    state = balance["path_C"][-1]
+    assert {node: figure.value for node, figure in hot.temperatures_C.items()} == pytest.approx(state, abs=0.4)
+    again = simulate(_scene(lubricant={**FLOW, "temperature_C": 130.0}), workers=1, notice=None)
+    for node, figure in hot.temperatures_C.items():
+        assert again.temperatures_C[node].value == pytest.approx(figure.value, abs=0.5)
+
+
+def test_unit_equal_scenes_give_equal_bits(hot):
+    """Unit: the number of threads does not change a bit of the figures, and the result comes back from its file."""
+    again = simulate(_scene(), workers=2, notice=None)
+    record, other = hot.as_dict(), again.as_dict()
+    for part in (record, other):
+        del part["cost"]
+    assert record == other
+    assert SimulationResult.from_dict(hot.as_dict()) == hot
+
+
+def test_unit_figures_are_those_of_the_scene_at_its_temperatures(hot):
+    """Unit: the scene with stated temperatures gives the same bits; clearances and films follow the parts."""
+    plain = simulated_scene(hot)
+    assert plain.thermal is None
+    alone = simulate(plain, workers=1, notice=None)
+    assert alone.impact_force_N == hot.impact_force_N and alone.power_loss_W == hot.power_loss_W
+    assert alone.clearance_um == hot.clearance_um and alone.thermal is None
+    state = hot.thermal["path_C"][-1]
+    films = plain.film_temperatures_C
+    assert films.outer == pytest.approx(0.5 * (state["outer"] + state["rollers"]))
+    assert films.inner == pytest.approx(0.5 * (state["inner"] + state["rollers"]))
+    assert films.land == pytest.approx(0.5 * (state["outer"] + state["rollers"]))
+    assert (films.cavity, films.pocket) == pytest.approx((state["oil"], state["rollers"]))
+    motion = history(_scene(), 1.0, samples_per_turn=32, notice=None)
+    assert motion.scene.thermal is None and motion.scene.lubricant.temperature_C == pytest.approx(state["oil"], abs=0.3)
+
+
+def test_unit_all_films_at_one_temperature_are_those_of_the_oil():
+    """Unit: parts at the temperature of the oil give the parameters of a scene without film temperatures, bit for bit."""
+    parts = {f"{part}_temperature_C": 95.0 for part in ("inner_ring", "outer_ring", "roller", "cage")}
+    tables = _tables(mounting={**MOUNTING, **parts}, lubricant={"oil": "MIL-L-7808", "temperature_C": 95.0})
+    del tables["thermal"], tables["lubricant"]["oil_flow_l_min"], tables["lubricant"]["oil_inlet_temperature_C"]
+    plain = Scene.from_dict(tables)
+    tables["lubricant"] = tables["lubricant"] | {"film_temperature": "parts"}
+    follows = Scene.from_dict(tables)
+    for one, other in zip(roller_bearing(plain), roller_bearing(follows), strict=True):
+        assert str(one) == str(other)
+
+
+@pytest.mark.parametrize(("place", "power"), [("outer", "outer"), ("inner", "inner")])
+def test_unit_each_film_has_its_own_temperature(place, power):
+    """Unit: a warmer ring thins the film of its own race and leaves the other as it is."""
+    cold = at_temperatures(_scene(), Temperatures(90.0, 90.0, 90.0, 90.0))
+    warm = at_temperatures(_scene(), Temperatures(90.0, 90.0, 90.0, 90.0)._replace(**{place: 100.0}))
+    other = {"outer": "inner", "inner": "outer"}[place]
+    assert warm.oil(place).viscosity < 0.95 * cold.oil(place).viscosity
+    assert warm.oil(other) == cold.oil(other) and warm.oil() == cold.oil() and warm.oil("pocket") == cold.oil("pocket")
+
+
+def test_unit_more_flow_and_more_cooling_are_cooler(hot):
+    """Unit: twice the oil, a better housing and colder oil each cool all nodes; a stated share of the flow acts like less flow."""
+    usual = {node: figure.value for node, figure in hot.temperatures_C.items()}
+
+    def nodes(**changes: dict[str, Any]) -> dict[str, float]:
+        result = simulate(_scene(**changes), workers=1, notice=None)
+        return {node: figure.value for node, figure in result.temperatures_C.items()}
+
+    fraction = {"oil_fraction_factor": 2.0**-0.37}  # of twice the flow, so that drag stays as it is
+    for cooler in (
+        nodes(lubricant={**FLOW, "oil_flow_l_min": 2.0, **fraction}),
+        nodes(thermal={"housing_factor": 5.0}),
+        nodes(lubricant={**FLOW, "oil_inlet_temperature_C": 70.0}),
+    ):
+        assert all(cooler[node] < usual[node] - 0.5 for node in usual)
+    hotter = nodes(thermal={"oil_share": 0.5})
+    assert all(hotter[node] > usual[node] + 2.0 for node in usual)
+
+
+def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
+    """Unit: a PEEK cage with room when cold, whose own heat closes its guide: seizure, with the last state, exit as a failure."""
+    result = simulate(
+        _scene(
+            materials={"cage": "peek"},
+            cage={"guide_clearance_mm": 0.17, "mass_g": 7.0},
+            lubricant={**FLOW, "oil_inlet_temperature_C": 75.0},
+        ),
+        workers=1,
+        notice=None,
+    )
+    assert result.status == "seizure" == result.thermal["status"]
+    assert "the cage seizes" in result.thermal["reason"] and result.notes[0].startswith("temperatures: seizure:")
+    assert result.temperatures_C["oil"].error is None
+    assert result.clearance_um["guide"]["operating"] > 6.0
+
+
+def test_unit_above_a_ceiling():
+    """Unit: oil above its ceiling is a status of its own, with figures."""
+    result = simulate(_scene(thermal={"oil_ceiling_C": 85.0}), workers=1, notice=None)
+    assert result.status == "too hot" and "thermal.oil_ceiling_C" in result.thermal["reason"]
+    assert result.temperatures_C["oil"].value > 85.0
+
+
+def test_unit_a_cage_too_hot_by_default_of_its_material():
+    """Unit: the ceiling of PEEK counts without a key; that of a metal does not exist."""
+    changes = {
+        "materials": {"cage": "peek"},
+        "cage": {"guidance": "roller", "mass_g": 7.0, "pocket_radial_clearance_mm": 0.6},
+    }
+    result = simulate(_scene(**changes, thermal={"cage_offset_K": 60.0}), workers=1, notice=None)
+    assert result.status == "too hot" and "thermal.cage_ceiling_C" in result.thermal["reason"]
+
+
+BATH = {"oil": "MIL-L-7808", "supply": "bath"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"lubricant": {"oil": "MIL-L-7808"}}, r"\[thermal\]: needs lubricant.oil_flow_l_min without lubricant.supply"),
+        ({"lubricant": {"oil": "MIL-L-7808", "supply": "jet"}}, r"\[thermal\]: needs lubricant.oil_flow_l_min with"),
+        ({"lubricant": {"oil": "MIL-L-7808", "oil_flow_l_min": 1.0}}, "lubricant.oil_inlet_temperature_C: missing"),
+        (
+            {"lubricant": BATH, "thermal": {"housing_factor": 0.0}},
+            "thermal.housing_factor = 0: leaves the heat no way out",
+        ),
+        (
+            {"thermal": {"oil_ceiling_C": 80.0}},
+            "thermal.oil_ceiling_C = 80: not above lubricant.oil_inlet_temperature_C = 80",
+        ),
+        ({"thermal": {"cage_ceiling_C": 60.0}}, "thermal.cage_ceiling_C = 60: not above"),
+        (
+            {"mounting": {**MOUNTING, "inner_ring_temperature_C": 90.0}},
+            "mounting.inner_ring_temperature_C = 90: the heat balance",
+        ),
+        (
+            {"lubricant": {**FLOW, "oil_fraction": 0.05}},
+            "lubricant.oil_fraction = 0.05: contradicts lubricant.oil_flow_l_min = 1",
+        ),
+        ({"lubricant": {**BATH, "oil_inlet_temperature_C": 40.0}}, "has no effect without lubricant.oil_flow_l_min"),
+        ({"lubricant": {**FLOW, "viscosity_mPas": 3.0}}, "lubricant.temperature_C: missing"),
+        ({"thermal": {"surface_factor": -1.0}}, "thermal.surface_factor = -1.0: must be greater than 0"),
+        ({"thermal": {"surfaces": 1.0}}, "did you mean surface_factor"),
+        ({"operation": {"schedule": {"time_s": [0.0, 1.0], "radial_load_N": [1.0, 2.0]}}}, "operation.schedule: "),
+    ],
+)
+def test_unit_bad_input_is_a_sentence(changes, sentence):
+    """Unit: each contradiction of the heat balance names the key and the fix."""
+    tables = _tables()
+    for table, keys in changes.items():
+        tables[table] = keys if table in ("lubricant", "mounting") else {**tables.get(table, {}), **keys}
+    with pytest.raises(InputError, match=sentence) as error:
+        Scene.from_dict(tables)
+    assert all(len(fault) < 300 for fault in error.value.faults)
+
+
+def test_unit_a_balance_without_mounting_or_width_is_a_sentence():
+    """Unit: [thermal] needs the sizes of the seats."""
+    tables = _tables()
+    del tables["mounting"]
+    with pytest.raises(InputError, match=r"\[thermal\]: needs \[mounting\]"):
+        Scene.from_dict(tables)
+    tables = _tables()
+    del tables["mounting"]["width_mm"]
+    with pytest.raises(InputError, match=r"mounting.width_mm: missing"):
+        Scene.from_dict(tables)
+
+
+def test_unit_unknown_inputs_of_a_balance():
+    """Unit: the weak conductances are unknown inputs, and what the balance computes is none."""
+    keys = {entry.key for entry in documented_of(_scene())}
+    weak = {
+        f"thermal.{name}"
+        for name in ("surface_factor", "housing_factor", "contact_factor", "oil_share", "cage_offset_K")
+    }
+    assert weak | {"lubricant.oil_fraction_factor"} <= keys
+    assert not {key for key in keys if key.startswith("mounting.") and key.endswith("temperature_C")}
+    assert not keys & {"lubricant.temperature_C", "lubricant.oil_fraction"}
+
+
+def test_unit_a_flow_gives_the_oil_fraction():
+    """Unit: 8.8 % for 1 L/min scaled by its factor, and not saved, because another speed has another."""
+    scene = _scene()
+    assert scene.lubricant.oil_fraction == pytest.approx(0.088, abs=0.0005)
+    assert _scene(lubricant={**FLOW, "oil_fraction_factor": 0.6}).lubricant.oil_fraction == pytest.approx(
+        0.0528, abs=0.0003
+    )
+    dump = scene.model_dump(mode="json")
+    assert "oil_fraction" not in dump["lubricant"] and Scene.from_dict(dump) == scene
+    slower = scene.changed({"operation.inner_speed_rpm": 20000.0})
+    assert slower.lubricant.oil_fraction == pytest.approx(1.2 * scene.lubricant.oil_fraction)
+
+
+def test_unit_ranges_hold_what_inputs_leave_open(hot):
+    """Unit: the range of each temperature holds its value, and a stated factor is exact and narrows it."""
+    ranges = hot.thermal["input_range"]["temperatures_C"]
+    for node, figure in hot.temperatures_C.items():
+        low, high = ranges[node]
+        assert low <= figure.value <= high and high - low > 5.0
+    exact = {"surface_factor": 1.0, "housing_factor": 1.0, "contact_factor": 1.0, "oil_share": 1.0}
+    stated = simulate(_scene(thermal=exact), workers=1, notice=None).thermal["input_range"]
+    assert stated["inputs"] == [] and all(high == low for low, high in stated["temperatures_C"].values())
+
+
+def test_unit_a_scene_without_a_balance_loads_nothing_of_it():
+    """Unit: neither rbdyn.thermal nor the loop is imported, and no key is saved."""
+    code = (
+        "import sys\nfrom rbdyn import Scene, simulate\n"
+        f"scene = Scene.load({str(EXAMPLES / 'cylindrical_roller.toml')!r}, ['numerics.turns=2', 'numerics.discard_turns=1'])\n"
+        "result = simulate(scene.changed({'numerics.replicates': 1, 'numerics.extend': False}), 1, notice=None)\n"
+        "assert 'thermal' not in result.scene and 'temperatures_C' not in result.as_dict()\n"
+        "print([name for name in sys.modules if name.startswith(('rbdyn.thermal', 'rbdyn.dynamics.temperatures'))])"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "[]"
+
+
+def test_unit_errors_of_temperatures_are_those_of_the_heat(hot):
+    """Unit: the error of the oil's temperature is about that of the loss over the conductance of its flow."""
+    loss, oil = hot.power_loss_W, hot.temperatures_C["oil"]
+    flow = hot.thermal["conductances_W_K"]["flow"]
+    assert oil.statistical_error == pytest.approx(loss.statistical_error / flow, rel=0.5)
+    assert oil.numerical_error is not None and math.isfinite(oil.numerical_error)
+    assert np.isfinite([figure.error for figure in hot.temperatures_C.values()]).all()
