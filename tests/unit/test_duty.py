@@ -296,6 +296,13 @@ def test_an_impossible_scene_names_its_point(tmp_path):
     assert "operation.inner_speed_rpm" in fault
 
 
+def test_temperatures_have_no_ratio(tmp_path):
+    heat = '[[response]]\nname = "oil_temperature_C"\naggregate = "worst_relative"\n[front]'
+    study = duty_study(tmp_path, IDLE_AND_CRUISE, ("[front]", heat), ("set = [", 'set = ["thermal.ambient_C=40.0", '))
+    with pytest.raises(InputError, match="temperatures in °C have no ratio"):
+        clearance.check_responses(study)
+
+
 def test_shares_are_normalised_on_request(tmp_path):
     hours = IDLE_AND_CRUISE.replace("0.25", "300").replace("0.75", "700").replace("share = 300", "share = 300.0")
     study = duty_study(tmp_path, hours.replace("700", "700.0"), ("[scene]", "normalise_shares = true\n[scene]"))
