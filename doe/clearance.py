@@ -67,6 +67,12 @@ def check_responses(study: Study) -> None:
         for name in study.figures
         if name not in RESPONSES and not (heats and name in TEMPERATURES)
     )
+    refuse(
+        f'{study.path}: response.aggregate of {response.name} = "worst_relative": temperatures in °C have no ratio; write '
+        '"worst" or "mean"'
+        for response in study.file.response
+        if response.name in TEMPERATURES and response.aggregate == "worst_relative"
+    )
 
 
 def _has_balance(study: Study) -> bool:

@@ -370,6 +370,12 @@ class DutyResult:
         """Whether the cage only jitters at any point, so that its whirl there is none."""
         return any(result.jitters for result in self.points.values())
 
+    @property
+    def jitter_points(self) -> tuple[str, ...]:
+        """Points at which the cage only jitters; none where it does so at all of them."""
+        names = [name for name, result in self.points.items() if result.jitters]
+        return tuple(names) if len(names) < len(self.points) else ()
+
 
 Simulated = SimulationResult | DutyResult
 

@@ -97,7 +97,9 @@ class Confirmed:
     without a designation.
 
     ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
-    likeliest point and its probability. Both are empty without a duty.
+    likeliest point and its probability; ``jitter_points``: those at which alone the cage trembles. They are empty
+    without a duty.
+
     ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 90 % of them over the inputs of the heat
     balance; both None without a balance, and over a duty. ``hot``: scenes at the temperatures of their runs by point of
     the duty, or under EVERYWHERE without a duty; empty without a balance.
@@ -117,6 +119,7 @@ class Confirmed:
     temperatures: Mapping[str, Quantity] | None = None
     temperature_ranges: Mapping[str, Sequence[float]] | None = None
     hot: Mapping[str, Scene] = field(default_factory=dict)
+    jitter_points: tuple[str, ...] = ()
 
     @property
     def error(self) -> Array:
@@ -203,7 +206,9 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     confirmed = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
     if isinstance(result, DutyResult):
         hot = {name: simulated_scene(one) for name, one in result.points.items() if one.thermal is not None}
-        return replace(confirmed, at_points=result.at_points, worst=result.worst, hot=hot)
+        return replace(
+            confirmed, at_points=result.at_points, worst=result.worst, jitter_points=result.jitter_points, hot=hot
+        )
     if result.thermal is None:
         return confirmed
     ranges = (result.thermal["input_range"] or {}).get("temperatures_C")
@@ -240,7 +245,11 @@ def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:
     jitter_shares = {name: share for name, share in shares.items() if share is not None}
     if WHIRL not in objectives or not jitter_shares:
         return ""
-    radii = " and ".join(f"{share:.2g} of its play at the {name}" for name, share in jitter_shares.items())
+    points = {name: ", ".join(confirmed[name].jitter_points) for name in jitter_shares}
+    radii = " and ".join(
+        f"{share:.2g} of its play at the {name}{f' ({points[name]})' if points[name] else ''}"
+        for name, share in jitter_shares.items()
+    )
     return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
 
 

@@ -41,8 +41,7 @@ from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with
 HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
 NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
-# Quantiles of a law at which its scenes must be possible: no plan of input sets goes farther out.
-ENDS = np.array([1e-3, 1.0 - 1e-3])
+ENDS = np.array([1e-3, 1.0 - 1e-3])  # quantiles at which a law's scenes must be possible: no plan goes farther out
 CHECKS = 16  # input sets that are checked before anything runs
 ROUND_SEEDS = 10_000  # of further replicates of the same input sets
 

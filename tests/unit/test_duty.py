@@ -296,6 +296,13 @@ def test_an_impossible_scene_names_its_point(tmp_path):
     assert "operation.inner_speed_rpm" in fault
 
 
+def test_temperatures_have_no_ratio(tmp_path):
+    heat = '[[response]]\nname = "oil_temperature_C"\naggregate = "worst_relative"\n[front]'
+    study = duty_study(tmp_path, IDLE_AND_CRUISE, ("[front]", heat), ("set = [", 'set = ["thermal.ambient_C=40.0", '))
+    with pytest.raises(InputError, match="temperatures in °C have no ratio"):
+        clearance.check_responses(study)
+
+
 def test_shares_are_normalised_on_request(tmp_path):
     hours = IDLE_AND_CRUISE.replace("0.25", "300").replace("0.75", "700").replace("share = 300", "share = 300.0")
     study = duty_study(tmp_path, hours.replace("700", "700.0"), ("[scene]", "normalise_shares = true\n[scene]"))
@@ -342,6 +349,19 @@ def test_the_worst_point_is_that_of_the_goal(goal, target, worst, point):
     # Far from each other, it is that point with its own errors.
     assert quantities(result)["impact_force_N"] == replace(parts[point], value=worst)
     assert result.worst == {"impact_force_N": (point, 1.0)}
+
+
+def test_the_cage_jitters_at_the_points_that_say_so():
+    """At a the orbit takes 0.05 of the play, at b 0.4: the whirl of the duty is in part that of a jitter."""
+    parts = dict.fromkeys("ab", Quantity(1.0, 0.1, 0.1, 10.0, 9))
+    result = result_of(Rule("mean", "min", None), parts, {"a": 0.5, "b": 0.5})
+    shares = {"a": 0.05, "b": 0.4}
+    orbits = {name: Quantity(share, 0.01, 0.0, 10.0, 9) for name, share in shares.items()}
+    points = {name: replace(part, cage_orbit_radius_share=orbits[name]) for name, part in result.points.items()}
+    moved = replace(result, points=points)
+    assert moved.jitters
+    assert moved.jitter_points == ("a",)
+    assert moved.cage_orbit_radius_share == orbits["a"]
 
 
 def test_a_worst_ratio_has_the_errors_of_the_baseline_too():
