@@ -17,7 +17,7 @@ from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.study_file import Study
 from doe.workflow.calibration import find_calibration, read_question
-from doe.workflow.confirmation import Choice, confirmed_from
+from doe.workflow.confirmation import EVERYWHERE, Choice, confirmed_from
 from doe.workflow.input_sets import read_case
 from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
 from doe.workflow.whole import check_study, operating_clearances, run_study
@@ -124,7 +124,7 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     scene = clearance.confirmation_scene(study, study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
     assert confirmed.values[-1] == 93.0 and confirmed.temperature_ranges["inner"] == [88.0, 108.0]
-    hot = confirmed.hot
+    hot = confirmed.hot[EVERYWHERE]
     assert hot.thermal is None and hot.mounting.inner_ring_temperature_C == 93.0 and hot.lubricant.temperature_C == 92.7
     found = operating_clearances(study, {"baseline": hot, "pick": hot}).operating
     assert found["guide_clearance_mm"]["pick"] == pytest.approx(0.1204, abs=2e-4)
