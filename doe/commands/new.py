@@ -100,7 +100,7 @@ def new(
 
 def limits_of(texts: Sequence[str]) -> Limits:
     """Limits by response. Raises InputError with all faults at once."""
-    from doe.clearance import RESPONSES
+    from doe.clearance import RESPONSES, TEMPERATURES
     from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
 
     limits: Limits = {}
@@ -111,8 +111,9 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
             continue
         name, sign, number = match.groups()
-        if name not in RESPONSES:
-            faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
+        if name not in RESPONSES and name not in TEMPERATURES:
+            names = f"{', '.join(RESPONSES)}, or with [thermal] one of {', '.join(TEMPERATURES)}"
+            faults.append(f"{where}: no response has that name; choose one of {names}")
             continue
         try:
             value = plain_number(number)

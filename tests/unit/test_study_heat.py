@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,11 @@ import numpy as np
 import pytest
 from instant_runs import instant_result
 from short_studies import EXAMPLES, silent
+from typer.testing import CliRunner
 
 from doe import clearance
 from doe.clearance import TEMPERATURES, Simulations
+from doe.cli import app
 from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.study_file import Study
@@ -165,6 +168,17 @@ def test_unit_measured_temperatures_need_an_error_and_a_balance(scene, column, s
     (tmp_path / "rig.csv").write_text(RIG.format(column), encoding="utf-8")
     with pytest.raises(InputError, match=sentence):
         read_question(EXAMPLES / scene, tmp_path / "rig.csv", (), ())
+
+
+def test_unit_a_new_study_may_limit_a_temperature():
+    """Unit: of a scene with a heat balance; of any other one sentence says what is missing."""
+    limits = ["new", str(HOT), "--limit", "inner_temperature_C<=110", "--json"]
+    shown = CliRunner().invoke(app, limits)
+    responses = {one["name"]: one for one in json.loads(shown.stdout)["response"]}
+    assert responses["inner_temperature_C"]["upper"] == 110.0 and responses["inner_temperature_C"]["goal"] == "none"
+    limits[1] = str(EXAMPLES / "cylindrical_roller.toml")
+    refused = CliRunner().invoke(app, limits)
+    assert refused.exit_code == 2 and "has no [thermal], which computes temperatures; add that table" in refused.stdout
 
 
 @pytest.mark.slow
