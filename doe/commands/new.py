@@ -112,8 +112,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
             continue
         name, sign, number = match.groups()
         if name not in RESPONSES and name not in TEMPERATURES:
-            names = f"{', '.join(RESPONSES)}, or with [thermal] one of {', '.join(TEMPERATURES)}"
-            faults.append(f"{where}: no response has that name; choose one of {names}")
+            faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
             continue
         try:
             value = plain_number(number)

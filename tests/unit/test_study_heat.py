@@ -208,7 +208,7 @@ def test_a_study_goes_on_without_bearings_that_are_too_hot(tmp_path):
 
 @pytest.mark.slow
 def test_ranges_of_temperatures_over_unknown_inputs(tmp_path):
-    """Sixteen input sets: each temperature has a range that holds its nominal value and is wider than its error."""
+    """Sixteen input sets: each temperature has a range about its nominal value that is far wider than its error."""
     scene = tmp_path / "hot.toml"
     keys = ", ".join(f'"numerics.{key}"' for key in SHORT)
     scene.write_text(f"{HOT.read_text('utf-8')}\n[uncertain]\nset = [{keys}]\n", encoding="utf-8")
@@ -217,7 +217,7 @@ def test_ranges_of_temperatures_over_unknown_inputs(tmp_path):
         found = find_uncertainty(scene, [], simulations, 16, 10.0)
     for name in TEMPERATURES:
         low, high = found.outputs[name].spread.low, found.outputs[name].spread.high
-        assert low < found.outputs[name].nominal.value + 5.0 < high + 10.0 and high - low > 5.0
+        assert low - 5.0 < found.outputs[name].nominal.value < high + 5.0 and high - low > 5.0
 
 
 @pytest.mark.slow
