@@ -102,6 +102,17 @@ def read_scene(study: Study) -> dict[str, Any]:
     return data
 
 
+def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
+    """Tables of a scene without its declared unknown inputs.
+
+    Those of a heat balance state its first guess, because a viscosity that varies needs a temperature at which it holds.
+    """
+    tables = {table: keys for table, keys in data.items() if table != "uncertain"}
+    if scene.thermal is not None:
+        tables["lubricant"] = {"temperature_C": scene.lubricant.temperature_C, **tables["lubricant"]}
+    return tables
+
+
 def declares_unknowns(study: Study) -> bool:
     """Whether the study or its scene declares unknown inputs; values that are only named as estimates are none."""
     if study.file.uncertain is not None:

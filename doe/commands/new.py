@@ -107,7 +107,7 @@ def new(
 
 def limits_of(texts: Sequence[str]) -> Limits:
     """Limits by response. Raises InputError with all faults at once."""
-    from doe.clearance import RESPONSES
+    from doe.clearance import RESPONSES, TEMPERATURES
     from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
 
     limits: Limits = {}
@@ -118,7 +118,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
             continue
         name, sign, number = match.groups()
-        if name not in RESPONSES:
+        if name not in RESPONSES and name not in TEMPERATURES:
             faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
             continue
         try:

@@ -5,7 +5,7 @@ The question, a scene and a table, is checked before anything runs.
 
 import copy
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -83,15 +83,6 @@ def question_of(question: Question) -> str:
     return digest_of(json.dumps(content, sort_keys=True))
 
 
-def _temperature_faults(path: Path, data: Path, outputs: Sequence[str], scene: Scene) -> list[str]:
-    """A sentence for each measured temperature of a scene without a heat balance."""
-    return [
-        f"{data}: column {name}: {path} has no [thermal], which computes temperatures; add that table there or remove the column"
-        for name in outputs
-        if name in clearance.TEMPERATURES and scene.thermal is None
-    ]
-
-
 def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
     """The question about a scene and a rig's table; ``free``: keys of the targets, by default all unknown ones.
 
@@ -149,8 +140,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {candidate.key for candidate in case.every}
     )
-    idle = [] if targets else [f"{path}: uncertain: no unknown input is declared; add one with a law"]
-    refuse([*idle, *_temperature_faults(path, data, rig.outputs, case.scene)])
+    refuse(_vain_question(case, rig, targets))
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
@@ -162,6 +152,15 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     # A fault at several conditions is reported once.
     refuse(dict.fromkeys(fault for condition in cases_of(case, rig) for fault in impossible(condition)))
     return Question(case, targets, rig, tuple(notes))
+
+
+def _vain_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[str]:
+    """Faults of a question without targets, and of measured temperatures that no heat balance of the scene computes."""
+    if not targets:
+        yield f"{case.source}: uncertain: no unknown input is declared; add one with a law"
+    names = [name for name in rig.outputs if name in clearance.TEMPERATURES and case.scene.thermal is None]
+    fix = f"{case.source} has no [thermal], which computes temperatures; add that table there or remove the column"
+    yield from (f"{rig.path}: column {name}: {fix}" for name in names)
 
 
 def cases_of(case: Case, rig: Rig) -> list[Case]:

@@ -264,10 +264,7 @@ def case_of(
     ordered = ((key, [column[place] for place in np.argsort(unknown.ranks(column))]) for key, column in sample.items())
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # Runs do not depend on declarations, and checking these again at every input set would be slow.
-    plain = {table: keys for table, keys in data.items() if table != "uncertain"}
-    if scene.thermal is not None:
-        # A viscosity that varies holds at a stated temperature: the first guess of the heat balance.
-        plain["lubricant"] = {"temperature_C": scene.lubricant.temperature_C, **plain["lubricant"]}
+    plain = clearance.undeclared(data, scene)
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
     inputs = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
