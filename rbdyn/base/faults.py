@@ -433,6 +433,8 @@ def _fix(kind: str, fault: Any) -> str:
         "model_type": "must be a table of keys",
         "model_attributes_type": "must be a table of keys",
         "list_type": "must be a list",
+        "too_short": "must have at least {min_length} item(s)",
+        "too_long": "must have at most {max_length} item(s)",
         "string_too_short": "must have at least {min_length} character(s)",
         "string_too_long": "must have at most {max_length} characters",
         "string_pattern_mismatch": "must have no commas, semicolons, quotes, line breaks or outer spaces",

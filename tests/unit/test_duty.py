@@ -276,6 +276,7 @@ def test_a_faulty_duty_is_one_sentence(tmp_path, duty, sentence):
             "'landing': no such point of the duty; name one of idle, cruise",
         ),
         (IDLE_AND_CRUISE, 'points = ["idle"]', "has no limit to hold there"),
+        (IDLE_AND_CRUISE, "upper = 300.0\npoints = []", "points = []: must have at least 1 item(s)"),
         ("", 'aggregate = "worst"', "response.aggregate of power_loss_W: needs points of a duty"),
         ("", 'upper = 300.0\npoints = ["idle"]', "response.points of power_loss_W: needs points of a duty"),
     ],
