@@ -283,7 +283,7 @@ def _result(
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
-        notes=(*_notes(scene, trial.hot, status, reason, ranges), *result.notes),
+        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_without_computed(result.notes, scene, trial.hot)),
     )
 
 
@@ -324,6 +324,12 @@ def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
         if parts[part] > ceiling
     ]
     return "; ".join(excesses)
+
+
+def _without_computed(notes: Sequence[str], scene: Scene, hot: Scene) -> list[str]:
+    """Notes without those that take a computed temperature for one in another unit."""
+    computed = set(hot.unit_notes) - set(scene.unit_notes)
+    return [note for note in notes if note not in computed]
 
 
 def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple[str, ...]:

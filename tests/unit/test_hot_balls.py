@@ -230,7 +230,7 @@ def test_unit_contradictions_are_one_sentence_each(changes, words):
 def test_unit_oil_too_thick_for_the_friction_model_is_a_note():
     """Unit: where SKF's starvation factor removes the rolling friction of cold oil, a note says so; warm oil has none."""
     cold = rbdyn.equilibrium(
-        scene_of(DEEP, lubricant__oil="ISO VG 680", lubricant__supply="oil_air", thermal__ambient_C=-40.0)
+        scene_of(DEEP, lubricant__oil="ISO VG 460", lubricant__supply="oil_air", thermal__ambient_C=-40.0)
     )
     assert cold.thermal["friction_W"]["rolling"] < 1.0
     assert any("starvation factor" in note for note in cold.notes)

@@ -336,3 +336,11 @@ def test_unit_errors_of_temperatures_are_those_of_the_heat(hot):
     assert oil.statistical_error == pytest.approx(loss.statistical_error / flow, rel=0.5)
     assert oil.numerical_error is not None and math.isfinite(oil.numerical_error)
     assert np.isfinite([figure.error for figure in hot.temperatures_C.values()]).all()
+
+
+def test_unit_no_note_takes_a_computed_temperature_for_kelvin():
+    """Unit: oil that its own heat drives above 220 C is no slip of the unit."""
+    result = simulate(
+        _scene(lubricant={"oil_flow_l_min": 1e-3}, thermal={"housing_factor": 0.0}), workers=1, notice=None
+    )
+    assert result.status == "no steady state" and not any(" K are meant" in note for note in result.notes)
