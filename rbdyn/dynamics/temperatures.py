@@ -341,4 +341,4 @@ def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | 
         )
     thermal, mounting = scene.thermal, scene.mounting
     assert thermal is not None and mounting is not None
-    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, 1e3 * ring_width(scene)), *flow_notes(hot))
+    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, ring_width(scene)), *flow_notes(hot))

@@ -187,7 +187,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> list[st
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
     thermal, lubricant, hot = scene.thermal, scene.lubricant, found.scene.lubricant
-    assert mounting is not None and mounting.width_mm is not None
+    assert mounting is not None and mounting.width is not None
     assert thermal is not None and lubricant is not None and hot is not None
     notes = [
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
@@ -205,11 +205,11 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> list[st
     rest = starvation_factor(GEOMETRIES[kind], *sizes, lubricant.supply)
     if rest < STARVED:
         notes.append(
-            f"temperatures: SKF's starvation factor of {rest:.2g} all but removes the rolling friction of so thick an oil, so the heat is "
-            "too low and a warmer state may exist; take a thinner oil or warm it"
+            f"temperatures: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
+            "too low; take a thinner oil or warm it"
         )
     if ranges is not None and ranges.unsteady > 0.0:
         notes.append(
             f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
         )
-    return [*notes, *heat_notes(thermal, lubricant, mounting, mounting.width_mm)]
+    return [*notes, *heat_notes(thermal, lubricant, mounting, mounting.width)]

@@ -72,15 +72,15 @@ def unit_notes(
     return _notes(usual)
 
 
-def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width_mm: float) -> tuple[str, ...]:
-    """One sentence for each suspicious value of a heat balance with rings of a width [mm]."""
-    outside = mounting.outside_diameter_mm
+def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: float) -> tuple[str, ...]:
+    """One sentence for each suspicious value of a heat balance with rings of a ``width`` [m]."""
+    outside, wide = mounting.outside_diameter_mm, 1e3 * width
     return _notes(
         [
             ("thermal.ambient_C", thermal.ambient_C, AMBIENT_C),
             ("lubricant.oil_inlet_temperature_C", oil.oil_inlet_temperature_C, OIL_C),
-            ("lubricant.oil_flow_l_min", oil.oil_flow_l_min, (0.0, LARGEST_FLOW * outside * width_mm)),
-            ("mounting.width_mm", width_mm, (0.0, outside)),
+            ("lubricant.oil_flow_l_min", oil.oil_flow_l_min, (0.0, LARGEST_FLOW * outside * wide)),
+            ("mounting.width_mm", wide, (0.0, outside)),
         ]
     )
 

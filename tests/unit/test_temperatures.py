@@ -257,8 +257,8 @@ def test_unit_notes_on_units_of_a_heat_balance():
 
     def notes(**changes: dict[str, Any]) -> tuple[str, ...]:
         scene = _scene(**changes)
-        assert scene.thermal is not None and scene.mounting is not None and scene.mounting.width_mm is not None
-        return heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width_mm)
+        assert scene.thermal is not None and scene.mounting is not None and scene.mounting.width is not None
+        return heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width)
 
     assert notes() == ()
     (kelvin,) = notes(thermal={"ambient_C": 293.15})
