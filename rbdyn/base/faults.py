@@ -291,9 +291,16 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
         faults += [
             fault
             for fault in _sentences(model, rest, data, source)[:MOST_FAULTS]
-            if ": missing; " not in fault or not any(name in fault for name in names)
+            if not any(_states_absence(fault, name) for name in names)
         ]
     raise InputError(dict.fromkeys(faults))
+
+
+def _states_absence(fault: str, name: str) -> bool:
+    """Whether a sentence on a table says that a key of that ``name`` is missing."""
+    return name in fault and (
+        ": missing; " in fault or re.search(rf"(needs|without) [\w.]*{re.escape(name)}\b", fault) is not None
+    )
 
 
 def set_key(data: dict[str, Any], assignment: str, name: str = "--set") -> None:

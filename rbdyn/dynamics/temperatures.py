@@ -23,13 +23,14 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING
-from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of
+from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of, ring_width
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean, quantity, work_done
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, inlet_temperature
 from rbdyn.thermal.fixed_point import TOLERANCE, State, gain, learned, steady_state
 from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
@@ -282,7 +283,7 @@ def _result(
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
-        notes=(*_notes(trial.hot, status, reason, ranges), *result.notes),
+        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_without_computed(result.notes, scene, trial.hot)),
     )
 
 
@@ -325,11 +326,19 @@ def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
     return "; ".join(excesses)
 
 
-def _notes(hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple[str, ...]:
+def _without_computed(notes: Sequence[str], scene: Scene, hot: Scene) -> list[str]:
+    """Notes without those that take a computed temperature for one in another unit."""
+    computed = set(hot.unit_notes) - set(scene.unit_notes)
+    return [note for note in notes if note not in computed]
+
+
+def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple[str, ...]:
     """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
     notes = [] if status == "steady" else [f"temperatures: {status}: {reason}"]
     if ranges is not None and ranges.unsteady > 0.0:
         notes.append(
             f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
         )
-    return (*notes, *flow_notes(hot))
+    thermal, mounting = scene.thermal, scene.mounting
+    assert thermal is not None and mounting is not None
+    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, ring_width(scene)), *flow_notes(hot))

@@ -15,11 +15,13 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError
+from rbdyn.life.friction import ANGULAR_GEOMETRY, DEEP_GROOVE_GEOMETRY, starvation_factor
 from rbdyn.quasistatic.heat import Heat, at_temperatures, balance
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.row.model import row_of
 from rbdyn.quasistatic.row.ring import Row
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, inlet_temperature, oil_ceiling
 from rbdyn.thermal.fixed_point import Search, State, gain, steady_state
 from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
@@ -33,6 +35,10 @@ FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 # SKF's friction over the heat of ISO 15312 at the reference speeds of 8 deep groove and 6 angular contact bearings of series 60 to
 # 64, 72 and 73 in that catalogue.
 LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}
+
+# K_Z of SKF's starvation factor by kind, and a factor far below those of bearings at their reference speed.
+GEOMETRIES = {"deep_groove_ball": DEEP_GROOVE_GEOMETRY, "angular_contact_ball": ANGULAR_GEOMETRY}
+STARVED = 0.1
 
 
 def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
@@ -105,7 +111,7 @@ def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], B
         thermal=_record(scene, search, slopes, found, ranges)
         | {"status": status}
         | ({} if steady else {"reason": reason}),
-        notes=[*_notes(scene, ranges), *(hot.notes or [])] if hot.is_equilibrium else None,
+        notes=[*_notes(scene, found, ranges), *(hot.notes or [])] if hot.is_equilibrium else None,
         rows=hot.rows if steady else (),
         scene=scene.model_dump(mode="json"),
     )
@@ -177,10 +183,12 @@ def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
     }
 
 
-def _notes(scene: SingleRowScene, ranges: Ranges | None) -> list[str]:
+def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> list[str]:
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
-    assert mounting is not None
+    thermal, lubricant, hot = scene.thermal, scene.lubricant, found.scene.lubricant
+    assert mounting is not None and mounting.width is not None
+    assert thermal is not None and lubricant is not None and hot is not None
     notes = [
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
         "range includes"
@@ -192,8 +200,16 @@ def _notes(scene: SingleRowScene, ranges: Ranges | None) -> list[str]:
             "friction was not verified"
             + ("; at 1.4 million it was 2.9 times the loss in NASA TP-2275" if kind == "angular_contact_ball" else "")
         )
+    oil = hot.in_service
+    sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
+    rest = starvation_factor(GEOMETRIES[kind], *sizes, lubricant.supply)
+    if rest < STARVED:
+        notes.append(
+            f"temperatures: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
+            "too low; take a thinner oil or warm it"
+        )
     if ranges is not None and ranges.unsteady > 0.0:
         notes.append(
             f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
         )
-    return notes
+    return [*notes, *heat_notes(thermal, lubricant, mounting, mounting.width)]

@@ -130,7 +130,9 @@ class Scene(SceneFile):
     def faults(self) -> list[str]:
         """Contradictions of the scene, each with a slip of the unit that may be its cause."""
         faults = list(self._misfits())
-        faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
+        faults += (
+            misfits(self.mounting, self.bearing, self.bearing.roller_length_mm) if self.mounting is not None else ()
+        )
         faults += self._overload_faults()
         faults += thermal_faults(self.thermal, self.lubricant, self.mounting, self.bearing.designation)
         if self.thermal is not None and self.operation.schedule is not None:

@@ -536,7 +536,7 @@ def _unmounted_faults(scene: BallScene) -> Iterator[str]:
 
 def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
     inner, outer = scene.outermost_rows
-    yield from mounting_faults(mounting, scene.bearing)
+    yield from mounting_faults(mounting, scene.bearing, inner.ball_diameter_mm)
     if mounting.cage_temperature_C is not None:
         yield f"mounting.cage_temperature_C = {mounting.cage_temperature_C:g}: the model of ball bearings has no cage; leave it out"
     for key, seat, row in (

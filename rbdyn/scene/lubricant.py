@@ -35,9 +35,13 @@ RHEOLOGIES = ("thermal_newtonian", "eyring", "limiting_shear")
 
 
 def _no_kelvin(value: Any) -> Any:
-    if isinstance(value, float) and HOTTEST_C < value < 1e3:
+    if isinstance(value, int | float) and HOTTEST_C < value < 1e3:
         raise ValueError(f"must be at most {HOTTEST_C:g}; if {value:g} K are meant, write {value - 273.15:.4g}")
     return value
+
+
+# Temperature of an oil, or of its surroundings [C].
+OilCelsius = Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]
 
 
 def _four_numbers(value: Any) -> Any:
@@ -66,7 +70,7 @@ class Lubricant(Sparse):
     """Two points [temperature in C, kinematic viscosity in mm^2/s] of a data sheet."""
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
     """Density of the oil at 15 C."""
-    temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
+    temperature_C: OilCelsius  # noqa: N815
     """Temperature of the oil in the contacts. With [thermal] the first guess, which may be left out."""
     film_temperature: Literal["oil", "parts"] = "oil"
     """Temperature of the films. oil: all have temperature_C; parts: each has the mean temperature of its surfaces by [mounting],
@@ -81,7 +85,7 @@ class Lubricant(Sparse):
     oil_flow_l_min: Positive | None = None
     """Flow of oil to the bearing. It gives oil_fraction, and with [thermal] it carries off heat. Above D B/12 500 L/min, with
     outside diameter and width in mm, it hardly cools further (SKF)."""
-    oil_inlet_temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)] | None = None  # noqa: N815
+    oil_inlet_temperature_C: OilCelsius | None = None  # noqa: N815
     """Temperature of the oil that flows to the bearing."""
     oil_fraction: Fraction = 0.02
     """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication. Default with oil_flow_l_min: 1e5
@@ -107,7 +111,12 @@ class Lubricant(Sparse):
         return {**self.UNSAVED, **follows}
 
     def faults(self) -> Iterator[str]:
-        """Whether the oil is stated once: by name, by grade with base oil and index, or by a data sheet."""
+        """Whether the oil is stated once: by name, by grade with base oil and index, or by a data sheet; and no grease flows."""
+        if self.oil_flow_l_min is not None and self.supply == "grease":
+            yield (
+                f"lubricant.oil_flow_l_min = {self.oil_flow_l_min:g}: contradicts lubricant.supply = 'grease', which does not flow; "
+                "leave out one of them"
+            )
         sheet = self.oil == "data_sheet"
         alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
         data = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}

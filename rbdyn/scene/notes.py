@@ -1,13 +1,14 @@
 """Notes on suspicious values of a scene: a probable slip of the unit, dimensions that contradict the stated designation."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rbdyn.properties.catalogue import Designation, Envelope, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.operation import Mounting
+from rbdyn.scene.thermal import Thermal
 
 # A key, its value or None, and its usual range.
 Usual = tuple[str, float | None, tuple[float, float]]
@@ -20,12 +21,18 @@ FACTORS = {
     "mPas": {"Pa s": 1e3},
     "1_GPa": {"1/Pa": 1e9, "1/MPa": 1e3},
     "N_m": {"N/um": 1e6, "N/mm": 1e3},
+    "l_min": {"mL/min": 1e-3},
 }
 ZERO_C_K = 273.15
 # Usual temperatures. Ester oils endure about 200 C and stiffen towards -54 C; bearing steels lose hardness above 300 C.
 OIL_C, RING_C = (-60.0, 220.0), (-60.0, 300.0)
 
 
+# Surroundings in kelvin are above the hottest usual ones in C, those of a hot engine.
+AMBIENT_C = (-60.0, 210.0)
+# Largest usual flow of oil over D B/12 500 L/min, D and B in mm, above which it hardly cools further (SKF). The jets of fast bearings
+# have 10 to 20 times that; a flow in mL/min would be 1000 times too large.
+LARGEST_FLOW = 300.0 / 12_500.0
 # Usual pressure coefficient [1/GPa]: below 1 for water, 60 for the thickest mineral oils in the cold.
 PRESSURE_COEFFICIENT = (2.0, 80.0)
 # Stiffness of a bar over modulus times roller length: 0.005 for slender bars, 0.3 for stubby ones, by the finite elements of
@@ -62,6 +69,24 @@ def unit_notes(
     ]
     temperatures = {} if mounting is None else mounting.model_dump()
     usual += [(f"mounting.{key}", value, RING_C) for key, value in temperatures.items() if key.endswith("_C")]
+    return _notes(usual)
+
+
+def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: float) -> tuple[str, ...]:
+    """One sentence for each suspicious value of a heat balance with rings of a ``width`` [m]."""
+    outside, wide = mounting.outside_diameter_mm, 1e3 * width
+    return _notes(
+        [
+            ("thermal.ambient_C", thermal.ambient_C, AMBIENT_C),
+            ("lubricant.oil_inlet_temperature_C", oil.oil_inlet_temperature_C, OIL_C),
+            ("lubricant.oil_flow_l_min", oil.oil_flow_l_min, (0.0, LARGEST_FLOW * outside * wide)),
+            ("mounting.width_mm", wide, (0.0, outside)),
+        ]
+    )
+
+
+def _notes(usual: Iterable[Usual]) -> tuple[str, ...]:
+    """The sentences on values outside their usual range."""
     return tuple(
         _note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1]
     )

@@ -327,8 +327,8 @@ class Mounting(Sparse):
                 )
 
 
-def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
-    """One sentence for each contradiction of mounting and bearing."""
+def misfits(mounting: Mounting, bearing: Raceways, element_width: float = 0.0) -> Iterator[str]:
+    """One sentence for each contradiction of mounting and bearing, whose elements are ``element_width`` wide [mm]."""
     inner, outer = bearing.raceway_diameters_mm
     if mounting.bore_mm >= inner:
         yield f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm; make it smaller"
@@ -336,4 +336,9 @@ def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
         yield (
             f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}: leaves no outer ring over a raceway of {outer:g} mm; "
             "make it larger"
+        )
+    if mounting.width_mm is not None and mounting.width_mm < element_width:
+        yield (
+            f"mounting.width_mm = {mounting.width_mm:g}: less than {element_width:g} mm of its rolling elements; give the width of the "
+            "rings in mm"
         )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from pydantic import Field
 
 from rbdyn.base.faults import NonNegative, Positive, Share, Strict
-from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant
+from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant, OilCelsius
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
 PART_TEMPERATURES = tuple(
     f"{part}_temperature_C" for part in ("inner_ring", "outer_ring", "roller", "cage", "shaft", "housing")
 )
+RING_TEMPERATURES = "inner_ring_temperature_C", "outer_ring_temperature_C"
 # Temperature at which ISO 15312 rates a bearing without a flow [C], and the usual rise of a flow of oil [K]: first guesses.
 RATED_C, USUAL_RISE = 70.0, 20.0
 # Customary ceilings of oils in service by base oil, and of cages by material [C], from memory of makers' catalogues.
@@ -44,7 +45,7 @@ class Thermal(Strict):
     first guess and may be left out. The result has the temperatures, their errors and what the loop of heat and clearance does.
     """
 
-    ambient_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C)] = 20.0  # noqa: N815
+    ambient_C: OilCelsius = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
     surface_factor: Positive = 1.0
     """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
@@ -61,7 +62,7 @@ class Thermal(Strict):
     """Share of the inner ring's rise above ambient by which the shaft stays below the ring: 0.10 to 0.15 (NSK)."""
     cage_offset_K: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0  # noqa: N815
     """Temperature of the cage above that of the rolling elements."""
-    oil_ceiling_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C)] | None = None  # noqa: N815
+    oil_ceiling_C: OilCelsius | None = None  # noqa: N815
     """Highest temperature of the oil. Default by base oil: mineral 120, PAO and PAG 150, ester 200."""
     cage_ceiling_C: Annotated[float, Field(ge=-60.0, le=1000.0)] | None = None  # noqa: N815
     """Highest temperature of the cage. Default by material: PEEK 150, phenolic laminate 120, none for metals."""
@@ -140,11 +141,7 @@ def with_first_guess(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     A stated viscosity holds at a stated temperature, so no guess stands for that.
     """
     thermal, oil = tables.get("thermal"), tables.get("lubricant")
-    if (
-        not isinstance(thermal, Mapping)
-        or not isinstance(oil, Mapping)
-        or {"temperature_C", "viscosity_mPas"} & set(oil)
-    ):
+    if thermal is None or not isinstance(oil, Mapping) or {"temperature_C", "viscosity_mPas"} & set(oil):
         return tables
     inlet = oil.get("oil_inlet_temperature_C")
     flows = "oil_flow_l_min" in oil and isinstance(inlet, int | float)
@@ -165,6 +162,8 @@ def thermal_faults(
     if lubricant.film_temperature == "parts" and mounting is None:
         yield "lubricant.film_temperature = 'parts': needs the temperatures of [mounting]; add it or write 'oil'"
     if thermal is None:
+        if lubricant.film_temperature == "parts" and mounting is not None:
+            yield from _cold_films(mounting)
         return
     if mounting is None:
         yield NO_MOUNTING
@@ -184,12 +183,28 @@ def thermal_faults(
         yield "lubricant.oil_inlet_temperature_C: missing; [thermal] with lubricant.oil_flow_l_min needs it"
     if flow is None and thermal.housing_factor == 0.0:
         yield "thermal.housing_factor = 0: leaves the heat no way out of a bearing without lubricant.oil_flow_l_min; raise it"
-    start = inlet_temperature(thermal, lubricant)
+    start, name = inlet_temperature(thermal, lubricant), "lubricant.oil_inlet_temperature_C"
+    if flow is None or inlet is None:
+        name = "thermal.ambient_C"
     for key in ("oil_ceiling_C", "cage_ceiling_C"):
         ceiling = getattr(thermal, key)
         if ceiling is not None and ceiling <= start:
-            name = "thermal.ambient_C" if flow is None else "lubricant.oil_inlet_temperature_C"
             yield f"thermal.{key} = {ceiling:g}: not above {name} = {start:g}; raise it or cool the oil"
+    if thermal.oil_ceiling_C is None and start >= (usual := oil_ceiling(thermal, lubricant)):
+        yield (
+            f"{name} = {start:g}: not below {usual:g}, the usual ceiling of {lubricant.oil}; if {start:g} K are meant, write "
+            f"{start - 273.15:.4g}, else cool the oil or state thermal.oil_ceiling_C"
+        )
+
+
+def _cold_films(mounting: Mounting) -> Iterator[str]:
+    """The fault of films that follow rings without a stated temperature, which would have that of the drawing."""
+    absent = [f"mounting.{key}" for key in RING_TEMPERATURES if getattr(mounting, key) is None]
+    if absent:
+        yield (
+            f"lubricant.film_temperature = 'parts': needs {' and '.join(absent)}, or the films are as cold as the drawing; state "
+            "what is missing or write 'oil'"
+        )
 
 
 def part_temperatures(thermal: Thermal, temperatures: Temperatures, cage: bool = True) -> dict[str, float]:

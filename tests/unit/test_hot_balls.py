@@ -209,6 +209,8 @@ def test_unit_too_hot_and_seizure():
         ({"thermal.cage_ceiling_C": 90.0}, "thermal.cage_ceiling_C = 90: the model of ball bearings has no cage"),
         ({"lubricant": None}, "lubricant: missing; [thermal] needs the oil"),
         ({"operation.inner_speed_rpm": 0.0}, "operation.inner_speed_rpm = 0: [thermal] needs rings that turn"),
+        ({"mounting.width_mm": 1.8}, "mounting.width_mm = 1.8: less than 11.906 mm of its rolling elements"),
+        ({"thermal.ambient_C": 293.15}, "thermal.ambient_C = 293.15: not below 120, the usual ceiling of ISO VG 32; if 293.15 K"),
         ({"errors": {}}, "[thermal] and [errors]: runout is computed at stated temperatures"),
     ],
 )  # fmt: skip
@@ -223,6 +225,16 @@ def test_unit_contradictions_are_one_sentence_each(changes, words):
         Scene.from_dict(tables)
     (fault,) = refused.value.faults
     assert fault.removeprefix("scene: ").startswith(words)
+
+
+def test_unit_oil_too_thick_for_the_friction_model_is_a_note():
+    """Unit: where SKF's starvation factor removes the rolling friction of cold oil, a note says so; warm oil has none."""
+    cold = rbdyn.equilibrium(
+        scene_of(DEEP, lubricant__oil="ISO VG 460", lubricant__supply="oil_air", thermal__ambient_C=-40.0)
+    )
+    assert cold.thermal["friction_W"]["rolling"] < 1.0
+    assert any("starvation factor" in note for note in cold.notes)
+    assert not any("starvation factor" in note for note in rbdyn.equilibrium(scene_of(DEEP)).notes)
 
 
 def test_unit_two_rows_and_other_studies_refuse():

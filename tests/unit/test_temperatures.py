@@ -13,6 +13,7 @@ from rbdyn import Scene, history, simulate
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.result import SimulationResult
+from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
 from rbdyn.scene.unknown import documented_of
 
@@ -198,6 +199,17 @@ BATH = {"oil": "MIL-L-7808", "supply": "bath"}
         ),
         ({"lubricant": {**BATH, "oil_inlet_temperature_C": 40.0}}, "has no effect without lubricant.oil_flow_l_min"),
         ({"lubricant": {**FLOW, "viscosity_mPas": 3.0}}, "lubricant.temperature_C: missing"),
+        (
+            {"lubricant": {**FLOW, "oil_inlet_temperature_C": 293.15}},
+            "lubricant.oil_inlet_temperature_C = 293.15: not below 200, the usual ceiling of MIL-L-7808; if 293.15 K are meant, write 20",
+        ),
+        ({"lubricant": BATH, "thermal": {"ambient_C": 293}}, "thermal.ambient_C = 293: not below 200"),
+        ({"thermal": {"oil_ceiling_C": 423}}, "thermal.oil_ceiling_C = 423: must be at most 350; if 423 K are meant"),
+        (
+            {"lubricant": {**FLOW, "supply": "grease"}},
+            "lubricant.oil_flow_l_min = 1: contradicts lubricant.supply = 'grease'",
+        ),
+        ({"mounting": {**MOUNTING, "width_mm": 4.0}}, "mounting.width_mm = 4: less than 5 mm of its rolling elements"),
         ({"thermal": {"surface_factor": -1.0}}, "thermal.surface_factor = -1.0: must be greater than 0"),
         ({"thermal": {"surfaces": 1.0}}, "did you mean surface_factor"),
         ({"operation": {"schedule": {"time_s": [0.0, 1.0], "radial_load_N": [1.0, 2.0]}}}, "operation.schedule: "),
@@ -211,6 +223,49 @@ def test_unit_bad_input_is_a_sentence(changes, sentence):
     with pytest.raises(InputError, match=sentence) as error:
         Scene.from_dict(tables)
     assert all(len(fault) < 300 for fault in error.value.faults)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, "one"])
+def test_unit_a_bad_flow_is_one_sentence(value):
+    """Unit: a bad value of the flow is not reported as a missing flow as well."""
+    with pytest.raises(InputError) as error:
+        _scene(lubricant={"oil_flow_l_min": value})
+    (fault,) = error.value.faults
+    assert "lubricant.oil_flow_l_min = " in fault
+
+
+def test_unit_a_bad_table_of_heat_is_one_sentence():
+    """Unit: a table of heat that is none does not make the oil's temperature missing."""
+    with pytest.raises(InputError) as error:
+        Scene.from_dict({**_tables(), "thermal": "yes"})
+    (fault,) = error.value.faults
+    assert "thermal = 'yes': must be a table" in fault
+
+
+def test_unit_films_of_parts_need_the_temperatures_of_the_rings():
+    """Unit: without them the films would silently be as cold as the drawing."""
+    tables = _tables(
+        mounting={"outer_ring_temperature_C": 90.0}, lubricant={"temperature_C": 95.0, "film_temperature": "parts"}
+    )
+    del tables["thermal"]
+    with pytest.raises(InputError, match=r"'parts': needs mounting.inner_ring_temperature_C, or the films"):
+        Scene.from_dict(tables)
+
+
+def test_unit_notes_on_units_of_a_heat_balance():
+    """Unit: surroundings in kelvin, a flow in mL/min and a width far above the diameter are notes; usual values are none."""
+
+    def notes(**changes: dict[str, Any]) -> tuple[str, ...]:
+        scene = _scene(**changes)
+        assert scene.thermal is not None and scene.mounting is not None and scene.mounting.width is not None
+        return heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width)
+
+    assert notes() == ()
+    (kelvin,) = notes(thermal={"ambient_C": 293.15})
+    assert kelvin.endswith("if 293.15 K are meant, write 20")
+    (flow,) = notes(lubricant={"oil_flow_l_min": 1000.0})
+    assert flow.endswith("if 1000 mL/min are meant, write 1")
+    assert any(note.startswith("mounting.width_mm = 1600: ") for note in notes(mounting={"width_mm": 1600.0}))
 
 
 def test_unit_a_balance_without_mounting_or_width_is_a_sentence():
@@ -281,3 +336,11 @@ def test_unit_errors_of_temperatures_are_those_of_the_heat(hot):
     assert oil.statistical_error == pytest.approx(loss.statistical_error / flow, rel=0.5)
     assert oil.numerical_error is not None and math.isfinite(oil.numerical_error)
     assert np.isfinite([figure.error for figure in hot.temperatures_C.values()]).all()
+
+
+def test_unit_no_note_takes_a_computed_temperature_for_kelvin():
+    """Unit: oil that its own heat drives above 220 C is no slip of the unit."""
+    result = simulate(
+        _scene(lubricant={"oil_flow_l_min": 1e-3}, thermal={"housing_factor": 0.0}), workers=1, notice=None
+    )
+    assert result.status == "no steady state" and not any(" K are meant" in note for note in result.notes)
