@@ -44,7 +44,8 @@ WARMER = 5.0
 MOST_WHOLE_RUNS = 3
 # Exponents of the viscosity in losses, with which slopes start. Any others give the same state.
 ROLLING_POWER, POCKET_POWER, LAND_POWER = 0.7, 0.5, 1.0
-# Share of the last step that counts as error: its slopes of about 0.3 are known within a third.
+# Share of the last step that counts as error: its slopes of about 0.3 are known within a third. A step that no run followed
+# counts as a whole.
 LAST_STEP = 0.1
 
 # Simulates a scene: replicates, and the time that they took.
@@ -228,7 +229,7 @@ def with_temperatures(
         state = balance.at(temperatures, True, progress, notice)
         path.append(state)
         temperatures = corrected(state, verdict.slopes)
-        if np.all(np.abs(temperatures - state.temperatures) <= np.maximum(TOLERANCE, state.noise)):
+        if not _open_step(state, temperatures - state.temperatures):
             break
     return _result(balance, path, verdict.slopes, verdict.status, verdict.reason, gather)
 
@@ -283,7 +284,11 @@ def _result(
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
-        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_without_computed(result.notes, scene, trial.hot)),
+        notes=(
+            *_notes(scene, trial.hot, status, reason, ranges),
+            *([_open_note(step)] if steady and _open_step(state, step) else []),
+            *_without_computed(result.notes, scene, trial.hot),
+        ),
     )
 
 
@@ -299,7 +304,9 @@ def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict
     """Temperatures of the nodes with their errors; those of the state itself where none is steady."""
     ensemble = trial.ensemble
     moving = drifting(ensemble.runs)
-    step = LAST_STEP * np.abs(corrected(state, slopes) - state.temperatures)
+    step = np.abs(corrected(state, slopes) - state.temperatures)
+    if not _open_step(state, step):
+        step = LAST_STEP * step
     figures = {}
     for place, figure in enumerate(temperature_figures(state.temperatures, trial.network, slopes)):
         slow = slow_change(figure, figure, ensemble.runs, ensemble.since, moving=moving)
@@ -311,6 +318,18 @@ def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict
             else replace(node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None)
         )
     return figures
+
+
+def _open_step(state: State, step: Array) -> bool:
+    """Whether the last step (4,) [K] is beyond the tolerance and the noise, because no further run was allowed."""
+    return bool(np.any(np.abs(step) > np.maximum(TOLERANCE, state.noise)))
+
+
+def _open_note(step: Array) -> str:
+    return (
+        f"temperatures: the last step, {np.abs(step).max():.2g} K, is not below their noise and counts as error; lengthen "
+        "numerics.turns or raise numerics.replicates"
+    )
 
 
 def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:

@@ -16,6 +16,7 @@ from rbdyn.result import SimulationResult
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
 from rbdyn.scene.unknown import documented_of
+from rbdyn.thermal.fixed_point import steady_state
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = {
@@ -344,3 +345,18 @@ def test_unit_no_note_takes_a_computed_temperature_for_kelvin():
         _scene(lubricant={"oil_flow_l_min": 1e-3}, thermal={"housing_factor": 0.0}), workers=1, notice=None
     )
     assert result.status == "no steady state" and not any(" K are meant" in note for note in result.notes)
+
+
+def test_unit_a_step_that_no_run_followed_counts_as_error(monkeypatch):
+    """Unit: where the last run is still off its balance, the whole step is in the numerical error, and a note says so."""
+    from rbdyn.dynamics import temperatures
+
+    monkeypatch.setattr(temperatures, "MOST_WHOLE_RUNS", 1)
+    monkeypatch.setattr(temperatures, "TOLERANCE", 1e-9)
+    monkeypatch.setattr(temperatures, "steady_state", lambda *arguments: steady_state(*arguments, tolerance=30.0))
+    result = simulate(_scene(lubricant={**FLOW, "temperature_C": 110.0}), workers=1, notice=None)
+    (note,) = [note for note in result.notes if "the last step" in note]
+    state = result.thermal["path_C"][-1]
+    for node, figure in result.temperatures_C.items():
+        assert figure.numerical_error >= abs(figure.value - state[node]) * (1.0 - 1e-9) - 1e-9
+    assert "numerics.turns" in note
