@@ -3,7 +3,7 @@
 python examples/benchmarks/temperature_coverage.py [--only WORD] [--repeats 40] [--workers 2]
 
 Variants of examples/hot_roller.toml, each repeated with other seeds. The truth is one run of four times the replicates and turns at
-a tenth of the tolerance. The cost is in simulations of the usual length without a heat balance, by shaft turns.
+a tenth of the tolerance, whose own error counts in the comparison. The cost is in simulations of the usual length without a heat balance, by shaft turns.
 """
 
 import argparse
