@@ -167,7 +167,7 @@ class Consistent(Strict):
         return or_refuse(self, self.faults())
 
 
-class Sparse(Consistent):
+class Sparse(Strict):
     """A table that leaves out of its saved form those keys of ``UNSAVED`` that have the value there.
 
     A table that gains such a key is saved as before, so results that are stored under it stay valid.

@@ -32,8 +32,8 @@ class Material:
 # Handbook values at room temperature; 52100 with the customary 206 GPa and 0.3. Expansions are middles of the usual ranges
 # (4340: the lower end, at 20 C); that of silicon nitride is sometimes misprinted as 3.4e-5.
 # Conductivities: 52100, silicon nitride and the middle of 81 to 121 for brass from NTN's catalogue 2203/E; M50 25.0 (ADORE-style
-# inputs print 13.4, which no tool steel has). Bronzes: data sheets of C93200 and C95400, 59 and 376, 58.7 and 419. Titanium: data
-# sheets, 6.7 to 7.2 and 526 to 560. The others are usual values of data sheets and handbooks. All are uncertain by 15 %.
+# inputs print 13.4, which no tool steel has). Aluminium bronze: data sheet of C95400, 58.7 and 419. Titanium: data
+# sheets, 6.7 to 7.2 and 526 to 560. The others are usual handbook values, from memory. All are uncertain by 15 %.
 MATERIALS = {
     "bearing_steel": Material(206e9, 0.30, 7827.0, 12.0e-6, 46.0, 470.0),
     "m50": Material(203e9, 0.28, 7900.0, 11.5e-6, 25.0, 460.0),

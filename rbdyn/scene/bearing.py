@@ -3,17 +3,9 @@
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_serializer,
-)
+from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
 from rbdyn.base.faults import (
@@ -25,6 +17,7 @@ from rbdyn.base.faults import (
     OptionalSI,
     Positive,
     Share,
+    Sparse,
     Strict,
 )
 from rbdyn.base.words import counted
@@ -42,8 +35,6 @@ PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "ta
 # Conductivity [W/(m K)] and heat capacity [J/(kg K)] of a material that states none: PA66 and PEEK have 0.25, PA66 1500 to 1700.
 STEEL_CONDUCTION = MATERIALS["bearing_steel"].conductivity, MATERIALS["bearing_steel"].heat_capacity
 POLYMER_CONDUCTION = 0.25, 1500.0
-# Keys of a material that a scene without them does not save.
-CONDUCTION_KEYS = ("conductivity_W_mK", "heat_capacity_J_kgK")
 
 
 # Keys of [cage], without their unit, that make a section together.
@@ -317,8 +308,10 @@ class Cage(Consistent):
         return self.pocket_clearance_mm if lips is None else lips
 
 
-class CustomMaterial(Strict):
+class CustomMaterial(Sparse):
     """A material by its properties."""
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"conductivity_W_mK": None, "heat_capacity_J_kgK": None}
 
     elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0), NotVanishing]  # noqa: N815
     """Young's modulus."""
@@ -332,11 +325,6 @@ class CustomMaterial(Strict):
     """Thermal conductivity, uncertain by 15 %. Default: 46, bearing steel; for an elastic modulus below 20 GPa 0.25, a polymer."""
     heat_capacity_J_kgK: Annotated[float, Field(ge=50.0, le=10000.0)] | None = None  # noqa: N815
     """Specific heat capacity, uncertain by 15 %. Default: 470, bearing steel; for an elastic modulus below 20 GPa 1500, a polymer."""
-
-    @model_serializer(mode="wrap")
-    def _without_default_conduction(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        saved: dict[str, Any] = handler(self)
-        return {key: value for key, value in saved.items() if value is not None or key not in CONDUCTION_KEYS}
 
 
 MaterialName = Literal[

@@ -51,7 +51,7 @@ def _four_numbers(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-class Lubricant(Sparse):
+class Lubricant(Consistent, Sparse):
     """The oil, its temperature and its supply."""
 
     # A heat balance has a first guess of temperature_C where that is left out.

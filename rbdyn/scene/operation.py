@@ -250,7 +250,7 @@ def raceway_radii(bearing: Raceways) -> tuple[float, float]:
     return 0.5e-3 * inner, 0.5e-3 * outer
 
 
-class Mounting(Sparse):
+class Mounting(Consistent, Sparse):
     """Fits, temperatures, shaft and housing.
 
     With this table, bearing.radial_clearance_mm is the clearance before mounting and the clearances of the cage are those of

@@ -43,7 +43,7 @@ class Validation(ModelMetaclass):
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
-class SceneFile(Sparse, metaclass=Validation):
+class SceneFile(Consistent, Sparse, metaclass=Validation):
     """A scene from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod
