@@ -52,7 +52,7 @@ Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p
 N = TypeVar("N")
 RPM = math.pi / 30.0  # [rad/s]
 TO_SI = {"mm": 1e-3, "um": 1e-6, "g": 1e-3, "g_mm": 1e-6, "kg_mm2": 1e-6, "MPa": 1e6, "mrad": 1e-3}
-TO_SI |= {"deg": math.pi / 180.0, "rpm": RPM}
+TO_SI |= {"deg": math.pi / 180.0, "rpm": RPM, "l_min": 1e-3 / 60.0}
 
 
 class InSI(Generic[N]):

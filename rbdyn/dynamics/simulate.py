@@ -10,7 +10,7 @@ import numpy as np
 
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
-from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
+from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
     film_drive_notes,
@@ -84,7 +84,7 @@ def simulate(
         from rbdyn.dynamics.temperatures import with_temperatures
 
         return with_temperatures(scene, run, _gather, progress, notice)
-    return _gather(scene, *run(scene, progress, notice))
+    return _gather(scene, *run(scene, roller_bearing(scene), progress, notice))
 
 
 def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None) -> Scene:
@@ -100,10 +100,9 @@ def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = N
 
 
 def _ensemble(
-    scene: Scene, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
+    scene: Scene, bearing: RollerBearing, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
 ) -> tuple[Ensemble, dict[str, float]]:
-    """Replicates of a scene, and the time [s] that they took and were stated to take."""
-    bearing = roller_bearing(scene)
+    """Replicates of a scene with its parameters, and the time [s] that they took and were stated to take."""
     compile_s = 0.0
     method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
     if (laws := (method, _types(bearing))) not in _prepared:

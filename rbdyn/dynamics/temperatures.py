@@ -22,8 +22,9 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING, RollerBearing
 from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of, ring_width
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
@@ -48,8 +49,8 @@ ROLLING_POWER, POCKET_POWER, LAND_POWER = 0.7, 0.5, 1.0
 # counts as a whole.
 LAST_STEP = 0.1
 
-# Simulates a scene: replicates, and the time that they took.
-Simulate = Callable[[Scene, Reporter, Notice], tuple[Ensemble, dict[str, float]]]
+# Simulates a scene by its parameters: replicates, and the time that they took.
+Simulate = Callable[[Scene, RollerBearing, Reporter, Notice], tuple[Ensemble, dict[str, float]]]
 # The result of simulated replicates.
 Gather = Callable[[Scene, Ensemble, dict[str, float]], SimulationResult]
 
@@ -128,8 +129,10 @@ class Balance:
     def at(self, temperatures: Array, whole: bool = False, progress: Reporter = None, notice: Notice = None) -> State:
         """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt."""
         hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()))
-        network = network_of(hot, self.thermal)
-        ensemble, clock = self.simulate(hot if whole else short(hot), progress, notice)
+        # The numerics of a short run change no parameter, and tables of traction take a quarter of a second.
+        bearing = roller_bearing(hot)
+        network = network_of(hot, self.thermal, bearing)
+        ensemble, clock = self.simulate(hot if whole else short(hot), bearing, progress, notice)
         self.compile_s += clock["compile_s"]
         self.wall_s += clock["wall_s"]
         self.runs += [*ensemble.runs, *ensemble.companions]

@@ -35,7 +35,7 @@ from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, cage_speed, constraint_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.operation import raceway_radii
-from rbdyn.scene.thermal import Temperatures, Thermal, base_oil_of, inlet_temperature, part_temperatures
+from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, part_temperatures
 from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, surface_coefficient
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.heat import Effusivities, power_vector, shares
@@ -48,7 +48,6 @@ HALF_ZONE = 0.2782 / 0.2288
 # Integral of (1 - x^2)^(1/4) over 0 to 1: what an ellipse conducts over a rectangle of its axes, since strips at its ends are short.
 ELLIPSE = 0.8740
 MINERAL = ("mineral", "naphthenic")
-LITRE_A_MINUTE = 1e-3 / 60.0  # [m^3/s]
 
 
 def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> SingleRowScene:
@@ -122,7 +121,7 @@ def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> Frictio
     oil, (inner, outer) = lubricant.in_service, scene.operation.speeds
     sizes = mounting.bore, mounting.outside_diameter
     at = *sizes, inner - outer, oil.viscosity / oil.density
-    film = MINERAL_FILM if base_oil_of(lubricant) in MINERAL else SYNTHETIC_FILM
+    film = MINERAL_FILM if lubricant.base_oil_name in MINERAL else SYNTHETIC_FILM
     if scene.bearing.kind == "deep_groove_ball":
         series = SERIES[diameter_series(*(1e3 * size for size in sizes))]
         assert series in DEEP_GROOVE
@@ -187,10 +186,10 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
     inner, outer = raceway_radii(drawing)
     cage = cage_speed(drawing, *scene.operation.speeds)
     transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
-    flow = lubricant.oil_flow_l_min
+    flow = lubricant.oil_flow
     to_ambient = [thermal.housing_factor * each for each in seats(mounting.bore, mounting.outside_diameter, width)]
     return Conductances(
-        flow=0.0 if flow is None else oil_flow(flow * LITRE_A_MINUTE, oil, thermal.oil_share),
+        flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
         oil_outer=transfer * 2.0 * math.pi * outer * width,
         oil_inner=transfer * 2.0 * math.pi * inner * width,
         oil_rollers=transfer * drawing.balls * math.pi * drawing.ball_diameter**2,

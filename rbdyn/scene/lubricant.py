@@ -7,7 +7,19 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from rbdyn.base.faults import RPM, SI, Consistent, Fraction, NonNegative, NotVanishing, Positive, Share, Sparse
+from rbdyn.base.faults import (
+    RPM,
+    SI,
+    TO_SI,
+    Consistent,
+    Fraction,
+    NonNegative,
+    NotVanishing,
+    OptionalSI,
+    Positive,
+    Share,
+    Sparse,
+)
 from rbdyn.properties.materials import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -103,7 +115,7 @@ class Lubricant(Consistent, Sparse):
     and grease 5 (2 to 10) is assumed. Over 135 points of five catalogue bearings this removes trends over oil and load compared
     with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
     together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
-    roller_roughness, race_roughness = SI("um"), SI("um")
+    roller_roughness, race_roughness, oil_flow = SI("um"), SI("um"), OptionalSI("l_min")
 
     def unsaved(self) -> Mapping[str, Any]:
         """Also the oil fraction that follows from a flow, because it would contradict another speed."""
@@ -136,6 +148,12 @@ class Lubricant(Consistent, Sparse):
                     f"and 0.5 to {THICKEST:g} mm2/s; fix the points"
                 )
 
+    @property
+    def base_oil_name(self) -> str:
+        """Base oil: that of a grade or a data sheet, ester for turbine oils."""
+        graded = self.oil.startswith(GRADE) or self.oil == "data_sheet"
+        return self.base_oil or "mineral" if graded else "ester"
+
     def _base(self) -> BaseOil:
         return BASE_OILS[self.base_oil or "mineral"]
 
@@ -158,7 +176,7 @@ class Lubricant(Consistent, Sparse):
         if self.oil in OILS:
             return ()
         oil, parts, graded = self.in_service, [], self.oil.startswith(GRADE)
-        base = "ester" if self.oil in TURBINE_OILS else self.base_oil or "mineral"
+        base = self.base_oil_name
         if self.viscosity_mPas is None:
             index = BASE_OILS[base].viscosity_index if self.viscosity_index is None else self.viscosity_index
             by_index = f" and its viscosity index of {index:g} (D2270)" if graded else ""
@@ -239,7 +257,7 @@ def fraction_of_flow(flow_l_min: float, pitch_mm: float, speed_rpm: float, facto
 
     if speed_rpm == 0.0:
         return LARGEST
-    return oil_fraction(flow_l_min / 60e3, abs(speed_rpm) * RPM, 1e-3 * pitch_mm, factor)
+    return oil_fraction(flow_l_min * TO_SI["l_min"], abs(speed_rpm) * RPM, 1e-3 * pitch_mm, factor)
 
 
 def fraction_faults(oil: Lubricant, pitch_mm: float, inner_rpm: float, outer_rpm: float) -> Iterator[str]:

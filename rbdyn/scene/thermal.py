@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from pydantic import Field
 
 from rbdyn.base.faults import NonNegative, Positive, Share, Strict
-from rbdyn.scene.lubricant import GRADE, HOTTEST_C, Lubricant, OilCelsius
+from rbdyn.scene.lubricant import HOTTEST_C, Lubricant, OilCelsius
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
@@ -105,16 +105,9 @@ def film_temperatures(scene: "Scene", rings: "MountedRings | None") -> FilmTempe
     )
 
 
-def base_oil_of(lubricant: Lubricant) -> str:
-    """Base oil by name: that of a grade or a data sheet, ester for turbine oils."""
-    if lubricant.oil.startswith(GRADE) or lubricant.oil == "data_sheet":
-        return lubricant.base_oil or "mineral"
-    return "ester"
-
-
 def oil_ceiling(thermal: Thermal, lubricant: Lubricant) -> float:
     """Highest allowed temperature of the oil [C], stated or by its base oil."""
-    return OIL_CEILINGS[base_oil_of(lubricant)] if thermal.oil_ceiling_C is None else thermal.oil_ceiling_C
+    return OIL_CEILINGS[lubricant.base_oil_name] if thermal.oil_ceiling_C is None else thermal.oil_ceiling_C
 
 
 def ceilings(scene: "Scene") -> dict[str, float]:

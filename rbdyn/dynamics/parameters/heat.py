@@ -6,8 +6,8 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOSSES, POWERS, ROLLING
-from rbdyn.dynamics.parameters.model import roller_bearing, rolling_contacts
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOSSES, POWERS, ROLLING, RollerBearing
+from rbdyn.dynamics.parameters.model import rolling_contacts
 from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage
 from rbdyn.scene import Scene
@@ -25,8 +25,6 @@ from rbdyn.thermal.conductances import (
 from rbdyn.thermal.heat import TERMS, Effusivities, shares
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
-
-LITRE_A_MINUTE = 1e-3 / 60.0  # [m^3/s]
 
 
 class Network(NamedTuple):
@@ -53,12 +51,12 @@ class Network(NamedTuple):
         return np.asarray(np.linalg.solve(matrix(self.conductances), self.shares.T))
 
 
-def network_of(hot: Scene, thermal: Thermal) -> Network:
-    """Network of a scene at temperatures, by its oil, contacts and sizes."""
+def network_of(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Network:
+    """Network of a scene at temperatures, by its oil, contacts and sizes; ``bearing``: parameters of the scene."""
     windage = np.zeros(len(NODES))
     windage[OIL] = spin_windage(hot)
     boundaries = Boundaries(inlet_temperature(thermal, hot.lubricant), thermal.ambient_C)
-    return Network(_conductances(hot, thermal), boundaries, _power_shares(hot), windage)
+    return Network(_conductances(hot, thermal, bearing), boundaries, _power_shares(hot), windage)
 
 
 def ring_width(scene: Scene) -> float:
@@ -72,10 +70,10 @@ def ring_width(scene: Scene) -> float:
     return 1e-3 * listed[1].width
 
 
-def _conductances(hot: Scene, thermal: Thermal) -> Conductances:
+def _conductances(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Conductances:
     mounting, lubricant, cage, geometry = hot.mounting, hot.lubricant, hot.cage, hot.geometry
     assert mounting is not None
-    oil, width, bearing = hot.oil(), ring_width(hot), roller_bearing(hot)
+    oil, width = hot.oil(), ring_width(hot)
     radii = geometry.land_radius, geometry.rim_radius
     size = CageSize(max(radii), min(radii), hot.bearing.roller_length + cage.lands * cage.land_width)
     rollers = hot.bearing.rollers, geometry.roller_radius, hot.bearing.roller_length
@@ -92,9 +90,9 @@ def _conductances(hot: Scene, thermal: Thermal) -> Conductances:
         for race in ("outer", "inner")
     }
     housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
-    flow = lubricant.oil_flow_l_min
+    flow = lubricant.oil_flow
     return Conductances(
-        flow=0.0 if flow is None else oil_flow(flow * LITRE_A_MINUTE, oil, thermal.oil_share),
+        flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
         oil_outer=film * areas.outer,
         oil_inner=film * areas.inner,
         oil_rollers=film * (areas.rollers + areas.cage),
@@ -107,14 +105,14 @@ def _conductances(hot: Scene, thermal: Thermal) -> Conductances:
 
 def flow_notes(hot: Scene) -> tuple[str, ...]:
     """Notes where the oil fraction that follows from a flow is a guess; none without a flow."""
-    flow, geometry = hot.lubricant.oil_flow_l_min, hot.geometry
+    flow, geometry = hot.lubricant.oil_flow, hot.geometry
     if flow is None or hot.mounting is None:
         return ()
     inner, outer = hot.operation.speeds
     volume = geometry.roller_mass / hot.material("roller").density
     cage = hot.cage.mass / hot.material("cage").density
     cavity = cavity_volume(geometry.raceways, ring_width(hot), hot.bearing.rollers, volume, cage)
-    stay = residence(hot.lubricant.oil_fraction, cavity, flow * LITRE_A_MINUTE, geometry.motion.cage_speed)
+    stay = residence(hot.lubricant.oil_fraction, cavity, flow, geometry.motion.cage_speed)
     return fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)
 
 
