@@ -21,7 +21,7 @@ from rbdyn.contact.hertz_line import (
     SlicedLineContact,
     TiltedLineContact,
 )
-from rbdyn.contact.rolling_resistance import OpenFilm, film_forces
+from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
@@ -504,7 +504,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     return on_ring
 
 
-@with_open_films.body(OpenFilm)
+@with_open_films.body(OpenFilm, LayerFilm)
 def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     sums = on_ring
     for start in range(0, rollers, LANES):

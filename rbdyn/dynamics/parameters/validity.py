@@ -12,8 +12,9 @@ import numpy as np
 from rbdyn.base.faults import RPM
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, dent_sentence, palmgren
+from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
-from rbdyn.dynamics.parameters.model import film_report, race_contact_law, rolling_contacts
+from rbdyn.dynamics.parameters.model import film_report, oil_layer, race_contact_law, rolling_contacts
 from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
@@ -200,7 +201,8 @@ def open_inner_films(scene: Scene) -> float:
     """Power of the oil films between inner race and the rollers that it does not load [W]; 0 where the scene has them.
 
     Each film takes 2 u times 4.601 eta u l sqrt(R/h), averaged over the circle, with the gap h = c - (c + d) cos psi. The ring
-    is displaced by the radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z).
+    is displaced by the radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z). With an inlet distance
+    a film has the share of it that the oil layer feeds.
     """
     clearance = 0.5 * scene.geometry.clearance
     if clearance <= 0.0 or scene.model.open_contact_film:
@@ -212,7 +214,14 @@ def open_inner_films(scene: Scene) -> float:
     angle = (np.arange(2000) + 0.5) * math.pi / 2000
     gap = clearance - (clearance + approach) * np.cos(angle)
     speed, oil = scene.geometry.motion.entrainment, scene.oil("inner")
-    powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
+    gap = gap[gap > 0.0]
+    powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap)
+    if scene.lubricant.inlet_distance is not None:
+        filled = np.linspace(0.0, 1.0, 41)[1:-1] ** 2
+        shares = [inlet(math.sqrt(1.0 / part - 1.0)).rolling / inlet(math.inf).rolling for part in filled]
+        powers *= np.interp(
+            np.sqrt(gap / max(oil_layer(scene), THINNEST_LAYER)), np.sqrt([0.0, *filled, 1.0]), [1.0, *shares, 0.0]
+        )
     return count * float(powers.sum()) / angle.size
 
 
@@ -306,9 +315,13 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
         return ()
     limit = f"{100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN"
     if scene.model.open_contact_film:
+        films = "which lubricant.inlet_distance left out takes as flooded"
+        if scene.lubricant.inlet_distance is not None:
+            layer = f"{1e6 * oil_layer(scene):.2g} um"
+            films = f"which fill gaps up to {layer} at open contacts: this layer follows lubricant.inlet_distance and the load"
         return (
-            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films and on "
-            "lubricant.inlet_distance; compare it over the range of that key",
+            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, {films}; compare it over the "
+            "range of that key",
         )
     return (
         f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, of which those at open inner "
