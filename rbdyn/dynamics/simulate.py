@@ -21,6 +21,7 @@ from rbdyn.dynamics.parameters.validity import (
     light_load_notes,
     race_notes,
     race_report,
+    slip_notes,
 )
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
@@ -180,6 +181,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *heat_notes(scene, figures["power_loss_W"].value),
             *friction_notes(maker),
             *race_notes(scene, races),
+            *slip_notes(scene, figures["cage_slip"].value),
             *film_drive_notes(scene),
             *light_load_notes(scene),
             *_model_notes(scene),

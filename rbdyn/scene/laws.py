@@ -101,7 +101,9 @@ class Laws(Consistent):
     and increases with load."""
     open_contact_film: bool = False
     """Oil film between a race and the rollers that do not touch it: rolling resistance and shear of rigid surfaces at the gap
-    (Reynolds' equation). Its inlet is that of lubricant.inlet_distance. It drives rollers and cage without any load."""
+    (Reynolds' equation). Without lubricant.inlet_distance it is flooded, and drives rollers and cage without any load. With it one
+    oil layer feeds loaded and open contacts: as thick as the gap where the oil of the mean loaded inner contact begins, 4 to 26 um
+    under 300 to 2000 N a contact. The film begins where the gap has that thickness, and a wider gap has none."""
     drag: Literal["cylinder", "off"] = "cylinder"
     """Drag of the rollers in the mixture of oil and air, as of cylinders in cross-flow, or none."""
     drag_coefficient: NonNegative = 1.0

@@ -114,7 +114,8 @@ class Lubricant(Consistent, Sparse):
     inputs have 10, which does not change the film and reduces the rolling resistance by 5 to 19 %. For baths, drop feed, oil-air
     and grease 5 (2 to 10) is assumed. Over 135 points of five catalogue bearings this removes trends over oil and load compared
     with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
-    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
+    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well. The gap there, ahead of the
+    mean loaded inner contact, is the oil layer of films at open contacts (model.open_contact_film)."""
     roller_roughness, race_roughness, oil_flow = SI("um"), SI("um"), OptionalSI("l_min")
 
     def unsaved(self) -> Mapping[str, Any]:

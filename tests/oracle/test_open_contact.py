@@ -13,7 +13,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.contact.film_thickness import film_in_service
 from rbdyn.contact.rolling_resistance import film_forces, inlet, layer_shape, open_film, touching_gap
 from rbdyn.dynamics.parameters.model import oil_layer, roller_bearing, rolling_contacts
-from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes, open_inner_films
+from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes, open_inner_films, slip_notes
 from rbdyn.dynamics.simulate import simulate
 
 OIL, RADIUS, LENGTH, SPEED = 0.01, 4.6e-3, 0.01, 5.0
@@ -160,10 +160,20 @@ def test_unit_notes_and_refusal(make_scene, outer):
     (on,) = film_drive_notes(make_scene(light, "model.open_contact_film=true"))
     assert "flooded" in on and "lubricant.inlet_distance" in on
     (fed,) = film_drive_notes(make_scene(light, "model.open_contact_film=true", "lubricant.inlet_distance=5.0"))
-    assert "fill gaps up to 2 um" in fed and "follows lubricant.inlet_distance and the load" in fed
+    assert "at open contacts fill gaps up to 2 um, as lubricant.inlet_distance and the load set it" in fed
     assert film_drive_notes(outer) == ()
     assert any("oil films" in note for note in left_out_notes(outer, 20.0))
     assert not any("oil films" in note for note in left_out_notes(make_scene("model.open_contact_film=true"), 20.0))
     assert any("times as much as the power loss" in note for note in left_out_notes(outer, 1e-3))
     with pytest.raises(InputError, match="open_contact_film = true contradict"):
         make_scene("model.open_contact_film=true", "model.rolling_resistance=off")
+
+
+def test_unit_slip_depends_on_the_traction_law(make_scene, outer):
+    """Unit: from 1 % of slip a note names the law and the others that its oil may have; none without slip or traction."""
+    (note,) = slip_notes(outer, 0.012)
+    assert note.startswith("cage slip: 1.2 % depends on traction.model = 'four_constant'")
+    assert "'eyring' and 'thermal_newtonian'" in note and "limiting_shear" not in note
+    (graded,) = slip_notes(make_scene("lubricant.oil=ISO VG 32"), 0.5)
+    assert "50 % depends on traction.model = 'limiting_shear'" in graded and "'eyring' and 'four_constant'" in graded
+    assert slip_notes(outer, 0.009) == slip_notes(make_scene("traction.model=off"), 0.5) == ()

@@ -1,14 +1,17 @@
 """Declaration of unknown inputs: every assumption has a range, every range gives scenes, bad declarations are one sentence."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
+from typer.testing import CliRunner
 
 from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.base.faults import InputError, read_toml, validated
+from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
@@ -60,6 +63,25 @@ def test_documented_ranges_give_scenes(name: str) -> None:
     assert len(inputs) > 15
     for values in table_of(laws, nested(len(laws), 64, 3)):
         Scene.from_dict(with_values(data, name, laws, values))
+
+
+@pytest.mark.parametrize(
+    ("oil", "model"),
+    [("ISO VG 68", "limiting_shear"), ("ISO VG 320 PAO", "limiting_shear"), ("23699", "four_constant"), ("Jet Oil II", "thermal_newtonian")],
+)  # fmt: skip
+def test_unit_new_scenes_draw_the_traction_law(oil: str, model: str) -> None:
+    """Unit: what ``rbdyn new`` writes draws the law its oil has by default and two others, each of which makes a scene."""
+    written = CliRunner().invoke(app, ["new", "NU210", "--oil", oil])
+    data = tomllib.loads(written.stdout)
+    scene = Scene.from_dict(data)
+    laws = {each.key: each.law for each in inputs_of(scene, data, scene.uncertain)}
+    values = laws["traction.model"].values
+    assert scene.traction.model == model and model in values and {"four_constant", "eyring"} < set(values)
+    rows = {row["traction.model"]: row for row in table_of(laws, nested(len(laws), 32, 1))}
+    assert rows.keys() == set(values)
+    for drawn_model, row in rows.items():
+        drawn = Scene.from_dict(with_values(data, "scene", laws, row))
+        assert drawn.traction.model == drawn_model and drawn.traction.elasticity
 
 
 PARTS = [(part, name) for part in Materials.model_fields for name in MATERIALS]

@@ -19,6 +19,7 @@ from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
+from rbdyn.scene.unknown import documented_of
 
 # Film over roughness below which asperities bear part of the load.
 FULL_FILM = 1.0
@@ -128,8 +129,10 @@ NOTED_SHARE = 0.03
 JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
 
 
-# Share of C below which films decide the slip: an NU 210 at 6000 rpm slips by 1 % under 0.03 C, by 0.35 under 0.003 C.
+# Share of C below which films decide the slip: an NU 210 at 6000 rpm slips by 0.7 % under 0.03 C, by 28 % under 0.003 C.
 FILM_DRIVEN = 0.01
+# Cage slip from which the form of the traction law matters.
+NOTED_SLIP, LAW = 0.01, "traction.model"
 
 
 class LeftOut(NamedTuple):
@@ -315,17 +318,28 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
         return ()
     limit = f"{100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN"
     if scene.model.open_contact_film:
-        films = "which lubricant.inlet_distance left out takes as flooded"
+        films = "are flooded, for lubricant.inlet_distance is left out"
         if scene.lubricant.inlet_distance is not None:
-            layer = f"{1e6 * oil_layer(scene):.2g} um"
-            films = f"which fill gaps up to {layer} at open contacts: this layer follows lubricant.inlet_distance and the load"
+            films = f"fill gaps up to {1e6 * oil_layer(scene):.2g} um, as lubricant.inlet_distance and the load set it"
         return (
-            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, {films}; compare it over the "
-            "range of that key",
+            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, which at open contacts {films}; "
+            "compare it over the range of that key",
         )
     return (
         f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, of which those at open inner "
         "contacts are left out; set model.open_contact_film = true",
+    )
+
+
+def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+    """A note where the cage slips so much that the form of the traction law decides how slip changes with a clearance or the oil."""
+    laws = {law for entry in documented_of(scene) if entry.key == LAW for law in entry.values or ()}
+    others = sorted(laws - {scene.traction.model})
+    if slip < NOTED_SLIP or scene.traction.model == "off" or not others:
+        return ()
+    return (
+        f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}', and so does its change with temperature "
+        f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key",
     )
 
 
