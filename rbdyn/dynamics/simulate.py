@@ -13,12 +13,10 @@ from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
-    film_drive_notes,
     friction_check,
     friction_notes,
     heat_notes,
     left_out_notes,
-    light_load_notes,
     race_notes,
     race_report,
     slip_notes,
@@ -182,8 +180,6 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *friction_notes(maker),
             *race_notes(scene, races),
             *slip_notes(scene, figures["cage_slip"].value),
-            *film_drive_notes(scene),
-            *light_load_notes(scene),
             *_model_notes(scene),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *scene.section_notes,

@@ -13,7 +13,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.contact.film_thickness import film_in_service
 from rbdyn.contact.rolling_resistance import film_forces, inlet, layer_shape, open_film, touching_gap
 from rbdyn.dynamics.parameters.model import oil_layer, roller_bearing, rolling_contacts
-from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes, open_inner_films, slip_notes
+from rbdyn.dynamics.parameters.validity import film_drive_notes, left_out_notes, open_inner_films, traction_law_notes
 from rbdyn.dynamics.simulate import simulate
 
 OIL, RADIUS, LENGTH, SPEED = 0.01, 4.6e-3, 0.01, 5.0
@@ -171,9 +171,9 @@ def test_unit_notes_and_refusal(make_scene, outer):
 
 def test_unit_slip_depends_on_the_traction_law(make_scene, outer):
     """Unit: from 1 % of slip a note names the law and the others that its oil may have; none without slip or traction."""
-    (note,) = slip_notes(outer, 0.012)
+    (note,) = traction_law_notes(outer, 0.012)
     assert note.startswith("cage slip: 1.2 % depends on traction.model = 'four_constant'")
     assert "'eyring' and 'thermal_newtonian'" in note and "limiting_shear" not in note
-    (graded,) = slip_notes(make_scene("lubricant.oil=ISO VG 32"), 0.5)
+    (graded,) = traction_law_notes(make_scene("lubricant.oil=ISO VG 32"), 0.5)
     assert "50 % depends on traction.model = 'limiting_shear'" in graded and "'eyring' and 'four_constant'" in graded
-    assert slip_notes(outer, 0.009) == slip_notes(make_scene("traction.model=off"), 0.5) == ()
+    assert traction_law_notes(outer, 0.009) == traction_law_notes(make_scene("traction.model=off"), 0.5) == ()

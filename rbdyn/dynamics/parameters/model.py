@@ -251,7 +251,8 @@ def oil_layer(scene: Scene, bearing: RollerBearing | None = None) -> float:
     """Largest gap [m] that oil fills at the inner race: h_s = h_c + gap_ahead(m) b^2/(2 R) of the mean loaded inner contact.
 
     m is lubricant.inlet_distance, b the half-width at that contact's load and h_c its film. The oil of a loaded contact begins
-    there, and the same oil feeds the open contacts. Without a loaded contact the layer is 0. ``bearing``: parameters of the
+    there, and the same oil feeds the open contacts. Without a loaded contact, or an inlet distance,
+    it is 0. ``bearing``: parameters of the
     scene with any film, for a caller that has them.
 
     The layer is a constant of a scene, by its static loads over a turn, the temperature of its films and its operating
@@ -263,23 +264,15 @@ def oil_layer(scene: Scene, bearing: RollerBearing | None = None) -> float:
 
 
 def _oil_layer(scene: Scene, bearing: RollerBearing) -> float:
-    operation = scene.operation
-    load = math.hypot(
-        operation.radial_load_N, operation.rotating_load_N + operation.unbalance * operation.speeds[0] ** 2
-    )
-    inner = load_distribution(scene, bearing, load).inner
-    if not np.any(inner > 0.0):
+    operation, distance = scene.operation, scene.lubricant.inlet_distance
+    turning = operation.rotating_load_N + operation.unbalance * operation.speeds[0] ** 2
+    inner = load_distribution(scene, bearing, math.hypot(operation.radial_load_N, turning)).inner
+    if distance is None or not np.any(inner > 0.0):
         return 0.0
-    mean, contact, distance = (
-        float(inner[inner > 0.0].mean()),
-        rolling_contacts(scene)["inner"],
-        scene.lubricant.inlet_distance,
-    )
-    assert distance is not None
-    film = 0.0
+    load, contact, film = float(inner[inner > 0.0].mean()), rolling_contacts(scene)["inner"], 0.0
     if contact.entrainment_speed > ROLLING:
-        film = float(film_thickness.film_in_service(contact, scene.oil("inner"), mean, distance))
-    return film + gap_ahead(distance) * float(film_thickness.half_width(contact, mean)) ** 2 / (2.0 * contact.radius)
+        film = float(film_thickness.film_in_service(contact, scene.oil("inner"), load, distance))
+    return film + gap_ahead(distance) * float(film_thickness.half_width(contact, load)) ** 2 / (2.0 * contact.radius)
 
 
 def _modulus(scene: Scene, first: str, second: str) -> float:

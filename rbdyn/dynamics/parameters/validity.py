@@ -222,9 +222,8 @@ def open_inner_films(scene: Scene) -> float:
     if scene.lubricant.inlet_distance is not None:
         filled = np.linspace(0.0, 1.0, 41)[1:-1] ** 2
         shares = [inlet(math.sqrt(1.0 / part - 1.0)).rolling / inlet(math.inf).rolling for part in filled]
-        powers *= np.interp(
-            np.sqrt(gap / max(oil_layer(scene), THINNEST_LAYER)), np.sqrt([0.0, *filled, 1.0]), [1.0, *shares, 0.0]
-        )
+        part = gap / max(oil_layer(scene), THINNEST_LAYER)
+        powers *= np.interp(np.sqrt(part), np.sqrt([0.0, *filled, 1.0]), [1.0, *shares, 0.0])
     return count * float(powers.sum()) / angle.size
 
 
@@ -331,7 +330,7 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+def traction_law_notes(scene: Scene, slip: float) -> tuple[str, ...]:
     """A note where the cage slips so much that the form of the traction law decides how slip changes with a clearance or the oil."""
     laws = {law for entry in documented_of(scene) if entry.key == LAW for law in entry.values or ()}
     others = sorted(laws - {scene.traction.model})
@@ -341,6 +340,11 @@ def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
         f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}', and so does its change with temperature "
         f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key",
     )
+
+
+def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+    """Notes on what a cage ``slip`` rests on: the traction law, oil films, and a load below what makers ask for."""
+    return (*traction_law_notes(scene, slip), *film_drive_notes(scene), *light_load_notes(scene))
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
