@@ -161,6 +161,10 @@ def test_unit_notes_and_refusal(make_scene, outer):
     assert "flooded" in on and "lubricant.inlet_distance" in on
     (fed,) = film_drive_notes(make_scene(light, "model.open_contact_film=true", "lubricant.inlet_distance=5.0"))
     assert "at open contacts fill gaps up to 2 um, as lubricant.inlet_distance and the load set it" in fed
+    (none,) = film_drive_notes(
+        make_scene("operation.radial_load_N=0.0", "model.open_contact_film=true", "lubricant.inlet_distance=5.0")
+    )
+    assert "are missing, for no loaded inner contact feeds them" in none
     assert film_drive_notes(outer) == ()
     assert any("oil films" in note for note in left_out_notes(outer, 20.0))
     assert not any("oil films" in note for note in left_out_notes(make_scene("model.open_contact_film=true"), 20.0))

@@ -319,7 +319,13 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
     if scene.model.open_contact_film:
         films = "are flooded, for lubricant.inlet_distance is left out"
         if scene.lubricant.inlet_distance is not None:
-            films = f"fill gaps up to {1e6 * oil_layer(scene):.2g} um, as lubricant.inlet_distance and the load set it"
+            layer = oil_layer(scene)
+            films = f"fill gaps up to {1e6 * layer:.2g} um, as lubricant.inlet_distance and the load set it"
+            films = (
+                films
+                if layer > 0.0
+                else "are missing, for no loaded inner contact feeds them by lubricant.inlet_distance"
+            )
         return (
             f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, which at open contacts {films}; "
             "compare it over the range of that key",
