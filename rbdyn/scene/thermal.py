@@ -51,8 +51,17 @@ class Thermal(Strict):
     """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
     Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
-    """Factor on the heat that housing and shaft carry off, 0.016 W/mm2 of the seats at 50 K above ambient as in ISO 15312. A
+    """Factor on the heat that the housing carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
     plummer block in moving air carries off more, a hot housing nothing (0)."""
+    shaft_factor: NonNegative = 1.0
+    """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
+    surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
+    sump_factor: NonNegative = 1.0
+    """Factor on the heat that the oil of a bath loses through the walls of the housing that it wets, 150 W/(m2 K) over the seat of the
+    outer ring. It counts with lubricant.supply = "bath" only."""
+    film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
+    """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
+    a contact in 1e-5 s, and heat is conducted to the walls in 1e-7 s, so little stays in the oil."""
     contact_factor: Positive = 1.0
     """Factor on the heat conducted through the race contacts, which follows from conductivity and heat capacity of the parts."""
     oil_share: Share = 1.0
@@ -174,8 +183,12 @@ def thermal_faults(
         )
     if flow is not None and inlet is None:
         yield "lubricant.oil_inlet_temperature_C: missing; [thermal] with lubricant.oil_flow_l_min needs it"
-    if flow is None and thermal.housing_factor == 0.0:
-        yield "thermal.housing_factor = 0: leaves the heat no way out of a bearing without lubricant.oil_flow_l_min; raise it"
+    bath = lubricant.supply == "bath" and thermal.sump_factor > 0.0
+    if flow is None and not bath and thermal.housing_factor == thermal.shaft_factor == 0.0:
+        yield (
+            "thermal.housing_factor = 0 and thermal.shaft_factor = 0: leave the heat no way out of a bearing without "
+            "lubricant.oil_flow_l_min; raise one of them"
+        )
     start, name = inlet_temperature(thermal, lubricant), "lubricant.oil_inlet_temperature_C"
     if flow is None or inlet is None:
         name = "thermal.ambient_C"

@@ -224,7 +224,7 @@ def value_of(scene: Scene | None, key: str) -> Any:
     return DERIVED[key](scene) if scene and value is None and key in DERIVED else value
 
 
-def plain_values(scene: Scene) -> dict[str, Any]:
+def plain_values(scene: BaseModel) -> dict[str, Any]:
     """Value by dotted key of all tables; "left out" for a key without a value.
 
     Keys that a scene saves only where they differ from None are not among them.
