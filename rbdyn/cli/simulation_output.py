@@ -131,7 +131,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     balance, figures = result.thermal, result.temperatures_C
     if balance is None or figures is None:
         return []
-    ranges = balance["ranges"] or {}
+    ranges = balance.get("ranges") or {}
     rows = [
         (
             PARTS[node],

@@ -44,7 +44,7 @@ from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
 from rbdyn.thermal.fixed_point import VAGUE, State, learned, steady_state
 from rbdyn.thermal.input_ranges import Ranges, input_ranges
-from rbdyn.thermal.losses import HOTTEST, gain, log_viscosity
+from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
 from rbdyn.thermal.network import NODES, carried_off
 
 # Replicates of a short run, and its counted turns as a share of those of the scene.
@@ -157,12 +157,13 @@ class Balance:
         return State(temperatures, image, noise, model, Trial(hot, bearing, network, ensemble, clock))
 
 
-def measured_slopes(balance: Balance, state: State, slopes: Array) -> tuple[Array, float]:
+def measured_slopes(balance: Balance, state: State, near: HeatModel) -> tuple[Array, float]:
     """Slopes after more short runs next to a state, and the error of their gain (95 %).
 
     Where all nodes are less than 5 K above the surroundings the estimate serves: their heat cannot run away. Else all nodes are moved, then the inner ring alone; the other nodes follow where the gain is near one. A warmer ring that makes the
     bearing impossible is replaced by a colder one.
     """
+    slopes = near._replace(rest=no_rest()).image_slopes(state.temperatures)
     if state.image.max() < state.model.coldest + WARMER:
         return slopes, 0.0
     alone = np.eye(len(NODES))
@@ -258,10 +259,12 @@ def _open_reason(state: State, slopes: Array) -> str:
 
 
 def steady_scene(scene: Scene, simulate: Simulate) -> Scene:
-    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none."""
+    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none or is too hot."""
     verdict = verdict_of(Balance(scene, simulate))
     if not verdict.steady:
         raise RunError(f"temperatures: {verdict.status}: {verdict.reason}")
+    if excess := _over_ceilings(scene, dict(zip(NODES, verdict.temperatures.tolist(), strict=True))):
+        raise RunError(f"temperatures: too hot: {excess}")
     return at_temperatures(scene, Temperatures(*verdict.temperatures.tolist()))
 
 

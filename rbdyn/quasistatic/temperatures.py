@@ -60,12 +60,14 @@ def steady_temperatures(scene: SingleRowScene) -> Search:
     cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
     guess = np.full(len(NODES), scene.lubricant.temperature_C)
     for start in (guess, cold):
-        search = steady_state(
-            partial(balance, scene), start, cold, lambda _, slopes: (slopes, 0.0), partial(_model, scene), TOLERANCE
-        )
+        search = steady_state(partial(balance, scene), start, cold, _exact_slopes, partial(_model, scene), TOLERANCE)
         if search.status == "steady":
             break
     return search
+
+
+def _exact_slopes(state: State, near: HeatModel) -> tuple[Array, float]:
+    return near.image_slopes(state.temperatures), 0.0
 
 
 def _model(scene: SingleRowScene, states: Sequence[State]) -> HeatModel:

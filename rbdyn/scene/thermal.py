@@ -4,7 +4,7 @@ The balance itself is in ``rbdyn.thermal``. A scene at temperatures has no balan
 temperatures, and its films have those of their surfaces.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedRings
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
+    from rbdyn.scene.ball import BallScene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
 COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
@@ -25,6 +26,8 @@ COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
 PART_TEMPERATURES = tuple(
     f"{part}_temperature_C" for part in ("inner_ring", "outer_ring", "roller", "cage", "shaft", "housing")
 )
+# Key that is a first guess of the balance.
+FIRST_GUESS = "lubricant.temperature_C"
 RING_TEMPERATURES = "inner_ring_temperature_C", "outer_ring_temperature_C"
 # Temperature at which ISO 15312 rates a bearing without a flow [C], and the usual rise of a flow of oil [K]: first guesses.
 RATED_C, USUAL_RISE = 70.0, 20.0
@@ -53,7 +56,7 @@ class Thermal(Strict):
     housing_factor: NonNegative = 1.0
     """Factor on the heat that the housing carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
     plummer block in moving air carries off more, a hot housing nothing (0)."""
-    shaft_factor: NonNegative = 1.0
+    shaft_factor: NonNegative = 0.5
     """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
     surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
     sump_factor: NonNegative = 1.0
@@ -149,6 +152,21 @@ def with_first_guess(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     flows = "oil_flow_l_min" in oil and isinstance(inlet, int | float)
     guess = min(inlet + USUAL_RISE, HOTTEST_C) if flows and isinstance(inlet, int | float) else RATED_C
     return {**tables, "lubricant": {**oil, "temperature_C": guess}}
+
+
+def first_guess_faults(scene: "Scene | BallScene", keys: Iterable[str]) -> list[str]:
+    """A sentence if the ``keys`` that vary have the oil's temperature, which changes nothing where [thermal] computes it.
+
+    A stated viscosity holds at that temperature, so it counts there.
+    """
+    lubricant = scene.lubricant
+    computed = scene.thermal is not None and lubricant is not None and lubricant.viscosity_mPas is None
+    if not computed or FIRST_GUESS not in keys:
+        return []
+    return [
+        f"{FIRST_GUESS}: is a first guess alone, since the heat balance of [thermal] computes it; vary thermal.ambient_C or "
+        "lubricant.oil_inlet_temperature_C"
+    ]
 
 
 def thermal_faults(

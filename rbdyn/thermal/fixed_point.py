@@ -30,6 +30,8 @@ TOLERANCE, VAGUE, CLEAR = 0.2, 20.0, 3.0
 NEARLY_UNSTABLE = 0.95
 # States from which the rest of a model is learned, and their distance at most [K].
 LEARNED, NEAR = 3, 40.0
+# Part of the steps between states in a direction, over the largest, from which they teach it.
+ALIKE = 0.1
 # Smallest change of the logarithm of the viscosity, and share of the heat, from which the exponent of a film is learned.
 VISCOSITY_CHANGE, POWER_SHARE = 0.2, 0.01
 
@@ -58,8 +60,8 @@ class State(NamedTuple):
 
 # The map. Raises InputError for an impossible state.
 Balance = Callable[[Array], State]
-# Slopes dM/dT (4, 4) at a state, and the error of their gain, by runs next to it or otherwise, and a first estimate.
-Slopes = Callable[[State, Array], tuple[Array, float]]
+# Slopes dM/dT (4, 4) at a state, and the error of their gain, by runs next to it or by the model of the search.
+Slopes = Callable[[State, HeatModel], tuple[Array, float]]
 # The model of the balance about the last state, from all states.
 Model = Callable[[Sequence[State]], HeatModel]
 
@@ -81,10 +83,13 @@ class Search(NamedTuple):
         return self.states[-1]
 
 
-def learned(slopes: Array, steps: Array, changes: Array) -> Array:
-    """Slopes changed least (Frobenius) so that they give the ``changes`` (k, n) along the ``steps`` (k, n)."""
+def learned(slopes: Array, steps: Array, changes: Array, alike: float = 1e-12) -> Array:
+    """Slopes changed least (Frobenius) so that they give the ``changes`` (k, n) along the ``steps`` (k, n).
+
+    Directions in which these have less than the part ``alike`` of the largest teach nothing.
+    """
     steps, changes = np.atleast_2d(steps), np.atleast_2d(changes)
-    return np.asarray(slopes + (changes - steps @ slopes.T).T @ np.linalg.pinv(steps.T))
+    return np.asarray(slopes + (changes - steps @ slopes.T).T @ np.linalg.pinv(steps.T, rcond=alike))
 
 
 def model_of(states: Sequence[State]) -> HeatModel:
@@ -101,7 +106,7 @@ def model_of(states: Sequence[State]) -> HeatModel:
         if CLEAR * noise < np.abs(step).max() <= NEAR:
             steps.append(step)
             missing.append(other.model.matrix @ other.deviation - model.excess(other.temperatures))
-    return model._replace(rest=learned(no_rest(), np.array(steps), np.array(missing))) if steps else model
+    return model._replace(rest=learned(no_rest(), np.array(steps), np.array(missing), ALIKE)) if steps else model
 
 
 def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
@@ -132,7 +137,7 @@ def steady_state(
         slopes = near.image_slopes(state.temperatures)
         vague = float(state.noise.max())
         if state.closes(tolerance) and vague <= VAGUE:
-            return _judged(tuple(visited), measured(state, slopes), "steady", "")
+            return _judged(tuple(visited), measured(state, near), "steady", "")
         if len(visited) >= MOST_STATES:
             reason = f"{len(visited)} states did not settle; the last misses its balance by {np.abs(state.deviation).max():.2g} K"
             if vague > VAGUE:
@@ -145,7 +150,7 @@ def steady_state(
         room = HOTTEST - float(state.temperatures.max())
         if room < 1.0 and step[state.temperatures.argmax()] > -1.0:
             reason = f"the heat drives a temperature beyond {HOTTEST:g} C"
-            return _judged(tuple(visited), measured(state, slopes), "too hot", reason)
+            return _judged(tuple(visited), measured(state, near), "too hot", reason)
         following, fault = _possible_step(balance, state, step)
         if following is None:
             return Search("seizure", tuple(visited), slopes, fault)

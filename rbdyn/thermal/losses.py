@@ -48,7 +48,9 @@ class Losses(NamedTuple):
     def slopes(self, nodes: Array) -> Array:
         """dP/dT (..., terms, 4) [W/K]."""
         films = nodes @ self.films.T
-        change = np.interp(films + 0.5, DEGREES, self.log_viscosity) - np.interp(films - 0.5, DEGREES, self.log_viscosity)
+        change = np.interp(films + 0.5, DEGREES, self.log_viscosity) - np.interp(
+            films - 0.5, DEGREES, self.log_viscosity
+        )
         return np.asarray((self.at(nodes) * self.exponents * change)[..., np.newaxis] * self.films)
 
 
