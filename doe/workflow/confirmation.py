@@ -212,7 +212,9 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     if result.thermal is None:
         return confirmed
     hot = {EVERYWHERE: simulated_scene(result)}
-    return replace(confirmed, temperatures=result.temperatures_C, temperature_ranges=result.thermal.get("ranges"), hot=hot)
+    return replace(
+        confirmed, temperatures=result.temperatures_C, temperature_ranges=result.thermal.get("ranges"), hot=hot
+    )
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

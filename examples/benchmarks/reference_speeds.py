@@ -23,6 +23,7 @@ from rbdyn.life.rollers import iso_15312_heat, skf_moments
 from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.properties.oils import BASE_OILS, grade_oil
+from rbdyn.scene.thermal import Thermal
 from rbdyn.thermal.conductances import CageSize, race_contact, seats, surface_coefficient, surfaces
 from rbdyn.thermal.heat import Effusivities, power_vector, shares
 from rbdyn.thermal.network import INNER, OUTER, Boundaries, Conductances, temperatures
@@ -115,7 +116,12 @@ def point(name: str, speed: float) -> Point:
         {"outer_race_traction": 0.5 * sliding, "inner_race_traction": 0.5 * sliding},
         {"outer": 0.5 * rolling, "inner": 0.5 * rolling},
     )
-    heat = shares(Effusivities(steel.effusivity, steel.effusivity, brass.effusivity), "outer").T @ powers
+    heat = (
+        shares(
+            Effusivities(steel.effusivity, steel.effusivity, brass.effusivity), "outer", Thermal().film_share_to_oil
+        ).T
+        @ powers
+    )
     return Point(rolling + sliding, temperatures(network, Boundaries(AMBIENT, AMBIENT), heat))
 
 

@@ -110,13 +110,17 @@ def model_of(states: Sequence[State]) -> HeatModel:
 
 
 def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
-    """Step (4,) [K] to the solution of the model, without its rest where that shows no stable one.
+    """Step (4,) [K] to the stable solution of the model; where that has none, by its slopes or, if these are unstable, without its rest.
 
     ``before``: the step that led here. A step that turns back is at most half as long.
     """
-    if gain(model.image_slopes(state.temperatures)) >= NEARLY_UNSTABLE:
-        model = model._replace(rest=no_rest())
-    step = model.balanced() - state.temperatures
+    slopes, balanced = model.image_slopes(state.temperatures), model.balanced()
+    if model.is_stable(balanced, NEARLY_UNSTABLE):
+        step = balanced - state.temperatures
+    elif gain(slopes) < NEARLY_UNSTABLE:
+        step = np.linalg.solve(np.eye(len(slopes)) - slopes, state.deviation)
+    else:
+        step = model._replace(rest=no_rest()).balanced() - state.temperatures
     longest = LONGEST_STEP
     if before is not None and float(step @ before) < 0.0:
         longest = min(longest, 0.5 * float(np.abs(before).max()))

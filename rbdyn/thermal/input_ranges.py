@@ -13,7 +13,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.thermal.heat import TERMS
-from rbdyn.thermal.losses import HOTTEST, HeatModel, gain
+from rbdyn.thermal.losses import HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def input_ranges(
             level *= levels[key](values[key])
         varied = model.varied(ratios, level, dry + changed.film_share_to_oil * (wet - dry))
         nodes = varied.balanced()
-        if nodes.max() >= HOTTEST or gain(varied.image_slopes(nodes)) >= 1.0:
+        if not varied.is_stable(nodes):
             rows.append(np.full(len(NODES), HOTTEST))
             continue
         rows.append(nodes)

@@ -19,6 +19,8 @@ from rbdyn.thermal.network import NODES, Boundaries, Conductances, matrix, sourc
 HOTTEST, COLDEST = 350.0, -60.0
 # Longest step of Newton's method, end of its steps [K], and their number at most.
 LONGEST_STEP, LAST_STEP, MOST_STEPS = 40.0, 1e-9, 200
+# Deviation of the model from its balance that counts as none [K].
+CLOSED = 1e-3
 DEGREES = np.arange(COLDEST, HOTTEST + 0.5)
 
 
@@ -129,6 +131,11 @@ class HeatModel(NamedTuple):
             if np.abs(nodes - before).max() < LAST_STEP:
                 break
         return np.asarray(nodes)
+
+    def is_stable(self, nodes: Array, most: float = 1.0) -> bool:
+        """Whether the temperatures (4,) of ``balanced`` are a balance of the model below HOTTEST, with a gain below ``most``."""
+        image = np.linalg.solve(self.matrix, self.excess(nodes))
+        return bool(np.abs(image).max() < CLOSED and nodes.max() < HOTTEST and gain(self.image_slopes(nodes)) < most)
 
     def varied(self, ratios: Mapping[str, float], powers: Array, shares: Array) -> Self:
         """The model with conductances and ``powers`` (terms,) times ratios, and other ``shares``."""

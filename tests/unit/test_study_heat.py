@@ -132,6 +132,29 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     assert found["pocket_clearance_mm"]["pick"] > 0.3
 
 
+def test_unit_a_first_guess_cannot_vary(tmp_path):
+    """Unit: the oil's temperature, which the balance computes, is neither a factor, nor an unknown input, nor set by a duty's point."""
+    fault = "lubricant.temperature_C: is a first guess alone, since the heat balance of .thermal. computes it"
+    path = hot_study(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    (key,) = [line for line in text.splitlines() if line.startswith('key = "bearing.radial_clearance_mm"')]
+    path.write_text(text.replace(key, 'key = "lubricant.temperature_C"'), encoding="utf-8")
+    study = Study.load(path)
+    with pytest.raises(InputError, match=f"factor.key = {fault}"):
+        clearance.confirmation_scene(study, study.baseline)
+    scene = tmp_path / "unknown.toml"
+    law = '\n[uncertain]\n"lubricant.temperature_C" = {law = "uniform", low = 80.0, high = 90.0}\n'
+    scene.write_text(HOT.read_text("utf-8") + law, encoding="utf-8")
+    with pytest.raises(InputError, match=f"uncertain: {fault}"):
+        read_case(scene, ["power_loss_W"], [])
+    (tmp_path / "rig.csv").write_text(
+        "lubricant.temperature_C,outer_temperature_C,outer_temperature_C_sd\n80,78,0.3\n90,89,0.3\n95,101,0.3\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=f"column {fault}"):
+        read_question(HOT, tmp_path / "rig.csv", (), ())
+
+
 def test_unit_unknown_inputs_of_a_heat_balance():
     """Unit: its weak conductances vary; temperatures that it computes do not; a viscosity that varies has its temperature."""
     case = read_case(HOT, ["power_loss_W"], [])

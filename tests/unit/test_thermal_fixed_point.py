@@ -173,7 +173,7 @@ def test_unit_a_bearing_that_is_impossible_when_cold_is_bad_input():
 
 def test_unit_steps_are_bounded_and_turn_back_by_half():
     """Unit: no node moves by more than 40 K, a step that turns back is at most half as long, and unstable slopes turn no step round."""
-    state = _state(COLD, 20.0 * HEAT)
+    state = _state(COLD, 4.0 * HEAT)
     onward = next_step(state.model, state, None)
     assert np.abs(onward).max() == pytest.approx(40.0) and onward.min() > 0.0
     back = next_step(state.model, state, np.full(4, -10.0))
