@@ -190,7 +190,7 @@ def test_unit_heat_by_effusivity():
 
 def test_unit_a_first_guess_is_no_axis_of_a_sweep():
     """Unit: the oil's temperature is computed, so a sweep over it is refused; a stated viscosity holds at it, so it counts there."""
-    with pytest.raises(InputError, match="lubricant.temperature_C: is a first guess alone"):
+    with pytest.raises(InputError, match=r"lubricant\.temperature_C: is a first guess alone"):
         sweep(scene_of(DEEP), {"lubricant.temperature_C": [40.0, 80.0]})
     stated_viscosity = scene_of(DEEP, lubricant__temperature_C=40.0, lubricant__viscosity_mPas=30.0)
     assert len(sweep(stated_viscosity, {"lubricant.temperature_C": [40.0, 60.0]}).statuses) == 2
