@@ -27,7 +27,7 @@ from rbdyn.base.forecast import Measured
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.thermal import Temperatures, at_temperatures
+from rbdyn.scene.thermal import Temperatures, at_temperatures, first_guess_faults
 from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
@@ -123,7 +123,10 @@ def declares_unknowns(study: Study) -> bool:
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError for an impossible value."""
     path = study.path_of(study.scene.file)
-    return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
+    scene = Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
+    keys = [factor.key for factor in study.file.factor]
+    refuse(f"{study.path}: factor.key = {fault}" for fault in first_guess_faults(scene, keys))
+    return scene
 
 
 def assignments(study: Study, factors: Array) -> list[str]:

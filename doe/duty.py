@@ -20,6 +20,7 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, key_path, refuse
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import first_guess_faults
 
 if TYPE_CHECKING:
     from doe.aggregation import Aggregated, Estimates
@@ -199,6 +200,7 @@ def over_duty(
     for name, overrides in duty.overrides.items():
         try:
             points[name] = scene(overrides)
+            refuse(first_guess_faults(points[name], {".".join(key_path(text) or ()) for text in overrides}))
         except InputError as error:
             faults[name] = error.faults
     # A fault at all points is none of the duty.

@@ -118,7 +118,7 @@ class SimulationResult(Brief, SavedRecord):
     - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
       play, None where nothing guides the cage
     - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
-    - ``thermal``: the balance: "status" ("steady", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+    - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;

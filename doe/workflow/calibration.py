@@ -58,6 +58,7 @@ from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented
 from rbdyn.scene.unknown import Input, put, value_of
 
@@ -97,6 +98,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     override_claims = Claims({key_path(override): override for override in uncertain.set})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
+        + [f"{data}: column {fault}" for fault in first_guess_faults(base, rig.keys)]
         + [
             f"{data}: column {key} is a target too ({path}: uncertain or --free); take it out of one of them"
             for key in rig.keys

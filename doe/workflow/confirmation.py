@@ -100,8 +100,8 @@ class Confirmed:
     likeliest point and its probability; ``jitter_points``: those at which alone the cage trembles. They are empty
     without a duty.
 
-    ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 90 % of them over the inputs of the heat
-    balance; both None without a balance, and over a duty. ``hot``: scenes at the temperatures of their runs by point of
+    ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 5, 50 and 95 % of them, of the inner ring over the
+    outer one and of the clearances, over the inputs of the heat balance; both None without a balance, and over a duty. ``hot``: scenes at the temperatures of their runs by point of
     the duty, or under EVERYWHERE without a duty; empty without a balance.
     """
 
@@ -211,9 +211,10 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
         )
     if result.thermal is None:
         return confirmed
-    ranges = (result.thermal["input_range"] or {}).get("temperatures_C")
     hot = {EVERYWHERE: simulated_scene(result)}
-    return replace(confirmed, temperatures=result.temperatures_C, temperature_ranges=ranges, hot=hot)
+    return replace(
+        confirmed, temperatures=result.temperatures_C, temperature_ranges=result.thermal.get("ranges"), hot=hot
+    )
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

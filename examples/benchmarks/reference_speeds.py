@@ -1,8 +1,8 @@
 """Speed at which SKF's friction heats a bearing to 70 C in the thermal network, over the reference speed of the catalogue.
 
 ``python examples/benchmarks/reference_speeds.py`` takes a dozen NU bearings at the conditions of ISO 15312: 0.05 C0, ISO VG 32 in a
-bath, outer ring at 70 C, surroundings at 20 C. No simulation runs. SKF's M_rr + M_sl arises half at each race, and all heat
-leaves through the seats. A bath carries nothing away: its oil only joins rings, rollers and cage.
+bath, outer ring at 70 C, surroundings at 20 C. No simulation runs. SKF's M_rr + M_sl arises half at each race, and the heat
+leaves through the seats and the sump, with the default factors of [thermal].
 
 The error is a factor of two, 0.5 to 2, and no finer claim is made. At the listed speeds SKF's own friction is 0.94 to 2.2 times the
 heat of ISO 15312. Loss rises with about the 1.3th power of the speed, so the friction model alone moves the speed by 0.55 to
@@ -23,7 +23,8 @@ from rbdyn.life.rollers import iso_15312_heat, skf_moments
 from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.properties.oils import BASE_OILS, grade_oil
-from rbdyn.thermal.conductances import CageSize, race_contact, seats, surface_coefficient, surfaces
+from rbdyn.scene.thermal import Thermal
+from rbdyn.thermal.conductances import CageSize, race_contact, seats, sump, surface_coefficient, surfaces
 from rbdyn.thermal.heat import Effusivities, power_vector, shares
 from rbdyn.thermal.network import INNER, OUTER, Boundaries, Conductances, temperatures
 
@@ -37,6 +38,7 @@ ERROR = 2.0
 # Largest roller load over the mean one F/Z of line contacts without clearance (Stribeck's sum for the exponent 10/9).
 STRIBECK = 4.08
 POSITIONS = 90
+DEFAULTS = Thermal()
 
 
 class Point(NamedTuple):
@@ -60,8 +62,8 @@ class Row(NamedTuple):
         return self.computed / self.listed
 
 
-def point(name: str, speed: float) -> Point:
-    """The bearing of a designation at a speed [rad/s], under the conditions of ISO 15312."""
+def point(name: str, speed: float, thermal: Thermal = DEFAULTS) -> Point:
+    """The bearing of a designation at a speed [rad/s], under the conditions of ISO 15312, with factors of ``thermal``."""
     named = read_designation(name)
     sizes = envelope(named)
     assert sizes.static_capacity is not None
@@ -107,7 +109,8 @@ def point(name: str, speed: float) -> Point:
         outer_rollers=race("outer"),
         inner_rollers=race("inner"),
         outer_ambient=housing,
-        inner_ambient=shaft,
+        inner_ambient=thermal.shaft_factor * shaft,
+        sump=thermal.sump_factor * sump(outside, width),
     )
     moments = skf_moments(named.series, bore, outside, speed, oil.viscosity / oil.density, load, supply="bath")
     rolling, sliding = moments.rolling * speed, moments.sliding * speed
@@ -115,11 +118,14 @@ def point(name: str, speed: float) -> Point:
         {"outer_race_traction": 0.5 * sliding, "inner_race_traction": 0.5 * sliding},
         {"outer": 0.5 * rolling, "inner": 0.5 * rolling},
     )
-    heat = shares(Effusivities(steel.effusivity, steel.effusivity, brass.effusivity), "outer").T @ powers
+    heat = (
+        shares(Effusivities(steel.effusivity, steel.effusivity, brass.effusivity), "outer", thermal.film_share_to_oil).T
+        @ powers
+    )
     return Point(rolling + sliding, temperatures(network, Boundaries(AMBIENT, AMBIENT), heat))
 
 
-def row(name: str) -> Row:
+def row(name: str, thermal: Thermal = DEFAULTS) -> Row:
     """Speed at which the outer ring has 70 C, by bisection, since heat rises with speed."""
     sizes = envelope(read_designation(name))
     assert sizes.reference_speed is not None
@@ -127,9 +133,9 @@ def row(name: str) -> Row:
     low, high = 0.05 * listed, 5.0 * listed
     while high - low > 1e-6 * listed:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if point(name, middle).temperatures[OUTER] < REFERENCE else (low, middle)
-    hot = point(name, low).temperatures
-    return Row(listed, low, float(hot[INNER] - hot[OUTER]), point(name, listed).power / iso_15312_heat(sizes))
+        low, high = (middle, high) if point(name, middle, thermal).temperatures[OUTER] < REFERENCE else (low, middle)
+    hot = point(name, low, thermal).temperatures
+    return Row(listed, low, float(hot[INNER] - hot[OUTER]), point(name, listed, thermal).power / iso_15312_heat(sizes))
 
 
 def main() -> None:

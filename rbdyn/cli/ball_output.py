@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, notes
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, shown
+from rbdyn.base.words import counted, other_ranges, range_ends, shown
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
 from rbdyn.scene import BallScene
 
@@ -150,10 +150,8 @@ PARTS = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": 
 
 def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]:
     """Steady temperatures with their ranges, heat and its ways out, clearance and contact angle in operation."""
-    spans = thermal["input_range"]["temperatures_C"]
-    parts = ", ".join(
-        f"{part} {nodes[node]:.1f} ({spans[node][0]:.0f} to {spans[node][1]:.0f})" for node, part in PARTS.items()
-    )
+    spans = thermal["ranges"]
+    parts = ", ".join(f"{part} {nodes[node]:.1f} ({range_ends(spans[node])})" for node, part in PARTS.items())
     friction = thermal["friction_W"]
     ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
     clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
@@ -163,6 +161,7 @@ def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]
         f"{friction['sliding']:.4g}; carried off by {ways}",
         f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "
         f"{angle['operating']:.4g} deg of {angle['drawn']:.4g}",
+        other_ranges(spans),
     ]
 
 

@@ -95,13 +95,10 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
     Raises InputError with all faults at once, RunError for a point without steady temperatures.
     """
     from rbdyn.dynamics.duty import roller_duty_life
+    from rbdyn.dynamics.simulate import steady_scene
 
     points = read_duty(path)
-    scenes = duty_scenes(scene, points, str(path))
-    if scene.thermal is not None:
-        from rbdyn.dynamics.simulate import steady_scene
-
-        scenes = [steady_scene(hot) for hot in scenes]
+    scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
     whole = sum(point.share for point in points)
     life = roller_duty_life(scenes, [point.share / whole for point in points])
     return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.forecast import span
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, error_alone, label
+from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -131,12 +131,12 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     balance, figures = result.thermal, result.temperatures_C
     if balance is None or figures is None:
         return []
-    ranges = (balance["input_range"] or {}).get("temperatures_C", {})
+    ranges = balance.get("ranges") or {}
     rows = [
         (
             PARTS[node],
             figure.value_text,
-            " to ".join(f"{end:.0f}" for end in ranges[node]) if node in ranges else "",
+            range_ends(ranges[node]) if node in ranges else "",
             "" if figure.statistical_error is None else _error(figure.statistical_error),
             "" if figure.numerical_error is None else _error(figure.numerical_error),
             f"{balance['heat_W'][node]:.3g}",
@@ -146,10 +146,11 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     header = ("temperature [°C]", "value", "inputs (90 %)", "statistical (95 %)", "numerical (95 %)", "heat [W]")
     ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance["carried_off_W"].items() if power)
     state = "steady state" if balance["status"] == "steady" else balance["status"]
-    inputs = ", ".join((balance["input_range"] or {}).get("inputs", ()))
+    inputs = ", ".join(balance.get("inputs", ()))
     return [
         Table("", header, rows),
         Paragraph(f"{state}; gain of heat and temperature {balance['gain']:+.2f}; carried off: {ways}"),
+        *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
     ]
 

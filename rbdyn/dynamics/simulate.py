@@ -89,7 +89,7 @@ def simulate(
 def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None) -> Scene:
     """The scene at its steady temperatures where it has [thermal], else the scene itself.
 
-    Raises RunError where it has none, and InputError where it is impossible even at the temperature of its surroundings.
+    Raises RunError where it has none or is above a ceiling there, and InputError where it is impossible even at the temperature of its surroundings.
     """
     if scene.thermal is None:
         return scene

@@ -3,12 +3,12 @@
 A state is a set of temperatures of oil, rings and rollers. The scene at these temperatures is simulated, the network carries off
 the heat of the losses, and the temperatures that this gives are compared with those assumed (``rbdyn.thermal.fixed_point``). Short
 runs come first; a run of the scene's own length at the end gives the figures, whose temperatures it also corrects by the last
-small step. All runs have the seed of the scene.
+small step. Temperatures are steady only if the heat of that run balances within its error. All runs have the seed of the scene.
 
 Errors of the temperatures are those of the heat, divided by 1 - dM/dT of the loop, as for any other figure: each temperature is
 a weighted sum of the losses. The gain of the loop comes from two more short runs, with all nodes 5 K warmer and with the inner
-ring alone 5 K warmer. Ranges over the documented inputs of the balance, which are far wider than these errors, follow from 256
-sets with the heat linear in the temperatures.
+ring alone 5 K warmer; where it is near one, the other nodes follow. Ranges over the documented inputs of the balance, which are
+far wider than these errors, follow from 256 sets of a model with the slopes measured there.
 """
 
 import math
@@ -22,31 +22,40 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LAND_FILM, POCKET_FILM, ROLLING, RollerBearing
-from rbdyn.dynamics.parameters.heat import Network, flow_notes, network_of, ring_width
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.parameters.heat import (
+    Network,
+    flow_notes,
+    heat_model,
+    loss_levels,
+    network_of,
+    ring_width,
+    term_shares,
+)
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean, quantity, work_done
+from rbdyn.mounting.fits import RunningSpeeds, cage_clearances, operating_clearance
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, inlet_temperature
-from rbdyn.thermal.fixed_point import TOLERANCE, State, gain, learned, steady_state
-from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
-from rbdyn.thermal.network import NODES, carried_off, matrix
+from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
+from rbdyn.thermal.fixed_point import VAGUE, State, learned, steady_state
+from rbdyn.thermal.input_ranges import Ranges, input_ranges
+from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
+from rbdyn.thermal.network import NODES, carried_off
 
 # Replicates of a short run, and its counted turns as a share of those of the scene.
 SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
 # Warmer nodes of the runs that measure the gain [K].
 WARMER = 5.0
+# Gain from which all nodes are measured, and random sets of noise that give its error.
+DOUBTFUL, NOISES = 0.7, 64
 # Runs of the scene's own length at most: the last deviates by less than the tolerance after one or two.
-MOST_WHOLE_RUNS = 3
-# Exponents of the viscosity in losses, with which slopes start. Any others give the same state.
-ROLLING_POWER, POCKET_POWER, LAND_POWER = 0.7, 0.5, 1.0
-# Share of the last step that counts as error: its slopes of about 0.3 are known within a third. A step that no run followed
-# counts as a whole.
+MOST_WHOLE_RUNS = 4
+# Share of the last step that counts as error: its slopes of about 0.3 are known within a third.
 LAST_STEP = 0.1
 
 # Simulates a scene by its parameters: replicates, and the time that they took.
@@ -56,9 +65,10 @@ Gather = Callable[[Scene, Ensemble, dict[str, float]], SimulationResult]
 
 
 class Trial(NamedTuple):
-    """A simulated state: the scene at its temperatures, its network, and its replicates with their time [s]."""
+    """A simulated state: the scene at its temperatures, its parameters and network, and its replicates with their time [s]."""
 
     hot: Scene
+    bearing: RollerBearing
     network: Network
     ensemble: Ensemble
     clock: dict[str, float]
@@ -114,6 +124,7 @@ class Balance:
         assert scene.thermal is not None
         self.scene, self.simulate, self.thermal = scene, simulate, scene.thermal
         self.compile_s, self.wall_s = 0.0, 0.0
+        self.viscosity = log_viscosity(scene.lubricant.at)
         self.runs: list[Replicate] = []
 
     @property
@@ -142,49 +153,49 @@ class Balance:
         ]
         image = np.array([figure.value for figure in figures])
         noise = np.array([figure.statistical_error or 0.0 for figure in figures])
-        return State(temperatures, image, noise, Trial(hot, network, ensemble, clock))
+        model = heat_model(hot, network, temperatures, powers_of(ensemble.runs), self.viscosity)
+        return State(temperatures, image, noise, model, Trial(hot, bearing, network, ensemble, clock))
 
 
-def viscous_slopes(state: State) -> Array:
-    """Slopes dM/dT (4, 4) at a state by the viscosity of the films alone, with which a search begins."""
-    hot, network = state.run.hot, state.run.network
-    powers, shares = powers_of(state.run.ensemble.runs), network.shares
-    race_and_rollers = {"outer": (0.0, 0.5, 0.0, 0.5), "inner": (0.0, 0.0, 0.5, 0.5), "roller": (0.0, 0.0, 0.0, 1.0)}
-    films = [
-        ("outer", "outer", ROLLING_POWER, powers[ROLLING] - powers[INNER_ROLLING], shares[ROLLING]),
-        ("inner", "inner", ROLLING_POWER, powers[INNER_ROLLING], shares[ROLLING] + shares[INNER_ROLLING]),
-        ("pocket", "roller", POCKET_POWER, powers[POCKET_FILM], shares[POCKET_FILM]),
-        ("land", hot.cage.guidance, LAND_POWER, powers[LAND_FILM], shares[LAND_FILM]),
-    ]
-    heat = np.zeros((len(NODES), len(NODES)))
-    for place, surface, exponent, power, nodes in films:
-        oil = hot.oil(place)
-        slope = -exponent * power * oil.viscosity_slope / oil.viscosity
-        heat += np.outer(nodes, slope * np.array(race_and_rollers[surface]))
-    return np.asarray(np.linalg.solve(matrix(network.conductances), heat))
+def measured_slopes(balance: Balance, state: State, near: HeatModel) -> tuple[Array, float]:
+    """Slopes after more short runs next to a state, and the error of their gain (95 %).
 
-
-def measured_slopes(balance: Balance, state: State, slopes: Array) -> Array:
-    """Slopes after two more short runs at a steady state: all nodes warmer, and the inner ring alone.
-
-    A warmer inner ring that makes the bearing impossible is replaced by a colder one.
+    Where all nodes are less than 5 K above the surroundings the estimate serves: their heat cannot run away. Else all nodes are moved, then the inner ring alone; the other nodes follow where the gain is near one. A warmer ring that makes the
+    bearing impossible is replaced by a colder one.
     """
-    steps, changes = [], []
-    for direction in (np.ones(len(NODES)), np.eye(len(NODES))[NODES.index("inner")]):
+    slopes = near._replace(rest=no_rest()).image_slopes(state.temperatures)
+    if state.image.max() < state.model.coldest + WARMER:
+        return slopes, 0.0
+    alone = np.eye(len(NODES))
+    inner = NODES.index("inner")
+    steps, changes, noises = list[Array](), list[Array](), list[Array]()
+    for place, direction in enumerate((np.ones(len(NODES)), alone[inner], *np.delete(alone, inner, axis=0)[1:])):
+        if place == 2 and gain(learned(slopes, np.array(steps), np.array(changes)) if steps else slopes) < DOUBTFUL:
+            break
         for step in (WARMER * direction, -WARMER * direction):
             try:
-                moved = balance.at(state.temperatures + step)
+                moved = balance.at(np.minimum(state.temperatures + step, HOTTEST))
             except InputError:
                 continue
-            steps.append(step)
+            steps.append(moved.temperatures - state.temperatures)
             changes.append(moved.image - state.image)
+            noises.append(np.hypot(moved.noise, state.noise))
             break
-    return learned(slopes, np.array(steps), np.array(changes)) if steps else slopes
+    taken = [place for place, step in enumerate(steps) if np.abs(step).max() > 0.5 * WARMER]
+    if not taken:
+        return slopes, 0.0
+    moves, seen, noise = (np.array(rows)[taken] for rows in (steps, changes, noises))
+    generator = np.random.default_rng(balance.scene.numerics.seed)
+    gains = [
+        gain(learned(slopes, moves, seen + 0.5 * noise * generator.normal(size=seen.shape))) for _ in range(NOISES)
+    ]
+    return learned(slopes, moves, seen), 2.0 * float(np.std(gains))
 
 
 def corrected(state: State, slopes: Array) -> Array:
-    """Steady temperatures [C] by one Newton step from a state."""
-    return np.asarray(state.temperatures + np.linalg.solve(np.eye(len(NODES)) - slopes, state.deviation))
+    """Steady temperatures [C] by one Newton step from a state, not colder than the surroundings and not hotter than any oil."""
+    step = np.linalg.solve(np.eye(len(NODES)) - slopes, state.deviation)
+    return np.asarray(np.clip(state.temperatures + step, state.model.coldest, HOTTEST))
 
 
 class Verdict(NamedTuple):
@@ -208,17 +219,10 @@ def verdict_of(balance: Balance) -> Verdict:
     Raises InputError where the bearing is impossible even at the temperature of its surroundings, RunError, KeyboardInterrupt.
     """
     first = np.full(len(NODES), balance.scene.lubricant.temperature_C)
-    search = steady_state(balance.at, first, viscous_slopes, balance.cold)
-    path, last = [*search.states], search.last
-    if search.status != "steady":
-        return Verdict(search.status, search.reason, search.slopes, path, last.temperatures)
-    slopes = measured_slopes(balance, last, search.slopes)
-    if gain(slopes) >= 1.0:
-        reason = (
-            f"the gain of the loop is {gain(slopes):.2g}, so heat grows faster with temperature than it is carried off"
-        )
-        return Verdict("no steady state", reason, slopes, path, last.temperatures)
-    return Verdict("steady", "", slopes, path, corrected(last, slopes))
+    search = steady_state(balance.at, first, balance.cold, lambda state, near: measured_slopes(balance, state, near))
+    last = search.last
+    temperatures = corrected(last, search.slopes) if search.status == "steady" else last.temperatures
+    return Verdict(search.status, search.reason, search.slopes, [*search.states], temperatures)
 
 
 def with_temperatures(
@@ -232,16 +236,35 @@ def with_temperatures(
         state = balance.at(temperatures, True, progress, notice)
         path.append(state)
         temperatures = corrected(state, verdict.slopes)
-        if not _open_step(state, temperatures - state.temperatures):
+        if _closes(state, verdict.slopes):
             break
-    return _result(balance, path, verdict.slopes, verdict.status, verdict.reason, gather)
+    status, reason = verdict.status, verdict.reason
+    if verdict.steady and not _closes(state, verdict.slopes):
+        status, reason = "undecided", _open_reason(state, verdict.slopes)
+    return _result(balance, path, verdict.slopes, status, reason, gather)
+
+
+def _closes(state: State, slopes: Array) -> bool:
+    """Whether the heat of a run balances within its error, and this error is small enough to know the temperatures."""
+    step = corrected(state, slopes) - state.temperatures
+    return state._replace(image=state.temperatures + step).closes() and float(state.noise.max()) <= VAGUE
+
+
+def _open_reason(state: State, slopes: Array) -> str:
+    step, noise = np.abs(corrected(state, slopes) - state.temperatures).max(), state.noise.max()
+    return (
+        f"after {MOST_WHOLE_RUNS} runs of full length the temperatures still move by {step:.2g} K, and their noise is {noise:.2g} K; "
+        "lengthen numerics.turns or raise numerics.replicates"
+    )
 
 
 def steady_scene(scene: Scene, simulate: Simulate) -> Scene:
-    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none."""
+    """The scene at its steady temperatures by short runs. Raises as ``verdict_of``, and RunError where it has none or is too hot."""
     verdict = verdict_of(Balance(scene, simulate))
     if not verdict.steady:
         raise RunError(f"temperatures: {verdict.status}: {verdict.reason}")
+    if excess := _over_ceilings(scene, dict(zip(NODES, verdict.temperatures.tolist(), strict=True))):
+        raise RunError(f"temperatures: too hot: {excess}")
     return at_temperatures(scene, Temperatures(*verdict.temperatures.tolist()))
 
 
@@ -251,7 +274,6 @@ def _result(
     scene, state = balance.scene, path[-1]
     trial: Trial = state.run
     steady = status == "steady"
-    step = corrected(state, slopes) - state.temperatures
     temperatures = _quantities(trial, state, slopes if steady else np.zeros_like(slopes), steady)
     values = {node: figure.value for node, figure in temperatures.items()}
     if steady and (excess := _over_ceilings(scene, values)):
@@ -260,23 +282,17 @@ def _result(
         trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s}
     )
     network = trial.network
-    heat = powers_of(trial.ensemble.runs) @ network.shares + network.windage
-    sized = network.conductances, network.boundaries
-    ranges = None
-    if steady:
-        slopes_of_heat = matrix(network.conductances) @ slopes
-        ranges = input_ranges(
-            _unknown_factors(scene), *sized, corrected(state, slopes), heat + slopes_of_heat @ step, slopes_of_heat
-        )
+    heat = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
+    ranges = _ranges(scene, trial.hot, state, slopes) if steady else None
     record = {
         "status": status,
         **({"reason": reason} if reason else {}),
         "gain": gain(slopes),
         "heat_W": dict(zip(NODES, heat.tolist(), strict=True)),
-        "windage_W": float(network.windage.sum()),
-        "carried_off_W": carried_off(*sized, state.image),
+        "windage_W": network.windage,
+        "carried_off_W": carried_off(network.conductances, network.boundaries, state.image),
         "conductances_W_K": network.conductances._asdict(),
-        "input_range": None if ranges is None else ranges.as_dict(),
+        **({"ranges": None} if ranges is None else ranges.as_dict()),
         "oil_fraction": trial.hot.lubricant.oil_fraction,
         "path_C": [dict(zip(NODES, visited.temperatures.tolist(), strict=True)) for visited in path],
     }
@@ -287,29 +303,38 @@ def _result(
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
-        notes=(
-            *_notes(scene, trial.hot, status, reason, ranges),
-            *([_open_note(step)] if steady and _open_step(state, step) else []),
-            *_without_computed(result.notes, scene, trial.hot),
-        ),
+        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_without_computed(result.notes, scene, trial.hot)),
     )
 
 
-def _unknown_factors(scene: Scene) -> dict[str, Array]:
-    """Unknown inputs of the scene's heat balance, as of ``factors_of``."""
-    thermal, uncertain = scene.thermal, scene.uncertain
-    assert thermal is not None
-    estimated = [] if uncertain is None else uncertain.estimated
-    return factors_of(thermal, scene.lubricant.oil_flow_l_min is not None, estimated)
+def _ranges(scene: Scene, hot: Scene, state: State, slopes: Array) -> Ranges:
+    """Ranges over the unknown inputs of the balance, about the steady state next to a state."""
+    mounting = hot.mounting
+    assert mounting is not None
+    speeds = hot.operation.speeds
+    running = RunningSpeeds(*speeds, hot.geometry.motion.cage_speed)
+
+    def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
+        parts = part_temperatures(thermal, Temperatures(*nodes.tolist()))
+        mounted = mounting.model_copy(update=parts)
+        land = 1e-3 * hot.land_diameter_mm
+        cage = cage_clearances(mounted, hot.bearing, hot.cage, hot.materials, land, running)
+        radial = operating_clearance(mounted, hot.bearing, hot.materials, *speeds)
+        plays = {"radial_um": radial, "guide_um": cage.guide, "pocket_um": cage.pocket}
+        return {name: 1e6 * play.operating for name, play in plays.items() if play is not None}
+
+    about = state.model.with_image_slopes(slopes)
+    estimated = [] if scene.uncertain is None else scene.uncertain.estimated
+    return input_ranges(
+        scene, about, lambda share: term_shares(hot, share), clearances, loss_levels(hot, state.run.bearing), estimated
+    )
 
 
 def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict[str, Quantity]:
     """Temperatures of the nodes with their errors; those of the state itself where none is steady."""
     ensemble = trial.ensemble
     moving = drifting(ensemble.runs)
-    step = np.abs(corrected(state, slopes) - state.temperatures)
-    if not _open_step(state, step):
-        step = LAST_STEP * step
+    step = LAST_STEP * np.abs(corrected(state, slopes) - state.temperatures)
     figures = {}
     for place, figure in enumerate(temperature_figures(state.temperatures, trial.network, slopes)):
         slow = slow_change(figure, figure, ensemble.runs, ensemble.since, moving=moving)
@@ -321,18 +346,6 @@ def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict
             else replace(node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None)
         )
     return figures
-
-
-def _open_step(state: State, step: Array) -> bool:
-    """Whether the last step (4,) [K] is beyond the tolerance and the noise, because no further run was allowed."""
-    return bool(np.any(np.abs(step) > np.maximum(TOLERANCE, state.noise)))
-
-
-def _open_note(step: Array) -> str:
-    return (
-        f"temperatures: the last step, {np.abs(step).max():.2g} K, is not below their noise and counts as error; lengthen "
-        "numerics.turns or raise numerics.replicates"
-    )
 
 
 def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:

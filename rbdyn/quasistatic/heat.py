@@ -36,10 +36,11 @@ from rbdyn.quasistatic.row.model import RowModel, cage_speed, constraint_of, loa
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, part_temperatures
-from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, surface_coefficient
+from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
 from rbdyn.thermal.fixed_point import State
-from rbdyn.thermal.heat import Effusivities, power_vector, shares
-from rbdyn.thermal.network import NODES, Boundaries, Conductances, temperatures
+from rbdyn.thermal.heat import TERMS, Effusivities, power_vector, shares
+from rbdyn.thermal.losses import HeatModel, Losses, log_viscosity, no_rest
+from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, temperatures
 
 # Series of SKF's table 3a by the diameter series of ISO 15.
 SERIES = {"8": "618", "9": "619", "0": "60", "2": "62", "3": "63", "4": "64"}
@@ -48,6 +49,8 @@ HALF_ZONE = 0.2782 / 0.2288
 # Integral of (1 - x^2)^(1/4) over 0 to 1: what an ellipse conducts over a rectangle of its axes, since strips at its ends are short.
 ELLIPSE = 0.8740
 MINERAL = ("mineral", "naphthenic")
+# Exponent of the viscosity in SKF's rolling moment.
+ROLLING_POWER = 0.6
 
 
 def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> SingleRowScene:
@@ -78,16 +81,23 @@ class Loads(NamedTuple):
 
 
 class Heat(NamedTuple):
-    """A row at temperatures: its equilibrium, loads, friction moments [N m], heat of each node [W], (4,), and its network."""
+    """A row at temperatures: its equilibrium, loads, friction moments [N m], the losses of each term [W], (terms,), the share of each
+    node in these, (terms, 4), and its network."""
 
     scene: SingleRowScene
     model: RowModel
     solution: Solution
     loads: Loads
     moments: FrictionMoments
-    heat: Array
+    powers: Array
+    shares: Array
     conductances: Conductances
     boundaries: Boundaries
+
+    @property
+    def heat(self) -> Array:
+        """Heat of each node [W], (4,)."""
+        return np.asarray(self.powers @ self.shares)
 
 
 def static_capacity_of(scene: SingleRowScene, model: RowModel) -> float:
@@ -142,16 +152,22 @@ def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> Frictio
     )
 
 
-def heat_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
-    """Heat of each node [W], (4,): half of each moment's power at either race, split like the losses of rollers."""
+def powers_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
+    """Losses in the order of ``heat.TERMS`` [W], (terms,): half of each moment's power at either race."""
     inner, outer = scene.operation.speeds
     rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
-    ball, heat = scene.material("ball").effusivity, np.zeros(len(NODES))
+    races = ("outer", "inner")
+    return power_vector({f"{race}_race_traction": sliding for race in races}, dict.fromkeys(races, rolling))
+
+
+def term_shares(scene: SingleRowScene, film_to_oil: float) -> Array:
+    """Share of each node in the losses, (terms, 4), split like those of rollers; ``film_to_oil`` of the heat of films is the oil's."""
+    ball, rows = scene.material("ball").effusivity, np.zeros((len(TERMS), len(NODES)))
     for race in ("outer", "inner"):
         ring = scene.material(f"{race}_ring").effusivity
-        power = power_vector({f"{race}_race_traction": sliding}, {race: rolling})
-        heat += power @ shares(Effusivities(ring, ball, ring), "roller")
-    return heat
+        of_race = [place for place, term in enumerate(TERMS) if term.startswith(race)]
+        rows[of_race] = shares(Effusivities(ring, ball, ring), "roller", film_to_oil)[of_race]
+    return rows
 
 
 def contact_conductance(scene: SingleRowScene, contact: PointContact, race: str, loads: Array) -> float:
@@ -187,7 +203,7 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
     cage = cage_speed(drawing, *scene.operation.speeds)
     transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
     flow = lubricant.oil_flow
-    to_ambient = [thermal.housing_factor * each for each in seats(mounting.bore, mounting.outside_diameter, width)]
+    housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
     return Conductances(
         flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
         oil_outer=transfer * 2.0 * math.pi * outer * width,
@@ -197,8 +213,9 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
         * contact_conductance(scene, model.outer_contact, "outer", solution.outer_load),
         inner_rollers=thermal.contact_factor
         * contact_conductance(scene, model.inner_contact, "inner", solution.inner_load),
-        outer_ambient=to_ambient[0],
-        inner_ambient=to_ambient[1],
+        outer_ambient=thermal.housing_factor * housing,
+        inner_ambient=thermal.shaft_factor * shaft,
+        sump=thermal.sump_factor * sump(mounting.outside_diameter, width) if lubricant.supply == "bath" else 0.0,
     )
 
 
@@ -228,7 +245,8 @@ def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
         solution,
         loads,
         moments,
-        heat_of(hot, moments),
+        powers_of(hot, moments),
+        term_shares(hot, thermal.film_share_to_oil),
         conductances_of(hot, thermal, model, solution),
         boundaries,
     )
@@ -239,5 +257,12 @@ def balance(scene: SingleRowScene, nodes: Array) -> State:
 
     Raises InputError as ``heat_at``.
     """
+    assert scene.lubricant is not None
     found = heat_at(scene, nodes)
-    return State(nodes, temperatures(found.conductances, found.boundaries, found.heat), np.zeros(len(NODES)), found)
+    films = np.zeros((len(TERMS), len(NODES)))
+    films[:, OIL] = 1.0
+    exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
+    losses = Losses(nodes, found.powers, exponents, films, log_viscosity(scene.lubricant.at))
+    model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_rest())
+    image = temperatures(found.conductances, found.boundaries, found.heat)
+    return State(nodes, image, np.zeros(len(NODES)), model, found)

@@ -267,7 +267,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
     equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
     computed it. ``temperatures_C``: of "oil", "outer" ring, "inner" ring and balls ("rollers"), where the scene has a heat balance.
-    ``thermal``: the balance: its "status" ("steady", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+    ``thermal``: the balance: its "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
     first, the "gain" of the loop, heat by node, friction and its loads, heat by way out, conductances, ranges of the temperatures
     over the documented inputs, and the "path_C" of the search. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
     ``max_stress_MPa``, and ``inner`` and ``outer`` of a double-decker bearing. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a

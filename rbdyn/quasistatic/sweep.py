@@ -43,6 +43,7 @@ from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
 from rbdyn.result import read_record, versions, write_json
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.thermal import first_guess_faults
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -428,7 +429,7 @@ def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis
     if not keys:
         raise InputError(["sweep: no key to sweep; name one, such as operation.inner_speed_rpm"])
     data = tables(scene)
-    faults: list[str] = []
+    faults = first_guess_faults(scene, keys)
     axes = []
     for key, values in keys.items():
         try:

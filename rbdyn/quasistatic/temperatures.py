@@ -1,12 +1,12 @@
 """A row of balls at the temperatures that its own friction keeps up: heat balance and equilibrium in one loop.
 
-The map from temperatures to those that balance their heat is exact to round-off, so Newton's method with central differences
-finds the fixed point to ``TOLERANCE`` (``rbdyn.thermal.fixed_point``). Its slopes also give the gain of the loop, and the
+The map from temperatures to those that balance their heat is exact to round-off, so a search whose slopes are central differences
+finds the fixed point to ``TOLERANCE`` (``rbdyn.thermal.fixed_point``). These slopes also give the gain of the loop, and the
 ranges of the temperatures over the documented inputs of the balance.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,18 +16,18 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError
 from rbdyn.life.friction import ANGULAR_GEOMETRY, DEEP_GROOVE_GEOMETRY, starvation_factor
-from rbdyn.quasistatic.heat import Heat, at_temperatures, balance
+from rbdyn.quasistatic.heat import Heat, at_temperatures, balance, term_shares
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.row.model import row_of
 from rbdyn.quasistatic.row.ring import Row
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, inlet_temperature, oil_ceiling
-from rbdyn.thermal.fixed_point import Search, State, gain, steady_state
-from rbdyn.thermal.input_ranges import Ranges, factors_of, input_ranges
-from rbdyn.thermal.network import NODES, carried_off, matrix
+from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling
+from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
+from rbdyn.thermal.input_ranges import Ranges, input_ranges
+from rbdyn.thermal.losses import HeatModel, gain
+from rbdyn.thermal.network import NODES, carried_off
 
-UNSTABLE = "the temperatures balance, but any disturbance grows"
 # Deviation from the balance that counts as none [K]; half of the difference of temperatures that gives slopes [K].
 TOLERANCE, DIFFERENCE = 1e-9, 0.01
 # Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
@@ -50,8 +50,8 @@ def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
     return np.array(columns).T
 
 
-def steady_temperatures(scene: SingleRowScene) -> tuple[Search, Array]:
-    """Search for steady temperatures of a scene with [thermal], and the slopes dM/dT (4, 4) at its last state.
+def steady_temperatures(scene: SingleRowScene) -> Search:
+    """Search for steady temperatures of a scene with [thermal].
 
     It starts at the first guess of the oil's temperature, and where that leads to no stable state also at that of the cold bearing.
     Raises InputError where the bearing is impossible even when cold.
@@ -59,30 +59,23 @@ def steady_temperatures(scene: SingleRowScene) -> tuple[Search, Array]:
     assert scene.thermal is not None and scene.lubricant is not None
     cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
     guess = np.full(len(NODES), scene.lubricant.temperature_C)
-    outcomes = []
     for start in (guess, cold):
-        search = steady_state(
-            partial(balance, scene),
-            start,
-            lambda state: _slopes_or(scene, state, np.zeros((len(NODES), len(NODES)))),
-            cold,
-            TOLERANCE,
-        )
-        slopes = _slopes_or(scene, search.last, search.slopes)
-        if search.status == "steady" and gain(slopes) >= 1.0:
-            search = search._replace(status="no steady state", reason=UNSTABLE)
-        outcomes.append((search, slopes))
+        search = steady_state(partial(balance, scene), start, cold, _exact_slopes, partial(_model, scene), TOLERANCE)
         if search.status == "steady":
             break
-    return outcomes[-1]
+    return search
 
 
-def _slopes_or(scene: SingleRowScene, state: State, otherwise: Array) -> Array:
-    """Slopes at a state, or others where a neighbour of it is impossible."""
+def _exact_slopes(state: State, near: HeatModel) -> tuple[Array, float]:
+    return near.image_slopes(state.temperatures), 0.0
+
+
+def _model(scene: SingleRowScene, states: Sequence[State]) -> HeatModel:
+    """Model of the balance about the last state with its slopes, or with those of all states where a neighbour is impossible."""
     try:
-        return slopes_at(scene, state.temperatures)
+        return states[-1].model.with_image_slopes(slopes_at(scene, states[-1].temperatures))
     except InputError:
-        return otherwise
+        return model_of(states)
 
 
 def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
@@ -91,10 +84,10 @@ def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], B
     ``solve`` gives the result of a scene at stated temperatures.
     """
     try:
-        search, slopes = steady_temperatures(scene)
+        search = steady_temperatures(scene)
     except InputError as error:
         return _seized_cold(scene, str(error.faults[0]), solve)
-    last = search.last
+    last, slopes = search.last, search.slopes
     found: Heat = last.run
     nodes = dict(zip(NODES, last.temperatures.tolist(), strict=True))
     status, reason = str(search.status), f"{search.reason}; gain of the loop {gain(slopes):.2g}"
@@ -108,9 +101,7 @@ def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], B
         status=hot.status if steady else f"{status}: {reason}",
         report=hot.report if steady else None,
         temperatures_C=nodes,
-        thermal=_record(scene, search, slopes, found, ranges)
-        | {"status": status}
-        | ({} if steady else {"reason": reason}),
+        thermal=_record(scene, search, found, ranges) | {"status": status} | ({} if steady else {"reason": reason}),
         notes=[*_notes(scene, found, ranges), *(hot.notes or [])] if hot.is_equilibrium else None,
         rows=hot.rows if steady else (),
         scene=scene.model_dump(mode="json"),
@@ -141,26 +132,28 @@ def ceiling_verdict(scene: SingleRowScene, nodes: dict[str, float]) -> tuple[str
 
 def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
     """Ranges of steady temperatures over the documented inputs of the balance, with the heat linear in the temperatures."""
-    assert scene.thermal is not None and scene.lubricant is not None
-    found: Heat = state.run
-    factors = factors_of(scene.thermal, scene.lubricant.oil_flow_l_min is not None, ())
-    heat_slopes = matrix(found.conductances) @ slopes
-    return input_ranges(factors, found.conductances, found.boundaries, state.temperatures, found.heat, heat_slopes)
+
+    def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
+        changed = scene.model_copy(update={"thermal": thermal})
+        return {"radial_um": 1e6 * clearance_of(row_of(at_temperatures(changed, Temperatures(*nodes.tolist()))).row)[0]}
+
+    about = state.model.with_image_slopes(slopes)
+    return input_ranges(scene, about, lambda share: term_shares(scene, share), clearances, {})
 
 
-def _record(scene: SingleRowScene, search: Search, slopes: Array, found: Heat, ranges: Ranges | None) -> dict[str, Any]:
+def _record(scene: SingleRowScene, search: Search, found: Heat, ranges: Ranges | None) -> dict[str, Any]:
     inner, outer = found.scene.operation.speeds
     speed = abs(inner - outer)
     return {
         "status": "",
-        "gain": gain(slopes),
+        "gain": gain(search.slopes),
         "heat_W": dict(zip(NODES, found.heat.tolist(), strict=True)),
         **_geometry(scene, found),
         "friction_W": {"rolling": speed * found.moments.rolling, "sliding": speed * found.moments.sliding},
         "friction_loads_N": found.loads._asdict(),
         "carried_off_W": carried_off(found.conductances, found.boundaries, search.last.image),
         "conductances_W_K": found.conductances._asdict(),
-        "input_range": None if ranges is None else ranges.as_dict(),
+        **({"ranges": None} if ranges is None else ranges.as_dict()),
         "path_C": [dict(zip(NODES, state.temperatures.tolist(), strict=True)) for state in search.states],
         "path_heat_W": [float(state.run.heat.sum()) for state in search.states],
         "path_clearance_um": [1e6 * clearance_of(state.run.model.row)[0] for state in search.states],

@@ -8,9 +8,20 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from rbdyn.base.faults import Consistent, InputError, Name, NonNegative, assignment_faults, read_toml, refuse, validated
+from rbdyn.base.faults import (
+    Consistent,
+    InputError,
+    Name,
+    NonNegative,
+    assignment_faults,
+    key_path,
+    read_toml,
+    refuse,
+    validated,
+)
 from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 
 MOST_POINTS = 12
@@ -81,6 +92,7 @@ def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[
     for point in points:
         try:
             scenes.append(scene.overridden(point.set))
+            refuse(first_guess_faults(scenes[-1], {".".join(key_path(text) or ()) for text in point.set}))
         except InputError as error:
             faults += [f"{source}: duty {point.name!r}: {fault.removeprefix('scene: ')}" for fault in error.faults]
     refuse(faults)

@@ -4,7 +4,7 @@ The balance itself is in ``rbdyn.thermal``. A scene at temperatures has no balan
 temperatures, and its films have those of their surfaces.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedRings
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
+    from rbdyn.scene.ball import BallScene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
 COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
@@ -25,6 +26,8 @@ COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
 PART_TEMPERATURES = tuple(
     f"{part}_temperature_C" for part in ("inner_ring", "outer_ring", "roller", "cage", "shaft", "housing")
 )
+# Key that is a first guess of the balance.
+FIRST_GUESS = "lubricant.temperature_C"
 RING_TEMPERATURES = "inner_ring_temperature_C", "outer_ring_temperature_C"
 # Temperature at which ISO 15312 rates a bearing without a flow [C], and the usual rise of a flow of oil [K]: first guesses.
 RATED_C, USUAL_RISE = 70.0, 20.0
@@ -51,8 +54,17 @@ class Thermal(Strict):
     """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
     Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
-    """Factor on the heat that housing and shaft carry off, 0.016 W/mm2 of the seats at 50 K above ambient as in ISO 15312. A
+    """Factor on the heat that the housing carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
     plummer block in moving air carries off more, a hot housing nothing (0)."""
+    shaft_factor: NonNegative = 0.5
+    """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
+    surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
+    sump_factor: NonNegative = 1.0
+    """Factor on the heat that the oil of a bath loses through the walls of the housing that it wets, 150 W/(m2 K) over the seat of the
+    outer ring. It counts with lubricant.supply = "bath" only."""
+    film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
+    """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
+    a contact in 1e-5 s, and heat is conducted to the walls in 1e-7 s, so little stays in the oil."""
     contact_factor: Positive = 1.0
     """Factor on the heat conducted through the race contacts, which follows from conductivity and heat capacity of the parts."""
     oil_share: Share = 1.0
@@ -142,6 +154,21 @@ def with_first_guess(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**tables, "lubricant": {**oil, "temperature_C": guess}}
 
 
+def first_guess_faults(scene: "Scene | BallScene", keys: Iterable[str]) -> list[str]:
+    """A sentence if the ``keys`` that vary have the oil's temperature, which changes nothing where [thermal] computes it.
+
+    A stated viscosity holds at that temperature, so it counts there.
+    """
+    lubricant = scene.lubricant
+    computed = scene.thermal is not None and lubricant is not None and lubricant.viscosity_mPas is None
+    if not computed or FIRST_GUESS not in keys:
+        return []
+    return [
+        f"{FIRST_GUESS}: is a first guess alone, since the heat balance of [thermal] computes it; vary thermal.ambient_C or "
+        "lubricant.oil_inlet_temperature_C"
+    ]
+
+
 def thermal_faults(
     thermal: Thermal | None, lubricant: Lubricant, mounting: Mounting | None, designation: str | None
 ) -> Iterator[str]:
@@ -174,8 +201,12 @@ def thermal_faults(
         )
     if flow is not None and inlet is None:
         yield "lubricant.oil_inlet_temperature_C: missing; [thermal] with lubricant.oil_flow_l_min needs it"
-    if flow is None and thermal.housing_factor == 0.0:
-        yield "thermal.housing_factor = 0: leaves the heat no way out of a bearing without lubricant.oil_flow_l_min; raise it"
+    bath = lubricant.supply == "bath" and thermal.sump_factor > 0.0
+    if flow is None and not bath and thermal.housing_factor == thermal.shaft_factor == 0.0:
+        yield (
+            "thermal.housing_factor = 0 and thermal.shaft_factor = 0: leave the heat no way out of a bearing without "
+            "lubricant.oil_flow_l_min; raise one of them"
+        )
     start, name = inlet_temperature(thermal, lubricant), "lubricant.oil_inlet_temperature_C"
     if flow is None or inlet is None:
         name = "thermal.ambient_C"

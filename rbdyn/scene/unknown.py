@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, refuse
 from rbdyn.scene import Scene
+from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
 # Value of a key without an entry that follows from other keys, in its own unit.
@@ -70,6 +71,7 @@ def inputs_of(
         for key in uncertain.estimated
         if key not in documented_keys
     ]
+    faults += [f"uncertain: {fault}" for fault in first_guess_faults(scene, keys)]
     refuse(f"{source}: {fault}" for fault in faults)
     inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
@@ -224,7 +226,7 @@ def value_of(scene: Scene | None, key: str) -> Any:
     return DERIVED[key](scene) if scene and value is None and key in DERIVED else value
 
 
-def plain_values(scene: Scene) -> dict[str, Any]:
+def plain_values(scene: BaseModel) -> dict[str, Any]:
     """Value by dotted key of all tables; "left out" for a key without a value.
 
     Keys that a scene saves only where they differ from None are not among them.

@@ -18,6 +18,8 @@ from rbdyn.properties.materials import Material, Oil
 OIL_SPEED_SHARE = 1.0 / 3.0
 # Local coefficient of a laminar boundary layer on a flat plate (Pohlhausen). Harris prints 0.0332 (from memory).
 FLAT_PLATE = 0.332
+# Coefficient of the walls that the oil of a bath wets beside the seat, over the area of the seat [W/(m^2 K)] (assumed, 100 to 300).
+SUMP = 150.0
 
 
 def oil_flow(volume_flow: float, oil: Oil, share: float = 1.0) -> float:
@@ -138,6 +140,14 @@ def race_contact(
     bodies = half_space_contact(width, contact.length, contact.entrainment_speed, ring.effusivity, roller.effusivity)
     resistance = thickness / (2.0 * width * contact.length * oil.conductivity) + 1.0 / bodies
     return float(np.where(loaded, 1.0 / resistance, 0.0).sum(axis=1).mean())
+
+
+def sump(outside: float, width: float) -> float:
+    """Conductance of the oil of a bath to the surroundings by the walls that it wets [W/K], over pi D B of the seat, sizes in m.
+
+    The heat of ISO 15312 is that through the seats alone.
+    """
+    return SUMP * math.pi * outside * width
 
 
 def seats(bore: float, outside: float, width: float) -> tuple[float, float]:

@@ -43,8 +43,6 @@ TERMS = (
     "support_damping",
     "spin_windage",
 )
-# Share of the heat of a film that its oil carries away, 0 to 1 (assumed).
-FILM_TO_OIL = 0.5
 
 
 class Effusivities(NamedTuple):
@@ -60,9 +58,7 @@ def heat_partition(first: float, second: float) -> float:
     return first / (first + second)
 
 
-def shares(
-    effusivities: Effusivities, guidance: Literal["outer", "inner", "roller"], film_to_oil: float = FILM_TO_OIL
-) -> Array:
+def shares(effusivities: Effusivities, guidance: Literal["outer", "inner", "roller"], film_to_oil: float) -> Array:
     """Share of each node of ``NODES`` in the heat of each term of ``TERMS``, (terms, nodes).
 
     Each row sums to 1, that of support damping to 0. ``guidance``: ring that guides the cage; under guidance by the rollers the

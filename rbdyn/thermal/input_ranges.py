@@ -1,112 +1,138 @@
-"""Ranges of steady temperatures over the unknown inputs of a heat balance: surfaces, housing, contacts, share of the oil.
+"""Ranges of steady temperatures over the unknown inputs of a heat balance: conductances, shares of the heat, level of the loss.
 
-These inputs scale conductances, so each set of them is one linear system, with the heat linear in the temperatures. Their laws are
-the documented ones (rbdyn/scene/unknown_inputs.toml). A key that the scene states is exact unless [uncertain] names it as
-estimated, as for ``doe uncertainty``, which also varies all other inputs, by simulation.
+Each set of these inputs is one balance of the model about the steady state (``losses``). Their laws are the documented ones
+(rbdyn/scene/unknown_inputs.toml). A key that the scene states is exact unless [uncertain] names it as estimated, as for ``doe
+uncertainty``, which also varies all other inputs, by simulation.
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.thermal.fixed_point import HOTTEST
-from rbdyn.thermal.network import NODES, Boundaries, Conductances, matrix, source
+from rbdyn.thermal.heat import TERMS
+from rbdyn.thermal.losses import HOTTEST, HeatModel
+from rbdyn.thermal.network import INNER, NODES, OUTER
 
 if TYPE_CHECKING:
+    from rbdyn.scene import Scene
+    from rbdyn.scene.ball import SingleRowScene
     from rbdyn.scene.thermal import Thermal
 
-# Keys of [thermal] that scale conductances, and the conductances that each scales.
+# Keys of [thermal] that scale conductances, and the conductances that each scales; all keys that vary.
 SCALED = {
     "surface_factor": ("oil_outer", "oil_inner", "oil_rollers"),
-    "housing_factor": ("outer_ambient", "inner_ambient"),
+    "housing_factor": ("outer_ambient",),
+    "shaft_factor": ("inner_ambient",),
+    "sump_factor": ("sump",),
     "contact_factor": ("outer_rollers", "inner_rollers"),
     "oil_share": ("flow",),
 }
-# Input sets, a power of two, their seed, and the quantiles that a range holds.
-SETS, SEED, QUANTILES = 256, 1, (0.05, 0.95)
+OTHER = ("film_share_to_oil", "shaft_lag", "cage_offset_K")
+# Input sets, a power of two, their seed, and the quantiles that a range states.
+SETS, SEED, QUANTILES = 256, 1, (0.05, 0.5, 0.95)
+DIFFERENCE = "inner_minus_outer_K"
 
 
 class Ranges(NamedTuple):
-    """Range of each node's temperature [C], the inputs that vary, and the share of input sets without a steady state."""
+    """5 %, 50 % and 95 % of each figure by its name, the inputs that vary, and the share of input sets without a steady state."""
 
-    temperatures: dict[str, tuple[float, float]]
+    figures: dict[str, tuple[float, float, float]]
     inputs: tuple[str, ...]
     unsteady: float
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
+        """Keys of the JSON of a balance."""
         return {
-            "temperatures_C": {node: list(ends) for node, ends in self.temperatures.items()},
+            "ranges": {name: list(quantiles) for name, quantiles in self.figures.items()},
             "inputs": list(self.inputs),
             "share_without_steady_state": self.unsteady,
         }
 
 
+# By key of a scene, the losses (terms,) at a value of it over those at its own.
+Levels = Mapping[str, Callable[[float], Array]]
+# Clearances in operation [um] by name, at temperatures of the nodes (4,) [C] and with keys of [thermal]. Raises ValueError.
+Clearances = Callable[[Array, "Thermal"], Mapping[str, float]]
+# Shares of the nodes in the losses (terms, 4) by the share of a film's heat that its oil takes.
+Shares = Callable[[float], Array]
+
+
 def input_ranges(
-    factors: Mapping[str, Array],
-    conductances: Conductances,
-    boundaries: Boundaries,
-    temperatures: Array,
-    heat: Array,
-    heat_slopes: Array,
+    scene: "Scene | SingleRowScene",
+    model: HeatModel,
+    shares: Shares,
+    clearances: Clearances,
+    levels: Levels,
+    estimated: Collection[str] = (),
 ) -> Ranges:
-    """Ranges of the temperatures about a steady state, 5 to 95 % of input sets.
+    """Ranges about a steady state: of the nodes [C], of the inner ring over the outer one [K], and of clearances [um].
 
-    ``factors``: as of ``factors_of``. ``temperatures`` (4,) [C] and ``heat`` (4,) [W] of the state; ``heat_slopes`` dQ/dT (4, 4) [W/K]. Sets whose temperatures run
-    away, or beyond what any oil bears, count as without a steady state and as the hottest.
+    ``estimated``: keys of the scene whose stated values are estimates. Sets whose temperatures run away, or beyond what any oil
+    bears, count as without a steady state and as the hottest; their clearances are left out.
     """
-    constant_heat = heat - heat_slopes @ temperatures
-    rows = []
-    for row in range(SETS if factors else 1):
-        varied = _scaled(conductances, {key: values[row] for key, values in factors.items()})
-        whole = matrix(varied) - heat_slopes
-        stable = np.linalg.eigvals(np.linalg.solve(matrix(varied), heat_slopes)).real.max() < 1.0
-        solution = (
-            np.linalg.solve(whole, constant_heat + source(varied, boundaries))
-            if stable
-            else np.full(len(NODES), HOTTEST)
-        )
-        rows.append(np.minimum(solution, HOTTEST))
+    thermal = scene.thermal
+    assert thermal is not None
+    sets = input_sets(scene, levels, estimated)
+    dry, wet = shares(0.0), shares(1.0)
+    rows, others = [], list[Mapping[str, float]]()
+    for place in range(SETS if sets else 1):
+        values = {key: float(column[place]) for key, column in sets.items()}
+        own = {key.removeprefix("thermal."): value for key, value in values.items() if key not in levels}
+        changed = thermal.model_copy(update=own)
+        ratios = {
+            name: own[key] / getattr(thermal, key) for key, names in SCALED.items() if key in own for name in names
+        }
+        level = np.ones(len(TERMS))
+        for key in sorted(set(levels) & set(values)):
+            level *= levels[key](values[key])
+        varied = model.varied(ratios, level, dry + changed.film_share_to_oil * (wet - dry))
+        nodes = varied.balanced()
+        if not varied.is_stable(nodes):
+            rows.append(np.full(len(NODES), HOTTEST))
+            continue
+        rows.append(nodes)
+        others.append({DIFFERENCE: float(nodes[INNER] - nodes[OUTER]), **clearances(nodes, changed)})
     table = np.array(rows)
-    unsteady = float(np.mean(table.max(axis=1) >= HOTTEST))
-    ends = np.quantile(table, QUANTILES, axis=0).T
-    ranges = {node: (float(low), float(high)) for node, (low, high) in zip(NODES, ends, strict=True)}
-    return Ranges(ranges, tuple(f"thermal.{key}" for key in factors), unsteady)
+    columns = dict(zip(NODES, table.T, strict=True))
+    columns |= {name: np.array([other[name] for other in others]) for name in (others or [{}])[0]}
+    figures = {name: tuple(np.quantile(column, QUANTILES).tolist()) for name, column in columns.items()}
+    return Ranges(figures, tuple(sets), float(np.mean(table.max(axis=1) >= HOTTEST)))
 
 
-def _scaled(conductances: Conductances, ratios: Mapping[str, float]) -> Conductances:
-    """Conductances times the ratio of each input to its value in the scene."""
-    names = {name: ratio for key, ratio in ratios.items() for name in SCALED[key]}
-    return conductances._replace(**{name: ratio * getattr(conductances, name) for name, ratio in names.items()})
-
-
-def factors_of(thermal: "Thermal", flows: bool, estimated: Collection[str]) -> dict[str, Array]:
-    """Ratio of each unknown input to its value in the scene, (SETS,), by its key in [thermal].
-
-    ``flows``: whether oil flows to the bearing; ``estimated``: keys of a scene whose stated values are estimates.
-    """
+def input_sets(
+    scene: "Scene | SingleRowScene", levels: Collection[str], estimated: Collection[str] = ()
+) -> dict[str, Array]:
+    """Values of each unknown input of the balance, (SETS,), by its key; ``levels``: keys that change losses."""
     from scipy.stats import qmc
 
     from rbdyn.scene.uncertain import documented
+    from rbdyn.scene.unknown import plain_values
 
-    exact = {f"thermal.{key}" for key in thermal.model_fields_set} - set(estimated)
-    laws = {
-        key: entry
-        for entry in documented()
-        for key in (entry.key.removeprefix("thermal."),)
-        if entry.key.startswith("thermal.") and key in SCALED and entry.key not in exact and getattr(thermal, key) > 0.0
+    thermal, present = scene.thermal, plain_values(scene)
+    assert thermal is not None
+    stated = {f"{table}.{key}" for table in ("lubricant", "model") for key in scene._tables.get(table, {})}
+    stated |= {f"thermal.{key}" for key in thermal.model_fields_set}
+    # A conductance of zero stays so.
+    keys = {
+        *levels,
+        *(f"thermal.{key}" for key in OTHER),
+        *(f"thermal.{key}" for key in SCALED if getattr(thermal, key)),
     }
-    if not flows:
-        laws.pop("oil_share", None)
+    laws = {
+        entry.key: entry
+        for entry in documented()
+        if entry.key in keys
+        and (entry.key in estimated or (entry.key not in stated and not entry.on_request))
+        and entry.counts(present)
+    }
     if not laws:
         return {}
     sample = qmc.Sobol(len(laws), seed=SEED).random_base2(int(math.log2(SETS)))
-    factors = {}
+    sets = {}
     for (key, entry), share in zip(sorted(laws.items()), sample.T, strict=True):
         low, high = float(entry.low or 0.0), float(entry.high or 0.0)
-        value = low * (high / low) ** share if entry.law == "log_uniform" else low + (high - low) * share
-        factors[key] = value / getattr(thermal, key)
-    return factors
+        sets[key] = low * (high / low) ** share if entry.law == "log_uniform" else low + (high - low) * share
+    return sets

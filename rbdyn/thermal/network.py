@@ -21,6 +21,7 @@ class Conductances(NamedTuple):
 
     ``flow``: heat capacity of the oil stream through the cavity. ``oil_outer``, ``oil_inner``, ``oil_rollers``: surfaces to the oil.
     ``outer_rollers``, ``inner_rollers``: race contacts. ``outer_ambient``, ``inner_ambient``: through housing and shaft.
+    ``sump``: from the oil of a bath through the walls of the housing, beside the seat.
     """
 
     flow: float
@@ -31,6 +32,7 @@ class Conductances(NamedTuple):
     inner_rollers: float
     outer_ambient: float
     inner_ambient: float
+    sump: float = 0.0
 
 
 class Boundaries(NamedTuple):
@@ -82,10 +84,11 @@ def temperatures(conductances: Conductances, boundaries: Boundaries, heat: Array
 
 
 def carried_off(conductances: Conductances, boundaries: Boundaries, temperatures: Array) -> dict[str, float]:
-    """Heat that leaves by "oil flow", "housing" and "shaft" [W]; in steady state their sum is the heat of all nodes."""
+    """Heat that leaves by "oil flow", "sump", "housing" and "shaft" [W]; in steady state their sum is the heat of all nodes."""
     oil, outer, inner, _ = temperatures
     return {
         "oil flow": float(conductances.flow * (oil - boundaries.inlet)),
+        "sump": float(conductances.sump * (oil - boundaries.ambient)),
         "housing": float(conductances.outer_ambient * (outer - boundaries.ambient)),
         "shaft": float(conductances.inner_ambient * (inner - boundaries.ambient)),
     }
@@ -109,6 +112,7 @@ def _parts(conductances: Conductances, boundaries: Boundaries) -> tuple[Array, A
     }
     for (one, other), value in pairs.items():
         couplings[one, other] = couplings[other, one] = value
-    ways_out = np.array([g.flow, g.outer_ambient, g.inner_ambient, 0.0])
-    beyond = np.array([boundaries.inlet, boundaries.ambient, boundaries.ambient, 0.0])
-    return couplings, ways_out, ways_out * beyond
+    ways_out = np.array([g.flow + g.sump, g.outer_ambient, g.inner_ambient, 0.0])
+    inflow = boundaries.ambient * ways_out
+    inflow[OIL] += g.flow * (boundaries.inlet - boundaries.ambient)
+    return couplings, ways_out, inflow

@@ -90,6 +90,46 @@ def test_simulate_refuses_a_cage_that_seizes_when_cold(command, scene):
     assert done.returncode == 2 and "the cage seizes" in done.stderr and "Traceback" not in done.stderr
 
 
+def test_a_first_guess_is_no_point_of_a_duty(command, scene, tmp_path):
+    """Command line: a duty that sets nothing but the first guess of the oil's temperature is bad input, for it has one point."""
+    (tmp_path / "duty.toml").write_text(
+        '[[duty]]\nname = "cold"\nshare = 1.0\nset = ["lubricant.temperature_C=20.0"]\n', encoding="utf-8"
+    )
+    done = command("map", scene, "--speed", "24000", "--load", "1300", "--duty", tmp_path / "duty.toml")
+    assert done.returncode == 2 and "duty 'cold': lubricant.temperature_C: is a first guess alone" in done.stderr
+
+
+def test_map_fails_where_the_oil_is_too_hot(command, scene):
+    """Command line: a cell above the oil's ceiling has no figures but its cause, and the command ends with code 1."""
+    low = ["--set", "thermal.oil_ceiling_C=87", "--set", "numerics.companion=false"]
+    done = command("map", scene, "--speed", "3000,24000", "--load", "1300", "--json", *low)
+    cool, hot = json.loads(done.stdout)["points"]
+    assert done.returncode == 1 and cool["status"] == "ok"
+    assert "too hot: the oil reaches" in hot["status"] and "power_loss_W" not in hot
+
+
+def test_map_marks_a_point_that_adds_heat_at_its_temperatures(scene):
+    """Command line: a point of a duty that adds the balance to a scene without it is computed with it."""
+    from pathlib import Path
+
+    from rbdyn.cli.duty import map_duty
+    from rbdyn.scene import Scene
+
+    hot = scene.read_text(encoding="utf-8")
+    plain = hot.replace(
+        "oil_flow_l_min = 1.0\noil_inlet_temperature_C = 80.0", 'temperature_C = 100.0\nsupply = "bath"'
+    )
+    scene.write_text(plain.replace("[thermal]", ""), encoding="utf-8")
+    duty = Path(scene).with_name("duty.toml")
+    points = [
+        f'[[duty]]\nname = "{name}"\nshare = 0.5\nset = {keys}\n'
+        for name, keys in (("off", "[]"), ("on", '["thermal.ambient_C=20.0"]'))
+    ]
+    duty.write_text("\n".join(points), encoding="utf-8")
+    off, on = map_duty(Scene.load(scene), duty, (24000.0,), (1300.0,)).scenes
+    assert off.mounting.inner_ring_temperature_C is None and on.mounting.inner_ring_temperature_C > 60.0
+
+
 def test_map_has_points_at_their_own_temperatures(command, scene):
     """Command line: a map of a heat balance runs each point at its steady temperatures, and a hot one fails with its reason."""
     grid = ["--speed", "12000,24000", "--load", "1300"]

@@ -52,10 +52,8 @@ def hot_study(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
 def hot_result(scene: Scene, status: str = "steady", reason: str = ""):
     """A result in no time, with a heat balance."""
     figures = {node: Quantity(value, 0.1, 0.05, 10.0, 9) for node, value in WARM.items()}
-    ranges = {node: [value - 5.0, value + 15.0] for node, value in WARM.items()}
-    record = {"status": status, "input_range": {"temperatures_C": ranges}, "path_C": [WARM]} | (
-        {"reason": reason} if reason else {}
-    )
+    ranges = {node: [value - 5.0, value, value + 15.0] for node, value in WARM.items()}
+    record = {"status": status, "ranges": ranges, "path_C": [WARM]} | ({"reason": reason} if reason else {})
     own = "ok" if status == "steady" else status
     return replace(instant_result(scene), status=own, temperatures_C=figures, thermal=record)
 
@@ -101,7 +99,7 @@ def test_unit_temperatures_are_figures(tmp_path):
     assert errors[0, 0] == 0.1 and samples.tolist() == [[10, 10, 10], [0, 10, 0]]
 
 
-@pytest.mark.parametrize("status", ["no steady state", "seizure", "too hot"])
+@pytest.mark.parametrize("status", ["undecided", "no steady state", "seizure", "too hot"])
 def test_unit_a_failed_balance_is_a_failed_run(status, monkeypatch, tmp_path):
     """Unit: its cause is status and reason; the store keeps it and it does not run again."""
     scene, calls = Scene.load(HOT), []
@@ -126,7 +124,7 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     study = Study.load(hot_study(tmp_path))
     scene = clearance.confirmation_scene(study, study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
-    assert confirmed.values[-1] == 93.0 and confirmed.temperature_ranges["inner"] == [88.0, 108.0]
+    assert confirmed.values[-1] == 93.0 and confirmed.temperature_ranges["inner"] == [88.0, 93.0, 108.0]
     hot = confirmed.hot[EVERYWHERE]
     assert hot.thermal is None and hot.mounting.inner_ring_temperature_C == 93.0 and hot.lubricant.temperature_C == 92.7
     found = operating_clearances(study, {"baseline": hot, "pick": hot}).operating
@@ -134,11 +132,43 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     assert found["pocket_clearance_mm"]["pick"] > 0.3
 
 
+def test_unit_a_first_guess_cannot_vary(tmp_path):
+    """Unit: the oil's temperature, which the balance computes, is neither a factor, nor an unknown input, nor set by a duty's point."""
+    fault = "lubricant.temperature_C: is a first guess alone, since the heat balance of .thermal. computes it"
+    path = hot_study(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    (key,) = [line for line in text.splitlines() if line.startswith('key = "bearing.radial_clearance_mm"')]
+    path.write_text(text.replace(key, 'key = "lubricant.temperature_C"'), encoding="utf-8")
+    study = Study.load(path)
+    with pytest.raises(InputError, match=f"factor.key = {fault}"):
+        clearance.confirmation_scene(study, study.baseline)
+    scene = tmp_path / "unknown.toml"
+    law = '\n[uncertain]\n"lubricant.temperature_C" = {law = "uniform", low = 80.0, high = 90.0}\n'
+    scene.write_text(HOT.read_text("utf-8") + law, encoding="utf-8")
+    with pytest.raises(InputError, match=f"uncertain: {fault}"):
+        read_case(scene, ["power_loss_W"], [])
+    (tmp_path / "rig.csv").write_text(
+        "lubricant.temperature_C,outer_temperature_C,outer_temperature_C_sd\n80,78,0.3\n90,89,0.3\n95,101,0.3\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=f"column {fault}"):
+        read_question(HOT, tmp_path / "rig.csv", (), ())
+
+
 def test_unit_unknown_inputs_of_a_heat_balance():
     """Unit: its weak conductances vary; temperatures that it computes do not; a viscosity that varies has its temperature."""
     case = read_case(HOT, ["power_loss_W"], [])
     keys = {one.key for one in case.every}
-    factors = {"surface_factor", "housing_factor", "contact_factor", "oil_share", "shaft_lag", "cage_offset_K"}
+    factors = {
+        "surface_factor",
+        "housing_factor",
+        "shaft_factor",
+        "film_share_to_oil",
+        "contact_factor",
+        "oil_share",
+        "shaft_lag",
+        "cage_offset_K",
+    }
     assert {f"thermal.{key}" for key in factors} | {"lubricant.oil_fraction_factor", "lubricant.viscosity_mPas"} <= keys
     assert not any("temperature_C" in key for key in keys) and "lubricant.oil_fraction" not in keys
     assert [len(stage.titles) for stage in uncertainty_stages(HOT, [], 16)][:2] == [1, 1]

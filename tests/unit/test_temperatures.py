@@ -16,7 +16,6 @@ from rbdyn.result import SimulationResult
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
 from rbdyn.scene.unknown import documented_of
-from rbdyn.thermal.fixed_point import steady_state
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = {
@@ -130,7 +129,7 @@ def test_unit_more_flow_and_more_cooling_are_cooler(hot):
     fraction = {"oil_fraction_factor": 2.0**-0.37}  # of twice the flow, so that drag stays as it is
     for cooler in (
         nodes(lubricant={**FLOW, "oil_flow_l_min": 2.0, **fraction}),
-        nodes(thermal={"housing_factor": 5.0}),
+        nodes(thermal={"housing_factor": 5.0, "shaft_factor": 2.5}),
         nodes(lubricant={**FLOW, "oil_inlet_temperature_C": 70.0}),
     ):
         assert all(cooler[node] < usual[node] - 0.5 for node in usual)
@@ -182,8 +181,8 @@ BATH = {"oil": "MIL-L-7808", "supply": "bath"}
         ({"lubricant": {"oil": "MIL-L-7808", "supply": "jet"}}, r"\[thermal\]: needs lubricant.oil_flow_l_min with"),
         ({"lubricant": {"oil": "MIL-L-7808", "oil_flow_l_min": 1.0}}, "lubricant.oil_inlet_temperature_C: missing"),
         (
-            {"lubricant": BATH, "thermal": {"housing_factor": 0.0}},
-            "thermal.housing_factor = 0: leaves the heat no way out",
+            {"lubricant": BATH, "thermal": {"housing_factor": 0.0, "shaft_factor": 0.0, "sump_factor": 0.0}},
+            "thermal.housing_factor = 0 and thermal.shaft_factor = 0: leave the heat no way out",
         ),
         (
             {"thermal": {"oil_ceiling_C": 80.0}},
@@ -286,7 +285,14 @@ def test_unit_unknown_inputs_of_a_balance():
     keys = {entry.key for entry in documented_of(_scene())}
     weak = {
         f"thermal.{name}"
-        for name in ("surface_factor", "housing_factor", "contact_factor", "oil_share", "cage_offset_K")
+        for name in (
+            "surface_factor",
+            "housing_factor",
+            "shaft_factor",
+            "film_share_to_oil",
+            "contact_factor",
+            "oil_share",
+        )
     }
     assert weak | {"lubricant.oil_fraction_factor"} <= keys
     assert not {key for key in keys if key.startswith("mounting.") and key.endswith("temperature_C")}
@@ -308,13 +314,21 @@ def test_unit_a_flow_gives_the_oil_fraction():
 
 def test_unit_ranges_hold_what_inputs_leave_open(hot):
     """Unit: the range of each temperature holds its value, and a stated factor is exact and narrows it."""
-    ranges = hot.thermal["input_range"]["temperatures_C"]
-    for node, figure in hot.temperatures_C.items():
-        low, high = ranges[node]
-        assert low <= figure.value <= high and high - low > 5.0
-    exact = {"surface_factor": 1.0, "housing_factor": 1.0, "contact_factor": 1.0, "oil_share": 1.0}
-    stated = simulate(_scene(thermal=exact), workers=1, notice=None).thermal["input_range"]
-    assert stated["inputs"] == [] and all(high == low for low, high in stated["temperatures_C"].values())
+    ranges, state = hot.thermal["ranges"], {node: figure.value for node, figure in hot.temperatures_C.items()}
+    assert list(ranges) == [*state, "inner_minus_outer_K", "radial_um", "guide_um", "pocket_um"]
+    for node, value in state.items():
+        assert ranges[node][0] <= value <= ranges[node][-1] and ranges[node][-1] - ranges[node][0] > 5.0
+    for play in ("guide", "pocket"):
+        assert ranges[f"{play}_um"][0] < hot.clearance_um[play]["operating"] < ranges[f"{play}_um"][-1]
+    keys = ("surface_factor", "housing_factor", "shaft_factor", "contact_factor", "oil_share")
+    exact = {**dict.fromkeys(keys, 1.0), "film_share_to_oil": 0.3, "shaft_lag": 0.125, "cage_offset_K": 0.0}
+    levels = {"model": {"rolling_resistance_factor": 1.0}, "lubricant": {**FLOW, "oil_fraction_factor": 1.0}}
+    alone = simulate(_scene(thermal=exact, **levels), workers=1, notice=None)
+    stated = alone.thermal
+    assert stated["inputs"] == [] and all(low == high for low, _, high in stated["ranges"].values())
+    for node, figure in alone.temperatures_C.items():
+        assert stated["ranges"][node][1] == pytest.approx(figure.value, abs=1e-6)
+    assert stated["ranges"]["guide_um"][1] == pytest.approx(alone.clearance_um["guide"]["operating"], abs=0.05)
 
 
 def test_unit_a_scene_without_a_balance_loads_nothing_of_it():
@@ -339,24 +353,52 @@ def test_unit_errors_of_temperatures_are_those_of_the_heat(hot):
     assert np.isfinite([figure.error for figure in hot.temperatures_C.values()]).all()
 
 
-def test_unit_no_note_takes_a_computed_temperature_for_kelvin():
-    """Unit: oil that its own heat drives above 220 C is no slip of the unit."""
-    result = simulate(
-        _scene(lubricant={"oil_flow_l_min": 1e-3}, thermal={"housing_factor": 0.0}), workers=1, notice=None
-    )
-    assert result.status == "no steady state" and not any(" K are meant" in note for note in result.notes)
+def test_unit_heat_without_a_way_out_is_too_hot():
+    """Unit: constant heat that would need more than 350 C has no gain of one, so it is too hot; no note takes 350 C for kelvin."""
+    ways = {"housing_factor": 0.0, "shaft_factor": 0.0}
+    result = simulate(_scene(lubricant={"oil_flow_l_min": 1e-3}, thermal=ways), workers=1, notice=None)
+    assert result.status == "too hot" and "beyond 350 C" in result.thermal["reason"] and result.thermal["gain"] < 1.0
+    assert not any(" K are meant" in note for note in result.notes)
 
 
-def test_unit_a_step_that_no_run_followed_counts_as_error(monkeypatch):
-    """Unit: where the last run is still off its balance, the whole step is in the numerical error, and a note says so."""
+def test_unit_a_run_that_does_not_close_is_undecided(monkeypatch):
+    """Unit: where no run of full length closes the balance, the temperatures are undecided, without errors, and the reason says so."""
     from rbdyn.dynamics import temperatures
 
     monkeypatch.setattr(temperatures, "MOST_WHOLE_RUNS", 1)
-    monkeypatch.setattr(temperatures, "TOLERANCE", 1e-9)
-    monkeypatch.setattr(temperatures, "steady_state", lambda *arguments: steady_state(*arguments, tolerance=30.0))
-    result = simulate(_scene(lubricant={**FLOW, "temperature_C": 110.0}), workers=1, notice=None)
-    (note,) = [note for note in result.notes if "the last step" in note]
-    state = result.thermal["path_C"][-1]
-    for node, figure in result.temperatures_C.items():
-        assert figure.numerical_error >= abs(figure.value - state[node]) * (1.0 - 1e-9) - 1e-9
-    assert "numerics.turns" in note
+    monkeypatch.setattr(temperatures, "corrected", lambda state, slopes: state.temperatures + 5.0)
+    result = simulate(_scene(), workers=1, notice=None)
+    assert result.status == "undecided" == result.thermal["status"] and result.thermal["ranges"] is None
+    assert "move by 5 K" in result.thermal["reason"] and "numerics.turns" in result.thermal["reason"]
+    assert all(figure.statistical_error is None for figure in result.temperatures_C.values())
+
+
+@pytest.mark.parametrize(
+    ("oil", "inlet"), [("MIL-L-7808", -60.0), ("MIL-L-23699", -30.0), ("ISO VG 32", -20.0), ("ISO VG 460", 0.0)]
+)
+def test_unit_a_cold_start_is_steady(oil, inlet):
+    """Unit: cold oil has one stable state, warmer than its inlet; the search finds it, whatever the first guess, with a gain below one."""
+    changes = {"lubricant": {**FLOW, "oil": oil, "oil_inlet_temperature_C": inlet}, "thermal": {"ambient_C": inlet}}
+    numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
+    found = simulate(_scene(**changes, numerics=numerics), workers=1, notice=None)
+    assert found.status == "ok" and found.thermal["gain"] < 0.7
+    assert min(figure.value - (figure.error or 0.0) for figure in found.temperatures_C.values()) > inlet
+    assert all(min(state.values()) >= inlet - 1e-9 for state in found.thermal["path_C"][1:])
+    heat = sum(found.thermal["heat_W"].values())
+    assert sum(found.thermal["carried_off_W"].values()) == pytest.approx(heat, rel=1e-9)
+
+
+def test_unit_ways_out_of_a_bath():
+    """Unit: a sump cools the oil and is one of the ways out; a shaft that carries off less warms the inner ring over the outer one."""
+
+    def nodes(**thermal: float) -> tuple[dict[str, float], dict[str, float]]:
+        tables = _tables(thermal=thermal) | {"lubricant": BATH}
+        tables["numerics"] |= {"turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
+        result = simulate(Scene.from_dict(tables), workers=1, notice=None)
+        return {node: figure.value for node, figure in result.temperatures_C.items()}, result.thermal["carried_off_W"]
+
+    with_sump, ways = nodes()
+    without, dry = nodes(sump_factor=0.0)
+    assert ways["sump"] > 0.0 == dry["sump"] and with_sump["oil"] < without["oil"] - 2.0
+    lagged, _ = nodes(shaft_factor=0.2)
+    assert lagged["inner"] - lagged["outer"] > with_sump["inner"] - with_sump["outer"] + 1.0

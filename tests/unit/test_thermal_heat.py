@@ -50,7 +50,7 @@ def test_unit_all_power_becomes_heat(effusivities, guidance, film_to_oil):
 def test_unit_heat_by_term():
     """Unit: like steels share the heat of traction evenly, land heat reaches the guiding ring, drag the oil."""
     steel = STEEL.effusivity
-    guided = {side: shares(Effusivities(steel, steel, steel), side) for side in ("outer", "inner", "roller")}
+    guided = {side: shares(Effusivities(steel, steel, steel), side, 0.5) for side in ("outer", "inner", "roller")}
     row = {term: guided["outer"][TERMS.index(term)] for term in TERMS}
     assert row["outer_race_traction"] == pytest.approx([0.0, 0.5, 0.0, 0.5])
     assert row["inner_race_traction"] == pytest.approx([0.0, 0.0, 0.5, 0.5])
@@ -63,11 +63,21 @@ def test_unit_heat_by_term():
     assert guided["roller"][land] == pytest.approx([0.0, 0.0, 0.0, 1.0])
 
 
+def test_unit_share_of_the_oil_in_a_film():
+    """Unit: at 0 a film heats its walls alone, at 1 its oil alone; drag and dry friction do not depend on it; shares are linear in it."""
+    dry, half, wet = (shares(Effusivities(1.0, 2.0, 3.0), "outer", share) for share in (0.0, 0.5, 1.0))
+    film = TERMS.index("outer_rolling_resistance")
+    assert dry[film] == pytest.approx([0.0, 0.5, 0.0, 0.5]) and wet[film] == pytest.approx([1.0, 0.0, 0.0, 0.0])
+    assert half == pytest.approx(0.5 * (dry + wet))
+    for term in ("roller_drag", "pocket_friction", "outer_race_traction"):
+        assert np.array_equal(dry[TERMS.index(term)], wet[TERMS.index(term)])
+
+
 def test_unit_power_vector_and_errors():
     """Unit: heat sums to the power; the covariance of heat is that of powers between the shares; an unknown term is refused."""
     powers = {term: float(number) for number, term in enumerate(LOSSES, 1)}
     vector = power_vector(powers, {"outer": 1.0, "inner": 2.0}, windage=7.0)
-    array = shares(Effusivities(1.0, 2.0, 3.0), "inner")
+    array = shares(Effusivities(1.0, 2.0, 3.0), "inner", 0.3)
     heat = array.T @ vector
     assert heat.sum() == pytest.approx(sum(powers.values()) + 7.0 - powers["support_damping"], rel=1e-14)
     covariance = np.diag(np.arange(len(TERMS), dtype=float))

@@ -13,7 +13,7 @@ INLET_WARM = Boundaries(inlet=60.0, ambient=20.0)
 # Log-uniform conductances over nine decades, zero for those that may be missing.
 some = st.floats(-4.0, 5.0).map(lambda exponent: 10.0**exponent)
 perhaps = st.one_of(st.just(0.0), some)
-networks = st.builds(Conductances, some, some, some, some, perhaps, perhaps, perhaps, perhaps)
+networks = st.builds(Conductances, some, some, some, some, perhaps, perhaps, perhaps, perhaps, perhaps)
 
 
 def test_unit_one_node():
@@ -36,6 +36,19 @@ def test_unit_two_nodes():
     assert found == pytest.approx([at_oil, at_outer, at_oil, at_oil], rel=1e-14)
 
 
+def test_unit_sump_of_a_bath():
+    """Unit: without a sump the balance is the former one; an endless one holds the oil at the surroundings; one node has the closed form."""
+    heat = np.array([100.0, 40.0, 60.0, 80.0])
+    bath = USUAL._replace(flow=0.0)
+    assert np.array_equal(matrix(bath), matrix(bath._replace(sump=0.0)))
+    small = temperatures(bath._replace(sump=1e-9), INLET_WARM, heat)
+    assert small == pytest.approx(temperatures(bath, INLET_WARM, heat), rel=1e-9)
+    endless = temperatures(bath._replace(sump=1e12), INLET_WARM, heat)
+    assert endless[0] == pytest.approx(INLET_WARM.ambient, abs=1e-9) and endless[3] > endless[0]
+    oil = bath._replace(sump=1.5, outer_ambient=0.0, inner_ambient=0.0)
+    assert temperatures(oil, INLET_WARM, np.array([90.0, 0.0, 0.0, 0.0])) == pytest.approx(np.full(4, 80.0), rel=1e-14)
+
+
 def test_unit_equations_of_the_network():
     """Unit: the temperatures solve G T = Q + b, and G^-1 is their derivative by heat."""
     heat = np.array([100.0, 40.0, 60.0, 80.0])
@@ -48,14 +61,14 @@ def test_unit_equations_of_the_network():
 @settings(max_examples=300, deadline=None)
 @given(networks, st.lists(st.floats(0.0, 1e4), min_size=4, max_size=4), st.floats(-20.0, 150.0))
 def test_unit_energy_in_is_energy_out(network, heat, inlet):
-    """Unit: the heat of the nodes leaves by oil, housing and shaft, to 1e-12 of what the ways carry."""
+    """Unit: the heat of the nodes leaves by oil, sump, housing and shaft, to 1e-12 of what the ways carry."""
     boundaries, heat = Boundaries(inlet, 20.0), np.array(heat)
     found = temperatures(network, boundaries, heat)
     ways = carried_off(network, boundaries, found)
     carried = heat.sum() + sum(abs(way) for way in ways.values())
     # A temperature in C has sixteen digits, and each way carries its round-off.
     largest = max(abs(found).max(), abs(inlet), 20.0)
-    round_off = np.finfo(float).eps * (network.flow + network.outer_ambient + network.inner_ambient) * largest
+    round_off = np.finfo(float).eps * sum((network.flow, *network[6:])) * largest
     assert abs(sum(ways.values()) - heat.sum()) <= 1e-12 * carried + 4.0 * round_off
 
 

@@ -55,7 +55,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
-from rbdyn.base.words import chance, label, quantity, rounded_down, shown, with_error
+from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
 
 # Meaning of a clearance of the scene, by its key.
 CLEARANCES = {
@@ -199,23 +199,24 @@ def _clearances(summary: Record) -> list[Block]:
 def _temperatures(summary: Record) -> list[Block]:
     """Steady temperatures at baseline and pick, and what the inputs of the heat balance leave open; nothing without a balance."""
     baseline, pick = (part(summary, "confirmation", name, "temperatures_C") or {} for name in ("baseline", "pick"))
+    ranges = part(summary, "confirmation", "pick", "thermal", "ranges")
     rows = [
-        (quantity(name)[0], _plain(baseline.get(name)), _plain(figure), _range(figure.get("input_range")))
+        (
+            quantity(name)[0],
+            _plain(baseline.get(name)),
+            _plain(figure),
+            range_ends(ranges[TEMPERATURES[name]]) if ranges else "",
+        )
         for name, figure in pick.items()
     ]
     header = ("steady state [°C]", "baseline", "pick", "pick over inputs (90 %)")
-    note = (
-        "Inputs: factors on surfaces, housing and contacts, and the share of the oil. Errors: of the simulation (95 %)."
-    )
-    return [Table("Temperatures", header, rows, note)] if rows else []
+    note = "Inputs: unknown conductances, shares of the heat and level of the loss. Errors: of the simulation (95 %)."
+    others = [Paragraph(f"The pick {other_ranges(ranges)}.", "small")] if ranges else []
+    return [Table("Temperatures", header, rows, note), *others] if rows else []
 
 
 def _plain(figure: Record | None) -> str:
     return with_error(figure["value"], figure["error"]) if figure else ""
-
-
-def _range(ends: Sequence[float] | None) -> str:
-    return "" if ends is None else f"{ends[0]:.0f} to {ends[1]:.0f}"
 
 
 def _robust_points(summary: Record) -> Table:
@@ -494,7 +495,11 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
             ],
         }
         | ({} if point.friction_check is None else {"friction_check": dict(point.friction_check)})
-        | ({} if point.temperatures is None else {"temperatures_C": temperatures_record(point)})
+        | (
+            {}
+            if point.temperatures is None
+            else {"temperatures_C": temperatures_record(point), "thermal": {"ranges": point.temperature_ranges}}
+        )
         | {
             key: record(outcome.gains[name])
             for key, record in (("gains", gains_record), ("statement", statement))
@@ -505,12 +510,10 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
 
 
 def temperatures_record(point: Confirmed) -> dict[str, Any]:
-    """Steady temperatures by response, each with its value, its 95 % error, and 90 % of it over the inputs of the heat balance."""
-    ranges = point.temperature_ranges or {}
+    """Steady temperatures by response, each with its value and its 95 % error."""
     figures = point.temperatures or {}
     return {
-        name: {"value": figures[node].value, "error": figures[node].stated_error, "input_range": ranges.get(node)}
-        for name, node in TEMPERATURES.items()
+        name: {"value": figures[node].value, "error": figures[node].stated_error} for name, node in TEMPERATURES.items()
     }
 
 

@@ -1,14 +1,18 @@
-"""Thermal network of a roller bearing at temperatures: conductances of its parts, and the nodes that each power heats."""
+"""Heat of a roller bearing at temperatures: conductances of its parts, the nodes that each power heats, and the films of losses."""
 
+import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.contact.rolling_resistance import rolling_force
+from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOSSES, POWERS, ROLLING, RollerBearing
-from rbdyn.dynamics.parameters.model import rolling_contacts
-from rbdyn.dynamics.parameters.state import load_distribution
+from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
+from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
@@ -19,30 +23,57 @@ from rbdyn.thermal.conductances import (
     oil_flow,
     race_contact,
     seats,
+    sump,
     surface_coefficient,
     surfaces,
 )
 from rbdyn.thermal.heat import TERMS, Effusivities, shares
-from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, matrix, source
+from rbdyn.thermal.losses import HeatModel, Losses, no_rest
+from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
+
+
+def _terms_of_powers() -> Array:
+    """Terms of the heat from the powers of a simulation, (terms, powers): rolling resistance is that of both races there."""
+    rows = np.array([[float(term == loss) for loss in (*LOSSES, *[""] * (POWERS - len(LOSSES)))] for term in TERMS])
+    for race, inner in (("outer", -1.0), ("inner", 1.0)):
+        rows[TERMS.index(f"{race}_rolling_resistance"), INNER_ROLLING] = inner
+    rows[TERMS.index("outer_rolling_resistance"), ROLLING] = 1.0
+    return rows
+
+
+TERMS_OF_POWERS = _terms_of_powers()
+# Exponents of the viscosity in losses, with which a search begins; the states visited change them.
+VISCOUS = {"outer_rolling_resistance": 0.7, "inner_rolling_resistance": 0.7, "pocket_film": 0.5, "land_film": 1.0}
 
 
 class Network(NamedTuple):
     """Network of a bearing at temperatures.
 
-    ``shares`` (powers, 4): of each node in each power of the simulation, in the order of ``equations.LOSSES`` and what follows
-    there. ``windage`` (4,) [W]: heat that no power of the simulation has.
+    ``term_shares`` (terms, 4): of each node in each term of ``heat.TERMS``. ``windage`` [W]: a loss that no power of the simulation
+    has.
     """
 
     conductances: Conductances
     boundaries: Boundaries
-    shares: Array
-    windage: Array
+    term_shares: Array
+    windage: float
+
+    @property
+    def shares(self) -> Array:
+        """Shares (powers, 4) of the nodes in the powers of a simulation, in the order of ``equations.LOSSES`` and what follows there."""
+        return np.asarray(TERMS_OF_POWERS.T @ self.term_shares)
+
+    def terms(self, powers: Array) -> Array:
+        """Losses (terms,) [W] of the powers of a simulation (powers,)."""
+        losses = TERMS_OF_POWERS @ powers
+        losses[TERMS.index("spin_windage")] = self.windage
+        return np.asarray(losses)
 
     @property
     def offset(self) -> Array:
         """Temperatures [C] of the nodes without the powers of the simulation, (4,)."""
-        heat = self.windage + source(self.conductances, self.boundaries)
+        heat = self.windage * self.term_shares[TERMS.index("spin_windage")] + source(self.conductances, self.boundaries)
         return np.asarray(np.linalg.solve(matrix(self.conductances), heat))
 
     @property
@@ -53,10 +84,33 @@ class Network(NamedTuple):
 
 def network_of(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Network:
     """Network of a scene at temperatures, by its oil, contacts and sizes; ``bearing``: parameters of the scene."""
-    windage = np.zeros(len(NODES))
-    windage[OIL] = spin_windage(hot)
     boundaries = Boundaries(inlet_temperature(thermal, hot.lubricant), thermal.ambient_C)
-    return Network(_conductances(hot, thermal, bearing), boundaries, _power_shares(hot), windage)
+    shares_of_terms = term_shares(hot, thermal.film_share_to_oil)
+    return Network(_conductances(hot, thermal, bearing), boundaries, shares_of_terms, spin_windage(hot))
+
+
+def term_shares(hot: Scene, film_to_oil: float) -> Array:
+    """Shares (terms, 4) of the nodes in each term of ``heat.TERMS``, with ``film_to_oil`` of the heat of films in the oil."""
+    effusivities = Effusivities(*(hot.material(part).effusivity for part in ("rings", "roller", "cage")))
+    return shares(effusivities, hot.cage.guidance, film_to_oil)
+
+
+def heat_model(hot: Scene, network: Network, temperatures: Array, powers: Array, viscosity: Array) -> HeatModel:
+    """Model of the balance about a state: ``temperatures`` (4,) [C], ``powers`` of the simulation, ``viscosity``: ``log_viscosity``."""
+    guide = {"outer": OUTER, "inner": INNER, "roller": ROLLERS}[hot.cage.guidance]
+    surfaces_of = {
+        "outer_rolling_resistance": OUTER,
+        "inner_rolling_resistance": INNER,
+        "pocket_film": ROLLERS,
+        "land_film": guide,
+    }
+    films = np.zeros((len(TERMS), len(NODES)))
+    for row, term in enumerate(TERMS):
+        for node in (surfaces_of.get(term, OIL), ROLLERS if term in surfaces_of else OIL):
+            films[row, node] += 0.5
+    exponents = np.array([VISCOUS.get(term, 0.0) for term in TERMS])
+    losses = Losses(temperatures, network.terms(powers), exponents, films, viscosity)
+    return HeatModel(losses, network.term_shares, network.conductances, network.boundaries, no_rest())
 
 
 def ring_width(scene: Scene) -> float:
@@ -99,8 +153,57 @@ def _conductances(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Condu
         outer_rollers=races["outer"],
         inner_rollers=races["inner"],
         outer_ambient=thermal.housing_factor * housing,
-        inner_ambient=thermal.housing_factor * shaft,
+        inner_ambient=thermal.shaft_factor * shaft,
+        sump=thermal.sump_factor * sump(mounting.outside_diameter, width) if lubricant.supply == "bath" else 0.0,
     )
+
+
+# Distances of inlets at which the rolling resistance is computed, in half-widths.
+DISTANCES = np.geomspace(1.0, 200.0, 17)
+
+
+def loss_levels(hot: Scene, bearing: RollerBearing) -> dict[str, Callable[[float], Array]]:
+    """By key of a scene, the losses (terms,) at a value of it over those at its own, at the static loads of the rollers.
+
+    Rolling resistance follows its factor and the inlet, drag and windage the density of the mixture of oil and air.
+    """
+    factor, distance, oil = hot.model.rolling_resistance_factor, hot.lubricant.inlet_distance, hot.oil()
+    rolling = np.array([term.endswith("rolling_resistance") for term in TERMS])
+    drag = np.array([term in ("roller_drag", "spin_windage") for term in TERMS])
+
+    def density(share: float) -> float:
+        return share * oil.density + (1.0 - share) * AIR_DENSITY
+
+    share = hot.lubricant.oil_fraction
+    scale = share / hot.lubricant.oil_fraction_factor
+    levels = {
+        "lubricant.oil_fraction": lambda value: np.where(drag, density(value) / density(share), 1.0),
+        "lubricant.oil_fraction_factor": lambda value: np.where(drag, density(value * scale) / density(share), 1.0),
+    }
+    if hot.model.rolling_resistance == "off" or factor == 0.0:
+        return levels
+    loads = load_distribution(hot, bearing, hot.operation.largest_load_N)
+    forces = np.log([_rolling_force(hot, loads, one) for one in DISTANCES])
+    usual = math.log(_rolling_force(hot, loads, distance))
+
+    def at_distance(value: float) -> Array:
+        level = np.exp(np.interp(math.log(value), np.log(DISTANCES), forces) - usual)
+        return np.where(rolling, level, 1.0)
+
+    return levels | {
+        "model.rolling_resistance_factor": lambda value: np.where(rolling, value / factor, 1.0),
+        "lubricant.inlet_distance": at_distance,
+    }
+
+
+def _rolling_force(hot: Scene, loads: LoadDistribution, distance: float | None) -> float:
+    """Rolling resistance of all loaded rollers on both races [N] with the oil beginning at a distance."""
+    starved = hot.model_copy(update={"lubricant": hot.lubricant.model_copy(update={"inlet_distance": distance})})
+    total = 0.0
+    for race, radius in zip(("outer", "inner"), hot.geometry.reduced_radii, strict=True):
+        law, speed = rolling_law(starved, hot.oil(race), radius), abs(hot.geometry.motion.entrainment)
+        total += sum(rolling_force(law, float(load), speed) for load in getattr(loads, race).ravel() if load > 0.0)
+    return total
 
 
 def flow_notes(hot: Scene) -> tuple[str, ...]:
@@ -114,17 +217,3 @@ def flow_notes(hot: Scene) -> tuple[str, ...]:
     cavity = cavity_volume(geometry.raceways, ring_width(hot), hot.bearing.rollers, volume, cage)
     stay = residence(hot.lubricant.oil_fraction, cavity, flow, geometry.motion.cage_speed)
     return fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)
-
-
-def _power_shares(hot: Scene) -> Array:
-    """Shares (powers, 4) of the nodes in the powers of a simulation."""
-    effusivities = Effusivities(*(hot.material(part).effusivity for part in ("rings", "roller", "cage")))
-    of_term = dict(zip(TERMS, shares(effusivities, hot.cage.guidance), strict=True))
-    rows = np.zeros((POWERS, len(NODES)))
-    for place, loss in enumerate(LOSSES):
-        if place != ROLLING:
-            rows[place] = of_term[loss]
-    # The rolling resistance is that of both races, and its inner part follows on its own.
-    rows[ROLLING] = of_term["outer_rolling_resistance"]
-    rows[INNER_ROLLING] = of_term["inner_rolling_resistance"] - of_term["outer_rolling_resistance"]
-    return rows

@@ -1,0 +1,154 @@
+"""The heat balance about a state: losses by the viscosity of their films, the nodes that they heat, and what else changes.
+
+A film's loss is P = P0 (eta/eta0)^p at the temperature of its surfaces. Oil that warms loses viscosity, so this heat falls while
+the heat carried off rises, and the balance has one solution. It lies above the coldest surroundings: no loss is negative, and the
+network only mixes temperatures. Newton's method comes to it by steps that never overshoot from the cold side, because the balance
+is concave there. Whatever else moves heat, such as lost clearance, is ``rest``, linear in the temperatures.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.properties.materials import Oil
+from rbdyn.thermal.network import NODES, Boundaries, Conductances, matrix, source
+
+# Temperature at which no oil lubricates, and the coldest one of a stated oil [C].
+HOTTEST, COLDEST = 350.0, -60.0
+# Longest step of Newton's method, end of its steps [K], and their number at most.
+LONGEST_STEP, LAST_STEP, MOST_STEPS = 40.0, 1e-9, 200
+# Deviation of the model from its balance that counts as none [K].
+CLOSED = 1e-3
+DEGREES = np.arange(COLDEST, HOTTEST + 0.5)
+
+
+class Losses(NamedTuple):
+    """Losses about a state.
+
+    ``temperatures`` (4,) [C] of the nodes and ``powers`` (terms,) [W] of the state; ``exponents`` (terms,) of the viscosity;
+    ``films`` (terms, 4): weights of the nodes in the temperature of the film of a loss; ``log_viscosity``: of the oil at whole
+    degrees from COLDEST to HOTTEST.
+    """
+
+    temperatures: Array
+    powers: Array
+    exponents: Array
+    films: Array
+    log_viscosity: Array
+
+    def viscosities(self, nodes: Array) -> Array:
+        """Logarithm of the viscosity in each film (..., terms) at temperatures of the nodes (..., 4)."""
+        return np.asarray(np.interp(nodes @ self.films.T, DEGREES, self.log_viscosity))
+
+    def at(self, nodes: Array) -> Array:
+        """Losses (..., terms) [W] at temperatures of the nodes (..., 4) [C]."""
+        change = self.viscosities(nodes) - self.viscosities(self.temperatures)
+        return np.asarray(self.powers * np.exp(self.exponents * change))
+
+    def slopes(self, nodes: Array) -> Array:
+        """dP/dT (..., terms, 4) [W/K]."""
+        films = nodes @ self.films.T
+        change = np.interp(films + 0.5, DEGREES, self.log_viscosity) - np.interp(
+            films - 0.5, DEGREES, self.log_viscosity
+        )
+        return np.asarray((self.at(nodes) * self.exponents * change)[..., np.newaxis] * self.films)
+
+
+def log_viscosity(oil_at: Callable[[float], Oil]) -> Array:
+    """Logarithm of an oil's viscosity at whole degrees, as of ``Losses``."""
+    return np.log([oil_at(float(degree)).viscosity for degree in DEGREES])
+
+
+def film_powers(losses: Losses, other: Losses, least_change: float, least_share: float) -> Array:
+    """Exponents (terms,) by which the losses of two states follow the viscosity, where this differs enough, else those of the first.
+
+    Its logarithm must differ by ``least_change``, and both powers exceed ``least_share`` of all. A loss that starvation or heat of
+    the inlet holds follows the viscosity less, so exponents stay in 0 to 1.2.
+    """
+    change = losses.viscosities(losses.temperatures) - losses.viscosities(other.temperatures)
+    clear = (losses.exponents > 0.0) & (np.abs(change) >= least_change)
+    for state in (losses, other):
+        clear &= state.powers > least_share * max(float(state.powers.sum()), 0.0)
+    ratios = np.where(clear, losses.powers, 1.0) / np.where(clear, other.powers, 1.0)
+    return np.where(clear, np.clip(np.log(ratios) / np.where(clear, change, 1.0), 0.0, 1.2), losses.exponents)
+
+
+class HeatModel(NamedTuple):
+    """Losses about a state, ``shares`` (terms, 4) of the nodes in these, the network, and ``rest`` (4, 4) [W/K] of the heat's slopes."""
+
+    losses: Losses
+    shares: Array
+    conductances: Conductances
+    boundaries: Boundaries
+    rest: Array
+
+    @property
+    def matrix(self) -> Array:
+        """G [W/K], (4, 4)."""
+        return matrix(self.conductances)
+
+    @property
+    def coldest(self) -> float:
+        """Temperature of the colder surroundings of those that exchange heat [C]: no node is colder."""
+        conductances, boundaries = self.conductances, self.boundaries
+        ways = {
+            boundaries.inlet: conductances.flow,
+            boundaries.ambient: conductances.outer_ambient + conductances.inner_ambient + conductances.sump,
+        }
+        return min((place for place, conductance in ways.items() if conductance > 0.0), default=boundaries.ambient)
+
+    def heat(self, nodes: Array) -> Array:
+        """Heat of the nodes (..., 4) [W] at their temperatures (..., 4) [C]."""
+        return np.asarray(self.losses.at(nodes) @ self.shares + (nodes - self.losses.temperatures) @ self.rest.T)
+
+    def heat_slopes(self, nodes: Array) -> Array:
+        """dQ/dT (..., 4, 4) [W/K]."""
+        return np.asarray(np.einsum("tn,...tm->...nm", self.shares, self.losses.slopes(nodes)) + self.rest)
+
+    def excess(self, nodes: Array) -> Array:
+        """Heat less what the network carries off (..., 4) [W]: zero where the heat balances."""
+        return np.asarray(self.heat(nodes) + source(self.conductances, self.boundaries) - nodes @ self.matrix.T)
+
+    def image_slopes(self, nodes: Array) -> Array:
+        """dM/dT (..., 4, 4) of the temperatures M that carry the heat off."""
+        return np.asarray(np.linalg.solve(self.matrix, self.heat_slopes(nodes)))
+
+    def with_image_slopes(self, slopes: Array) -> Self:
+        """The model with the rest that gives it the slopes dM/dT at its state."""
+        viscous = self._replace(rest=np.zeros_like(self.rest)).heat_slopes(self.losses.temperatures)
+        return self._replace(rest=self.matrix @ slopes - viscous)
+
+    def balanced(self) -> Array:
+        """Temperatures (4,) [C] that balance their heat, between the coldest surroundings and HOTTEST."""
+        whole, inflow, coldest = self.matrix, source(self.conductances, self.boundaries), self.coldest
+        nodes = np.clip(self.losses.temperatures, coldest, HOTTEST)
+        for _ in range(MOST_STEPS):
+            step = np.linalg.solve(whole - self.heat_slopes(nodes), self.heat(nodes) + inflow - whole @ nodes)
+            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), LAST_STEP))
+            before, nodes = nodes, np.clip(nodes + step, coldest, HOTTEST)
+            if np.abs(nodes - before).max() < LAST_STEP:
+                break
+        return np.asarray(nodes)
+
+    def is_stable(self, nodes: Array, most: float = 1.0) -> bool:
+        """Whether the temperatures (4,) of ``balanced`` are a balance of the model below HOTTEST, with a gain below ``most``."""
+        image = np.linalg.solve(self.matrix, self.excess(nodes))
+        return bool(np.abs(image).max() < CLOSED and nodes.max() < HOTTEST and gain(self.image_slopes(nodes)) < most)
+
+    def varied(self, ratios: Mapping[str, float], powers: Array, shares: Array) -> Self:
+        """The model with conductances and ``powers`` (terms,) times ratios, and other ``shares``."""
+        scaled = {name: ratio * getattr(self.conductances, name) for name, ratio in ratios.items()}
+        losses = self.losses._replace(powers=powers * self.losses.powers)
+        return self._replace(losses=losses, shares=shares, conductances=self.conductances._replace(**scaled))
+
+
+def gain(slopes: Array) -> float:
+    """Gain of the loop: largest real part of the eigenvalues of dM/dT; steady below one."""
+    return float(np.linalg.eigvals(slopes).real.max())
+
+
+def no_rest() -> Array:
+    """Slopes of a balance that follows the viscosity alone (4, 4)."""
+    return np.zeros((len(NODES), len(NODES)))
