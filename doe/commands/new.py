@@ -109,6 +109,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
     """Limits by response. Raises InputError with all faults at once."""
     from doe.clearance import RESPONSES, TEMPERATURES
     from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
+    from rbdyn.base.words import quantity
 
     limits: Limits = {}
     faults = []
@@ -122,7 +123,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
             continue
         try:
-            value = plain_number(number)
+            value = plain_number(number, quantity(name)[1])
         except MethodError as error:
             faults.append(f"{where}: {one_line(number, LONGEST_NAME)} {error}")
             continue

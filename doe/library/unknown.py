@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,6 +104,7 @@ def uncertainty(
     folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
     effort = Effort(workers, scheduler, retry, progress, notice)
     refuse(_points_faults(points))
+    points = None if points is None else int(points)
     accuracy = valid_target(target)
     with registered(path, folder):
         inputs, runs = content_digest(path), runs_digest(path, assignments)
@@ -128,10 +130,10 @@ def _points_faults(points: Any) -> list[str]:
     """Faults of the number of input sets."""
     if points is None:
         return []
-    if isinstance(points, bool) or not isinstance(points, int) or not FEWEST_SETS <= points <= MOST_SETS:
+    if isinstance(points, bool) or not isinstance(points, Integral) or not FEWEST_SETS <= int(points) <= MOST_SETS:
         value = one_line(repr(points), LONGEST_NAME)
         return [f"points = {value}: must be a power of two from {FEWEST_SETS} to {MOST_SETS}"]
-    return no_power_of_two("--points ", points)
+    return no_power_of_two("--points ", int(points))
 
 
 class CalibrationAnswer(Answer):

@@ -97,7 +97,7 @@ class Typed:
         if text is None:
             return None
         try:
-            value = plain_number(text)
+            value = plain_number(text, LIMITS[option][2])
         except MethodError as error:
             self.fault(option, str(error))
             return None
@@ -138,7 +138,7 @@ def _whole_number(text: str, least: int, largest: int) -> int:
 
 def roller_size(text: str) -> tuple[float, float]:
     """Diameter and length of a roller [mm] from "7x7" and like spellings. Raises MethodError."""
-    if comma := comma_fault(text):
+    if comma := comma_fault(text, roller_size):
         raise MethodError(comma)
     match = ROLLER.fullmatch(text)
     try:
@@ -160,11 +160,11 @@ def clearance_of(text: str) -> str | float:
     name = text.strip().upper()
     if name in CLEARANCE_CLASSES:
         return name
-    if comma := comma_fault(text):
-        raise MethodError(comma)
     try:
-        value = float(text)
-    except ValueError:
+        value = plain_number(text, "mm")
+    except MethodError as error:
+        if not str(error).startswith("is no number"):
+            raise
         classes = ", ".join(CLEARANCE_CLASSES)
         raise MethodError(f"is no clearance class; choose one of {classes}, or write millimetres, as 0.02") from None
     if fault := _range_fault(value, *CLEARANCES, "mm"):
