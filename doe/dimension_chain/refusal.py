@@ -2,14 +2,16 @@
 
 from collections.abc import Callable, Sequence
 
-from doe.dimension_chain.allocation import Allocation, cheapest
+from doe.dimension_chain.allocation import SAMPLES, Allocation, cheapest
 from doe.dimension_chain.closing import interval, middle
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Mode, Part, Selective, stated_parts
-from doe.dimension_chain.yields import SelectiveAssembly, classes_needed, moments
+from doe.dimension_chain.yields import SelectiveAssembly, classes_needed, moments, standard_error
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
 
 FEWEST_CLASSES = 2
+# Largest yield that random assemblies can show to be reached, two standard errors below 1.
+SURE_YIELD = 1.0 - 2.0 * standard_error(1.0, SAMPLES)
 # Whether a changed chain is accepted, and its matched assemblies where only they keep the limits.
 Judge = Callable[[Chain], tuple[bool, SelectiveAssembly | None]]
 
@@ -75,6 +77,11 @@ def allocated_reason(search: Allocation) -> str:
     """Why no tolerances can be allocated: the fixed links, the narrowest processes, or the resolution of the drawing."""
     chain, limits = search.chain, search.chain.closing_link
     bare = search.parts({link.name: 0.0 for link in chain.free})
+    if search.mode == "yield" and not search.function.linear and chain.allocate.target_yield > SURE_YIELD:
+        return (
+            f"allocate.target_yield = {chain.allocate.target_yield:g}: {SAMPLES} random assemblies cannot show it for a chain with "
+            f'functions; write at most {SURE_YIELD:g}, or mode = "worst_case"'
+        )
     if search.mode == "yield" and (share := search.sure_yield(bare)) < chain.allocate.target_yield:
         low, high = search.tails(bare)
         return (

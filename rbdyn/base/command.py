@@ -292,12 +292,25 @@ FACTORS = {
 }
 
 
-def plain_number(text: str, unit: str = "") -> float:
-    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit and for what is no number."""
+def plain_number(text: str, unit: str = "", fault: Callable[[float], str | None] = lambda value: None) -> float:
+    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit and for what is no number.
+
+    ``fault``: that of a value; a value that has one is not advised.
+    """
     try:
         return float(text)
     except ValueError:
-        raise MethodError(comma_fault(text, float) or _unit_fault(text, unit)) from None
+        pass
+    comma, typed = comma_fault(text, float), TYPED.fullmatch(text)
+    factor = 1.0 if typed and typed[2] in (unit, f"\u00b0{unit}") else typed and FACTORS.get((typed[2], unit))
+    if comma:
+        value, advice = float(text.replace(",", ".")), comma
+    elif typed and factor:
+        value = factor * float(typed[1].replace(",", "."))
+        advice = f"has a unit; write {value:.10g}"
+    else:
+        raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}")
+    raise MethodError(fault(value) or advice)
 
 
 def comma_fault(text: str, reader: Callable[[str], Any]) -> str:
@@ -310,12 +323,3 @@ def comma_fault(text: str, reader: Callable[[str], Any]) -> str:
     except (MethodError, ValueError):
         return ""
     return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}"
-
-
-def _unit_fault(text: str, unit: str) -> str:
-    """What to write in place of a number with a unit, or of what is no number."""
-    typed = TYPED.fullmatch(text)
-    factor = 1.0 if typed and typed[2] in (unit, f"\u00b0{unit}") else typed and FACTORS.get((typed[2], unit))
-    if typed and factor:
-        return f"has a unit; write {factor * float(typed[1].replace(',', '.')):.10g}"
-    return f"is no number; write a plain number{f' in {unit}' if unit else ''}"
