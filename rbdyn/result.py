@@ -121,6 +121,8 @@ class SimulationResult(Brief, SavedRecord):
     - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
+    - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
+      (``rbdyn.dynamics.part_figures``)
     - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
       None unless numerics.pulse_threshold_N is stated
     """
@@ -157,6 +159,12 @@ class SimulationResult(Brief, SavedRecord):
     pulse_impulse_N_s: Quantity | None = None  # noqa: N815
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
+    part_figures: dict[str, Quantity] | None = None
+
+    @property
+    def responses(self) -> dict[str, Quantity]:
+        """All figures with errors that a study may name: those of the whole bearing and of its parts."""
+        return self.quantities | (self.part_figures or {})
 
     @property
     def jitters(self) -> bool:

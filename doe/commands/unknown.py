@@ -22,6 +22,15 @@ def uncertainty(
     target: Annotated[
         str, typer.Option(metavar="SHARE", help="Standard error of the ends of a range, as a share of its width.")
     ] = "10%",
+    figure: Annotated[
+        list[str] | None,
+        valued(
+            "NAME",
+            "A further output, such as land_film_power_W or outer_max_pressure_MPa; repeatable.",
+            "impact, whirl, loss, cage speed, temperatures",
+            "--figure",
+        ),
+    ] = None,
     overrides: Set = None,
     out: Annotated[
         Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_uncertainty")
@@ -50,6 +59,7 @@ def uncertainty(
                 retry,
                 progress,
                 notice(quiet),
+                figure or (),
             )
         _hand_over(answer, as_json, quiet)
 

@@ -88,7 +88,8 @@ class Answer(Mapping[str, Any]):
         return pd.DataFrame(list(rows[name]))
 
     def __getitem__(self, key: str) -> Any:
-        return self.record[key]
+        """A value of the record, which shares nothing with the answer."""
+        return copy.deepcopy(self.record[key])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.record)

@@ -103,10 +103,11 @@ def texts_given(argument: Any, name: str, example: str) -> list[str]:
     """The argument ``name`` of a call as a list of texts; None is an empty one. Raises InputError for anything else."""
     if argument is None:
         return []
-    texts = list(argument) if isinstance(argument, list | tuple | set | frozenset) else [argument]
-    wrong = not isinstance(argument, list | tuple | set | frozenset) or not all(isinstance(text, str) for text in texts)
-    refuse([f"{name} = {one_line(repr(argument), LONGEST_NAME)}: must be a list such as {example}"] if wrong else [])
-    return texts
+    # The order of a set changes from one process to the next.
+    words = "a set has no order; write" if isinstance(argument, set | frozenset) else "must be"
+    valid = isinstance(argument, list | tuple) and all(isinstance(text, str) for text in argument)
+    refuse([] if valid else [f"{name} = {one_line(repr(argument), LONGEST_NAME)}: {words} a list such as {example}"])
+    return list(argument)
 
 
 @contextmanager

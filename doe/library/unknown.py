@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +80,7 @@ def uncertainty(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    figures: Sequence[str] = (),
 ) -> UncertaintyAnswer:
     """Range of every output of a scene over its unknown inputs, and the share of each input, as ``doe uncertainty``.
 
@@ -88,6 +90,7 @@ def uncertainty(
     - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``figures``: further outputs, such as ``["outer_max_pressure_MPa"]``
 
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
@@ -102,7 +105,9 @@ def uncertainty(
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
     folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
     effort = Effort(workers, scheduler, retry, progress, notice)
+    names = texts_given(figures, "figures", '["outer_max_pressure_MPa"]')
     refuse(_points_faults(points))
+    points = None if points is None else int(points)
     accuracy = valid_target(target)
     with registered(path, folder):
         inputs, runs = content_digest(path), runs_digest(path, assignments)
@@ -110,7 +115,7 @@ def uncertainty(
         with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
             agenda.plan(uncertainty_stages(path, assignments, points))
             with effort.simulations(folder, path, agenda) as simulations:
-                result = find_uncertainty(path, assignments, simulations, points, accuracy)
+                result = find_uncertainty(path, assignments, simulations, points, accuracy, names)
             agenda.enter(ANSWER)
             identity = scene_identity("doe uncertainty", path, assignments)
             answer = UncertaintyAnswer(
@@ -128,10 +133,10 @@ def _points_faults(points: Any) -> list[str]:
     """Faults of the number of input sets."""
     if points is None:
         return []
-    if isinstance(points, bool) or not isinstance(points, int) or not FEWEST_SETS <= points <= MOST_SETS:
+    if isinstance(points, bool) or not isinstance(points, Integral) or not FEWEST_SETS <= int(points) <= MOST_SETS:
         value = one_line(repr(points), LONGEST_NAME)
         return [f"points = {value}: must be a power of two from {FEWEST_SETS} to {MOST_SETS}"]
-    return no_power_of_two("--points ", points)
+    return no_power_of_two("--points ", int(points))
 
 
 class CalibrationAnswer(Answer):

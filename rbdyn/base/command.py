@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
@@ -162,8 +162,8 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 def flag(*names: str, says: str, **more: Any) -> Any:
-    """An option without a value; help shows no type for it."""
-    return typer.Option(*names, metavar="", help=says, **more)
+    """An option without a value."""
+    return typer.Option(*names, help=says, **more)
 
 
 def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
@@ -171,10 +171,45 @@ def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> A
     return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
 
 
+def _without_types(params: list[Any]) -> list[Any]:
+    """The parameters of a command; help shows no type for an option without a value."""
+    for param in params:
+        if getattr(param, "is_flag", False) and param.metavar is None:
+            param.metavar = ""
+    return params
+
+
+class Command(TyperCommand):
+    """A command."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
+class Group(TyperGroup):
+    """All commands of a program."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options of the program itself, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
+class Program(typer.Typer):
+    """A program of several commands."""
+
+    def __init__(self) -> None:
+        super().__init__(cls=Group, no_args_is_help=True, pretty_exceptions_enable=False)
+
+    def command(self, name: str | None = None, *, cls: type[TyperCommand] | None = Command, **options: Any) -> Any:
+        """Take up a function as a command."""
+        return super().command(name, cls=cls, **options)
+
+
 def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
     """A class of command, for ``cls``, that refuses ``former`` options and names the replacement of each."""
 
-    class Refusing(TyperCommand):
+    class Refusing(Command):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             """Refuse former options before any other."""
             option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
@@ -245,15 +280,46 @@ def _fill_line(line: str, values: Mapping[str, Any]) -> str:
 DECIMAL_COMMA = re.compile(r"(\d),(\d)")
 
 
-def plain_number(text: str) -> float:
-    """A number that is typed. Raises MethodError for a decimal comma and for what is no number."""
+TYPED = re.compile(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*([^\d\s.,](?:[^\d]*[^\d\s])?)\s*")
+# Units that are typed in place of another, and their factor to it.
+FACTORS = {
+    ("kN", "N"): 1e3,
+    ("m", "mm"): 1e3,
+    ("cm", "mm"): 10.0,
+    ("um", "mm"): 1e-3,
+    ("\u00b5m", "mm"): 1e-3,
+    ("krpm", "rpm"): 1e3,
+}
+
+
+def plain_number(text: str, unit: str = "", fault: Callable[[float], str | None] = lambda value: None) -> float:
+    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit and for what is no number.
+
+    ``fault``: that of a value; a value that has one is not advised.
+    """
     try:
         return float(text)
     except ValueError:
-        raise MethodError(comma_fault(text) or "is no number; write a plain number") from None
+        pass
+    comma, typed = comma_fault(text, float), TYPED.fullmatch(text)
+    factor = 1.0 if typed and typed[2] in (unit, f"\u00b0{unit}") else typed and FACTORS.get((typed[2], unit))
+    if comma:
+        value, advice = float(text.replace(",", ".")), comma
+    elif typed and factor:
+        value = factor * float(typed[1].replace(",", "."))
+        advice = f"has a unit; write {value:.10g}"
+    else:
+        raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}")
+    raise MethodError(fault(value) or advice)
 
 
-def comma_fault(text: str) -> str:
-    """What to write in place of a decimal comma; empty where there is none."""
+def comma_fault(text: str, reader: Callable[[str], Any]) -> str:
+    """What to write in place of a decimal comma; empty where there is none, or where ``reader`` does not take the rest."""
     with_point = DECIMAL_COMMA.sub(r"\1.\2", text.strip())
-    return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}" if with_point != text.strip() else ""
+    if with_point == text.strip():
+        return ""
+    try:
+        reader(with_point)
+    except (MethodError, ValueError):
+        return ""
+    return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}"

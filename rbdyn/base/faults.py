@@ -126,6 +126,11 @@ def refuse(faults: Iterable[str]) -> None:
         raise InputError(sentences)
 
 
+def refuse_places(places: Sequence[int], sentence: Callable[[int], str]) -> None:
+    """Raises InputError with the sentence of each place, if there are any; only those that the message lists are made."""
+    refuse([*map(sentence, places[:MOST_FAULTS]), *[""] * (len(places) - MOST_FAULTS)])
+
+
 def check_all(checks: Iterable[Callable[[], object]]) -> None:
     """Make all checks. Raises InputError with the faults of all of them."""
     faults: list[str] = []
@@ -279,6 +284,7 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
         return model.model_validate(data)
     except ValidationError as error:
         errors: Sequence[Any] = error.errors(include_url=False)
+    refuse(_other_kind(model, data, source))
     faults = _sentences(model, errors, data, source)
     # A table with a bad key is not checked as a whole; without that key it may show more faults.
     bad = {fault["loc"] for fault in errors}
@@ -296,10 +302,28 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     raise InputError(dict.fromkeys(faults))
 
 
+# A key that only files of one kind have, with the kind and what reads it.
+KINDS = {
+    "bearing": ("scene", "rbdyn simulate, rbdyn ball or doe new"),
+    "factor": ("study", "doe study"),
+    "closing_link": ("dimension chain", "doe chain"),
+    "chain": ("file of dimension chains", "doe chain"),
+}
+
+
+def _other_kind(model: type[BaseModel], data: Any, source: str) -> list[str]:
+    """The fault of a file of another kind, each key of which would be a fault of its own."""
+    own, other = (next((key for key in KINDS if key in keys), None) for keys in (model.model_fields, data))
+    if own is None or other is None or own in data:
+        return []
+    kind, readers = KINDS[other]
+    return [f"{source}: this is a {kind}, not a {KINDS[own][0]}; give it to {readers}"]
+
+
 def _states_absence(fault: str, name: str) -> bool:
     """Whether a sentence on a table says that a key of that ``name`` is missing."""
     return name in fault and (
-        ": missing; " in fault or re.search(rf"(needs|without) [\w.]*{re.escape(name)}\b", fault) is not None
+        ": missing; " in fault or re.search(rf"(needs|without) [^:;]*\b{re.escape(name)}\b", fault) is not None
     )
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
     from rbdyn.scene import Scene
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+app = command.Program()
 
 # Former options of ``rbdyn accuracy``, and what replaces them.
 SCRIPT = "run python examples/benchmarks/{}"

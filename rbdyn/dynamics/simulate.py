@@ -21,6 +21,7 @@ from rbdyn.dynamics.parameters.validity import (
     race_report,
     slip_notes,
 )
+from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
@@ -189,6 +190,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
+        part_figures=part_figures(scene, runs, companions, ensemble.plan.share, ensemble.since, races),
         **pulses,
     )
 
