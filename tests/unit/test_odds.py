@@ -8,7 +8,7 @@ from scipy import special
 
 from doe.unknown.decision import odds, wilson
 
-COUNT, SPREAD = 2000, 3.0
+COUNT, SPREAD = 256, 3.0
 
 
 def simulated(noise, count=COUNT, seed=1):
