@@ -138,7 +138,9 @@ def test_unit_set_makes_a_documented_input_known() -> None:
     keys = [each.key for each in case.every]
     assert "cage.imbalance_um" not in keys and "traction.mu_m" not in keys and "traction.eyring_stress_MPa" in keys
     (note,) = case.notes
-    assert note.startswith(f"{len(keys)} of {len(keys) + 4} inputs vary, the others count as exact (known by uncertain.set: cage.imb")
+    assert note.startswith(
+        f"{len(keys)} of {len(keys) + 4} inputs vary, the others count as exact (known by uncertain.set: cage.imb"
+    )
     assert "uncertain.defaults: bearing.effective_length_mm, cage.mass_g, lubricant.temperature_C)" in note
     (scene,) = case.scenes(case.every[:1], [{case.every[0].key: 1.0}], 0)
     assert isinstance(scene, Scene) and scene.cage.imbalance_um == 7.0 and scene.traction.model == "eyring"

@@ -194,14 +194,21 @@ def test_declarations_over_others_replace_them_key_by_key() -> None:
     turns = over(set=["numerics.turns=20"])
     # A stated default is stated.
     assert {"numerics.turns=20", "numerics.replicates=3"} <= set(turns.assignments)
-    assert "numerics.turns=60" not in turns.assignments and turns.estimated == plain.estimated and turns.laws == plain.laws
+    assert (
+        "numerics.turns=60" not in turns.assignments and turns.estimated == plain.estimated and turns.laws == plain.laws
+    )
     assert over(**{"cage.mass_g": narrow}).laws["cage.mass_g"].low == 45.0
     fixed = over(set=["cage.mass_g=45", "cage.imbalance_um=2"])
-    assert set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"] and not fixed.correlation
+    assert (
+        set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"] and not fixed.correlation
+    )
     law = over(**{"model.drag_coefficient": {"law": "uniform", "low": 0.3, "high": 1.0}})
     assert "model.drag_coefficient=0.5" not in law.assignments and len(law.laws) == 3
     pair = {"keys": ["cage.bar_width_mm", "cage.mass_g"], "rank": -0.2}
-    assert [entry.rank for entry in over(**{"cage.mass_g": narrow, "cage.bar_width_mm": wide, "correlation": [pair]}).correlation] == [-0.2]
+    assert [
+        entry.rank
+        for entry in over(**{"cage.mass_g": narrow, "cage.bar_width_mm": wide, "correlation": [pair]}).correlation
+    ] == [-0.2]
 
 
 def test_relative_values_multiply_what_the_scene_has() -> None:
