@@ -92,7 +92,7 @@ def fuzz(count: int) -> dict[str, float]:
 
 def test_fuzz_of_random_tables() -> None:
     found = fuzz(60)
-    assert found.pop("refused") <= 6 and min(found.values()) > 0.8
+    assert found.pop("refused") <= 10 and min(found.values()) > 0.8
 
 
 @pytest.mark.slow
