@@ -95,7 +95,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     uncertain = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is a result of calibration; leave it out"] if uncertain.sample else [])
     documented_keys, law_keys = {entry.key for entry in documented()}, set(uncertain.laws)
-    override_claims = Claims({key_path(override): override for override in uncertain.set})
+    override_claims = Claims({key_path(override): override for override in uncertain.assignments})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
         + [f"{data}: column {fault}" for fault in first_guess_faults(base, rig.keys)]
@@ -360,7 +360,8 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     """Cells (c,) at the scene's own inputs: logarithms, variances of one run, counted turns, numerical variances."""
     scenes = [
-        Scene.from_dict(case.data, case.source, [*case.uncertain.set, "numerics.companion=true"]) for case in rows.cases
+        Scene.from_dict(case.data, case.source, [*case.uncertain.assignments, "numerics.companion=true"])
+        for case in rows.cases
     ]
     labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
     results = rows.run(scenes, labels, "as the scene says")
@@ -487,7 +488,7 @@ def pace(question: Question) -> Paces:
     """Pace of the runs by a probe at the first condition, of an input set as the scene says; none of a run that fails."""
     case = cases_of(question.case, question.rig)[0]
     try:
-        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.set))
+        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.assignments))
     except RunError:
         return Paces()
 

@@ -129,8 +129,8 @@ def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:
 
 def _samples(study: Study) -> list[str]:
     """The posterior sample of unknown inputs that the study names, or else its scene."""
-    if study.file.uncertain is not None:
-        return list(filter(None, [study.file.uncertain.sample]))
+    if study.file.uncertain is not None and study.file.uncertain.sample is not None:
+        return [study.file.uncertain.sample]
     with suppress(InputError):
         declared = read_toml(study.path_of(study.scene.file)).get("uncertain")
         if isinstance(declared, dict) and isinstance(name := declared.get("sample"), str):

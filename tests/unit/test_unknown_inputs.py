@@ -186,14 +186,51 @@ def test_what_is_given_is_known_unless_estimated() -> None:
 def test_set_replaces_single_keys_of_its_default() -> None:
     """What a list leaves alone stays as it is by default; the order is the default's rest, then the list."""
     asked = ["numerics.turns=60", "model.drag=off"]
-    found = _uncertain(set=asked).set
+    found = _uncertain(set=asked).assignments
     assert found == [*(each for each in RUNS if not each.startswith("numerics.turns=")), *asked]
     assert "numerics.extend=false" in found and "numerics.turns=20" not in found
-    assert _uncertain(set=[]).set == _uncertain().set == list(RUNS)
-    assert _uncertain(set=found).set[: len(RUNS) - 1] == found[: len(RUNS) - 1]
-    assert _uncertain(set=['"numerics".turns = 60']).set == [*found[:-2], '"numerics".turns = 60']
+    assert _uncertain(set=[]).assignments == _uncertain().assignments == list(RUNS)
+    assert _uncertain(set=found).assignments[: len(RUNS) - 1] == found[: len(RUNS) - 1]
+    assert _uncertain(set=['"numerics".turns = 60']).assignments == [*found[:-2], '"numerics".turns = 60']
     with pytest.raises(InputError, match="replaces an earlier assignment of this list"):
         _uncertain(set=["numerics.turns=60", "numerics.turns=70"])
+
+
+def test_declarations_over_others_replace_them_key_by_key() -> None:
+    """A key keeps what is stated under it unless the upper table states it, by a law, as an estimate or in set."""
+    narrow, wide = ({"law": "uniform", "low": low, "high": 50.0} for low in (45.0, 40.0))
+    under = {
+        "estimated": ["cage.land_width_mm", "cage.imbalance_um"],
+        "points": 64,
+        "set": ["numerics.turns=60", "numerics.replicates=3", "model.drag_coefficient=0.5"],
+        "cage.mass_g": wide,
+        "cage.bar_width_mm": wide,
+        "correlation": [{"keys": ["cage.mass_g", "cage.bar_width_mm"], "rank": 0.5}],
+    }
+    plain = Uncertain.model_validate(under)
+
+    def over(**upper: Any) -> Uncertain:
+        return Uncertain.model_validate(Uncertain.model_validate(upper).over(plain))
+
+    assert over() == plain and over(seed=3) == plain.model_copy(update={"seed": 3})
+    turns = over(set=["numerics.turns=20"])
+    # A stated default is stated.
+    assert {"numerics.turns=20", "numerics.replicates=3"} <= set(turns.assignments)
+    assert (
+        "numerics.turns=60" not in turns.assignments and turns.estimated == plain.estimated and turns.laws == plain.laws
+    )
+    assert over(**{"cage.mass_g": narrow}).laws["cage.mass_g"].low == 45.0
+    fixed = over(set=["cage.mass_g=45", "cage.imbalance_um=2"])
+    assert (
+        set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"] and not fixed.correlation
+    )
+    law = over(**{"model.drag_coefficient": {"law": "uniform", "low": 0.3, "high": 1.0}})
+    assert "model.drag_coefficient=0.5" not in law.assignments and len(law.laws) == 3
+    pair = {"keys": ["cage.bar_width_mm", "cage.mass_g"], "rank": -0.2}
+    assert [
+        entry.rank
+        for entry in over(**{"cage.mass_g": narrow, "cage.bar_width_mm": wide, "correlation": [pair]}).correlation
+    ] == [-0.2]
 
 
 def test_relative_values_multiply_what_the_scene_has() -> None:
