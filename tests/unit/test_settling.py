@@ -378,7 +378,7 @@ def test_command_line_coverage(command, monkeypatch):
 
 
 def test_unit_replicates_start_in_two_groups(outer, make_scene):
-    """Unit: every second replicate slips, its cage is nearly at its guide and circles, its rollers are at one wall, in turn the
+    """Unit: every second replicate slips, its cage is near its guide and circles, its rollers are at one wall, in turn the
     front and the back; a schedule prescribes one start; rollers stand inside their pockets.
     """
     assert [group_of(outer, replicate) for replicate in range(4)] == [0, 1, 0, 1]

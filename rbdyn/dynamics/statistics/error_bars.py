@@ -53,7 +53,7 @@ SIGNIFICANT = 4.0
 FEWEST_REPLICATES = 3
 # Share of settled runs in which a figure seems to differ: of those that are lengthened, and of those whose errors count the
 # whole difference, which costs no turn.
-FALSE_ALARMS, DOUBT = 0.05, 0.3
+FALSE_ALARMS, DOUBT = 0.05, 0.5
 # Difference of a figure, over the figure, for which no run is lengthened.
 NEGLIGIBLE = 1e-2
 # Impact windows in a stretch.
