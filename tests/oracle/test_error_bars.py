@@ -155,7 +155,7 @@ def test_literature_transient_of_the_bearing(outer):
     for name in ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm"):
         ours, exact = getattr(short, name), getattr(auto, name)
         error = ours.statistical_error
-        assert error is None or abs(ours.value - exact.value) < error and error > 3.0 * exact.statistical_error
+        assert error is None or (abs(ours.value - exact.value) < error and error > 3.0 * exact.statistical_error)
 
 
 def test_unit_notes_name_the_figure_and_the_mend(outer):
