@@ -156,12 +156,13 @@ class Numerics(Consistent):
     """Shaft turns before the counted ones, discarded as transient; "auto" detects the transient in the series of the run, at
     least one batch."""
     extend: bool = True
-    """Count at least three relaxation times of the slowest motion, in whole impact windows. Where the counted figures drift, the
-    run is doubled and its second half counts."""
+    """Double the run until its figures have settled, and count its second half: until replicates that start in two different ways
+    agree, and the later half of the counted turns with the earlier one. Whole impact windows count."""
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     """Longest run with extend, as a multiple of turns."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
-    """Number of runs of the scene from different starts, whose scatter gives the statistical error."""
+    """Number of runs of the scene from different starts, whose scatter gives the statistical error. Every second one starts with
+    slip, its cage near the guide and its rollers at one side of their pockets, so that runs that have not settled differ."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all random starts and spreads. Equal scenes of equal seed and version give equal bits."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
