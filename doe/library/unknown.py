@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered, texts_given
 from rbdyn.base.blocks import Block
-from rbdyn.base.command import output_folder
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
+from rbdyn.base.folder import output_folder
 from rbdyn.base.forecast import Notice
 from rbdyn.base.words import counted, quantity, shown
 
@@ -79,6 +79,7 @@ def uncertainty(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    force: bool = False,
 ) -> UncertaintyAnswer:
     """Range of every output of a scene over its unknown inputs, and the share of each input, as ``doe uncertainty``.
 
@@ -88,6 +89,7 @@ def uncertainty(
     - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
@@ -96,7 +98,7 @@ def uncertainty(
     from doe.running.runner import ANSWER
     from doe.workflow.status import content_digest, runs_digest
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
-    from rbdyn.base.page import write_with_report
+    from rbdyn.base.page import REPORT_FILES, write_with_report
     from rbdyn.dynamics.target import valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
@@ -104,9 +106,10 @@ def uncertainty(
     effort = Effort(workers, scheduler, retry, progress, notice)
     refuse(_points_faults(points))
     accuracy = valid_target(target)
-    with registered(path, folder):
+    names = (*UNCERTAINTY_FILES, *REPORT_FILES)
+    with output_folder(folder, "doe", names, force=force) as output, registered(path, folder):
         inputs, runs = content_digest(path), runs_digest(path, assignments)
-        output_folder(folder, "doe", path)
+        output.claim(path)
         with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
             agenda.plan(uncertainty_stages(path, assignments, points))
             with effort.simulations(folder, path, agenda) as simulations:
@@ -116,11 +119,12 @@ def uncertainty(
             answer = UncertaintyAnswer(
                 uncertainty_record(result), folder, (), agenda.agenda, identity=identity, uncertainty=result
             )
-            files = write_with_report(folder, identity, answer.blocks, partial(write_uncertainty, result, folder))
+            files = write_with_report(output, identity, answer.blocks, partial(write_uncertainty, result))
             agenda.finish(files)
     return replace(answer, files=tuple(files))
 
 
+UNCERTAINTY_FILES = ("uncertainty.json", "input_sets.csv", "ranges.csv", "shares.csv", "uncertainty.png")
 FEWEST_SETS, MOST_SETS = 16, 512
 
 
@@ -195,6 +199,7 @@ def calibrate(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    force: bool = False,
 ) -> CalibrationAnswer:
     """Unknown inputs of a scene from measurements on a rig, and whether it may be called calibrated, as ``doe calibrate``.
 
@@ -205,11 +210,12 @@ def calibrate(
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
       and the answer
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
     from doe.report.identity import scene_identity
-    from doe.report.sections.calibration import cost_of, files_of, record_of, stored, write
+    from doe.report.sections.calibration import FILES, RECORD, cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
     from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
     from doe.workflow.status import content_digest
@@ -220,10 +226,10 @@ def calibrate(
         texts_given(given, name, '["cage.mass_g"]') for given, name in ((free, "free"), (overrides, "overrides"))
     )
     effort = Effort(workers, scheduler, retry, progress, notice)
-    with registered(path, folder):
+    with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)
         identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
-        output_folder(folder, "doe", path)
+        output.claim(path)
         if not retry and (record := stored(folder, identity)) is not None:
             return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
         inputs = content_digest(path)
@@ -235,6 +241,6 @@ def calibrate(
                 turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
-            write(result, record, folder, scene)
+            output.write(lambda stage: write(result, record, stage, scene), last=RECORD)
             agenda.finish(files_of(record))
     return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda, identity=scene)

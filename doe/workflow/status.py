@@ -23,7 +23,7 @@ from doe.study_file.sections import Front
 from doe.study_file.workbook import split_path
 from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
-from rbdyn.base.faults import InputError, read_toml
+from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.result import read_json, versions
 
@@ -141,8 +141,8 @@ def _samples(study: Study) -> list[str]:
 def _content(path: Path) -> bytes:
     """Bytes of a file; empty for one that cannot be read, which the study refuses later."""
     try:
-        return split_path(path)[0].read_bytes()
-    except (OSError, ValueError):
+        return read_bytes(split_path(path)[0])
+    except InputError:
         return b""
 
 
@@ -267,12 +267,12 @@ def folder_of(path: Path, *usual: str) -> Path:
 
 
 def content_digest(path: Path) -> str:
-    """Digest of the content of a scene's file. Raises OSError."""
-    return digest_of(path.read_bytes())
+    """Digest of the content of a scene's file. Raises InputError."""
+    return digest_of(read_bytes(path))
 
 
 def runs_digest(path: Path, overrides: Sequence[str]) -> str:
-    """Digest of what decides the runs of a scene's file: its content, its overrides, and the code. Raises OSError."""
+    """Digest of what decides the runs of a scene's file: its content, its overrides, and the code. Raises InputError."""
     return digest_of("\n".join([content_digest(path), *overrides, code_version(clearance.SIMULATION)]))
 
 

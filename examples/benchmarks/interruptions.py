@@ -31,7 +31,7 @@ from typing import Any
 
 from doe.running.store import Store
 from doe.workflow.runs import STORE
-from rbdyn.dynamics.slip_map import POINTS
+from rbdyn.cli.app import MAP_POINTS as POINTS
 
 EXAMPLES = Path(__file__).resolve().parents[1]
 SHORT = (

@@ -19,15 +19,11 @@ from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.storage import digest_of
 from rbdyn.base.streams import FAILED
 from rbdyn.base.terminal import show
-from rbdyn.result import read_json, write_json
 
 # Exit code of a command whose input is at fault.
 BAD_INPUT = 2
-# File that names the command and the input of a folder of results.
-MARK = "made_by.json"
 
 
 @contextmanager
@@ -88,35 +84,6 @@ def checkpoint_message(path: Path | None) -> Iterator[None]:
         if path is None or not path.exists():
             raise
         raise KeyboardInterrupt(f"finished parts are saved in {path}; start the command again to resume") from None
-
-
-def output_folder(path: Path, command: str, source: Path) -> Path:
-    """Make the folder that ``--out`` names for the results of ``command`` on the file ``source``.
-
-    A folder belongs to one command and one file, which its ``made_by.json`` names. Results of the same file (the same place or
-    the same content) are overwritten. A folder of another file is refused. All commands of ``doe`` count as one, because they
-    share the store of a study. Raises InputError.
-    """
-    mark, source = path / MARK, source.resolve()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        digest = digest_of(source.read_bytes())
-        # Relative to the folder, so that folder and file can move together.
-        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        owner = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if owner["command"] != command or (own["file"] != owner["file"] and digest != owner["sha256"]):
-            raise InputError(
-                [
-                    f"--out {path}: holds results of {owner['command']} from {os.path.normpath(path / owner['file'])}; "
-                    "name another folder or remove this one"
-                ]
-            )
-        write_json(mark, own)
-    except OSError as error:
-        raise InputError([f"--out {path}: cannot be written to ({error.strerror}); name another folder"]) from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
-    return path
 
 
 @contextmanager
@@ -214,6 +181,7 @@ Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.r
 Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
 Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
+Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]

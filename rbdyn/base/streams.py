@@ -29,6 +29,25 @@ AGAIN_S = 0.05
 PATH, LONGEST_WARNING = re.compile(r"(?<!\w)(?:[A-Za-z]:)?[/\\][^\s/\\]+[/\\]\S+"), 300
 
 
+class Uninterrupted:
+    """Context in which Ctrl-C waits until its end, for a few statements of which all or none must be executed."""
+
+    def __enter__(self) -> None:
+        self._waiting, self._usual = 0, None
+        # Only the main thread hears of signals, and only a handler of Python can wait.
+        if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
+            self._usual = signal.signal(signal.SIGINT, self._wait)
+
+    def _wait(self, number: int, frame: Any) -> None:
+        self._waiting += 1
+
+    def __exit__(self, *ended: object) -> None:
+        if callable(self._usual):
+            signal.signal(signal.SIGINT, self._usual)
+            if self._waiting:
+                self._usual(signal.SIGINT, None)
+
+
 class _Losing(io.FileIO):
     """A stream whose writes never fail; ``fault`` is the first error, after which it drops output."""
 
