@@ -1,6 +1,5 @@
 """Unknown inputs of a scene: ``uncertainty`` and ``calibrate``, and their answers."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -238,7 +237,7 @@ def calibrate(
             predicted = None if scheduler else agenda.state_first(pace(question))
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
-                turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
+                turns, took_s = simulations.turns, agenda.elapsed_s
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
             output.write(lambda stage: write(result, record, stage, scene), last=RECORD)
