@@ -228,9 +228,9 @@ def calibrate(
     with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)
         identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
-        output.claim(path)
         if not retry and (record := stored(folder, identity)) is not None:
             return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
+        output.claim(path)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
