@@ -123,7 +123,7 @@ def test_a_folder_keeps_what_a_command_did_not_make(tmp_path, written, fuzz_case
             and now[str(place.relative_to(case))] == earlier[str(place.relative_to(case))]
         ), where
         foreign = {name for name, kind in kinds.items() if kind != "other name"}
-        assert (shown.returncode == 2) == bool(place.parent == out and place.name in names or "folder" in kinds.values() or foreign and not force), where  # fmt: skip
+        assert (shown.returncode == 2) == bool((place.parent == out and place.name in names) or "folder" in kinds.values() or (foreign and not force)), where  # fmt: skip
         if shown.returncode == 2:
             refused += 1
             assert shown.stderr.startswith("--out ") and now == earlier, where
