@@ -242,15 +242,31 @@ def write_json(path: Path | str, data: dict[str, Any]) -> None:
 def whole_file(path: Path | str) -> Iterator[Path]:
     """A file to write, which then replaces ``path``: a reader gets the old one or the new one.
 
-    A failure or an interruption leaves no part of the new one.
+    A failure or an interruption leaves no part of the new one. Raises InputError for a path where no file can be.
     """
-    path = Path(path)
+    path = path_of(path)
+    if path.is_dir() or not path.name:
+        raise InputError([f"{path}: is a folder; name a file in it"])
+    if not path.parent.is_dir():
+        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
-        yield partial
-        os.replace(partial, path)
+        with naming(lambda: path):
+            yield partial
+            os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: Callable[[], Path]) -> Iterator[None]:
+    """Let an error of the disk name a file, which it does not do where writing fails: ``path`` finds it then."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            error.filename = str(path())
+        raise
 
 
 def versions() -> dict[str, str]:

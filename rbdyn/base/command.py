@@ -16,24 +16,23 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from rbdyn.base.blocks import Table
-from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.storage import digest_of
-from rbdyn.base.streams import FAILED
+from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
-from rbdyn.result import read_json, write_json
 
 # Exit code of a command whose input is at fault.
 BAD_INPUT = 2
-# File that names the command and the input of a folder of results.
-MARK = "made_by.json"
+# Whole numbers that numba and matplotlib read of the environment, with their ends.
+VARIABLES = {"NUMBA_NUM_THREADS": (1, 10_000), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
 
 
 @contextmanager
 def guarded(as_json: bool) -> Iterator[None]:
     """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
     try:
+        refuse(_environment_faults())
         yield
     except InputError as error:
         _leave(as_json, BAD_INPUT, error.faults)
@@ -46,6 +45,15 @@ def guarded(as_json: bool) -> Iterator[None]:
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
+
+
+def _environment_faults() -> Iterator[str]:
+    """Sentences on variables of the environment that end a library in the middle of a command."""
+    for name, (least, most) in VARIABLES.items():
+        value = os.environ.get(name, "").strip() or str(least)
+        if not (value.isdecimal() and value.isascii() and least <= int(value[:LONGEST_NAME]) <= most):
+            shown = one_line(value, LONGEST_NAME)
+            yield f"environment variable {name} = {shown}: must be a whole number from {least} to {most}; unset it"
 
 
 def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
@@ -90,35 +98,6 @@ def checkpoint_message(path: Path | None) -> Iterator[None]:
         raise KeyboardInterrupt(f"finished parts are saved in {path}; start the command again to resume") from None
 
 
-def output_folder(path: Path, command: str, source: Path) -> Path:
-    """Make the folder that ``--out`` names for the results of ``command`` on the file ``source``.
-
-    A folder belongs to one command and one file, which its ``made_by.json`` names. Results of the same file (the same place or
-    the same content) are overwritten. A folder of another file is refused. All commands of ``doe`` count as one, because they
-    share the store of a study. Raises InputError.
-    """
-    mark, source = path / MARK, source.resolve()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        digest = digest_of(source.read_bytes())
-        # Relative to the folder, so that folder and file can move together.
-        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        owner = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if owner["command"] != command or (own["file"] != owner["file"] and digest != owner["sha256"]):
-            raise InputError(
-                [
-                    f"--out {path}: holds results of {owner['command']} from {os.path.normpath(path / owner['file'])}; "
-                    "name another folder or remove this one"
-                ]
-            )
-        write_json(mark, own)
-    except OSError as error:
-        raise InputError([f"--out {path}: cannot be written to ({error.strerror}); name another folder"]) from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
-    return path
-
-
 @contextmanager
 def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
     """Show progress on a terminal, nothing elsewhere; yields ``progress(count, total)``.
@@ -145,7 +124,12 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
         bar.update(task, completed=count, total=total)
 
     with Progress(
-        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeLeft(),
+        console=Console(file=styled(sys.stderr)),
+        transient=True,
     ) as bar:
         task = bar.add_task(title, total=None)
         yield progress
@@ -153,7 +137,7 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
     """Function that prints a note to standard error at once; None for a quiet command."""
-    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
+    return None if quiet else lambda sentence: print(f"note: {escaped(sentence)}", file=sys.stderr, flush=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -249,6 +233,7 @@ Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.r
 Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
 Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
+Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.map/1"
 FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
-# Name of the finished points in the folder of a map.
-POINTS = "map_points.jsonl"
 
 
 class Point(Record):

@@ -18,7 +18,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.forecast import Forecast, duration, span
 from rbdyn.base.identity import Identity
-from rbdyn.base.page import REPORT, write_with_report
+from rbdyn.base.page import REPORT, with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
@@ -29,6 +29,7 @@ from rbdyn.scene.unknown import Input
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
+FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
 ENDS = (0.05, 0.5, 0.95)
 TAUS = (0.5, 0.05, 0.95)
 OFFSET = "A constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs."
@@ -270,7 +271,7 @@ def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
 
 def write(calibration: Calibration, record: dict[str, Any], folder: Path, identity: Identity) -> None:
     """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
-    write_with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record, folder))
+    with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record))
     # Last, as it marks the folder as complete.
     sign(record)
     write_json(folder / RECORD, record)
