@@ -21,6 +21,8 @@ SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 # Excel's own line on the separator of a file.
 HINT = re.compile(r"\s*sep=([,;\t])\r?\n", re.IGNORECASE)
+# Rows of another length than the header that are named one by one.
+MOST_ROWS_NAMED = 2
 # Characters of no text: a file with them is something else.
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
@@ -168,11 +170,13 @@ def _tidy(path: Path, rows: list[list[str]]) -> list[list[str]]:
     lengths = [_filled_length(row) for row in rows]
     width = len(rows[0]) if any(lengths[0] < length <= len(rows[0]) for length in lengths) else max(lengths[0], 1)
     rows = [row[: max(width, length)] for row, length in zip(rows, lengths, strict=True)]
+    wrong = [(number, len(row)) for number, row in enumerate(rows) if len(row) != width]
+    # Of columns without a name every row is a case; one stands for them.
+    others = f"; {len(wrong) - 1} more rows are like it" if len(wrong) > MOST_ROWS_NAMED else ""
     refuse(
-        f"{path}: row {number} has {counted(len(row), 'field')} and the header {width}; give it a field for each column, "
-        f"in their order{SEMICOLONS if len(row) > width else ''}"
-        for number, row in enumerate(rows)
-        if len(row) != width
+        f"{path}: row {number} has {counted(length, 'field')} and the header {width}; give it a field for each column, "
+        f"in their order{SEMICOLONS if length > width else ''}{others}"
+        for number, length in (wrong[:1] if others else wrong)
     )
     return rows
 
