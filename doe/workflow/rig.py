@@ -230,12 +230,13 @@ def _accuracies(cells: _Cells, outputs: Sequence[str]) -> tuple[dict[str, float]
 
 def _shifted(sheet: Sheet, faults: list[str]) -> list[str]:
     """The faults of cells, or a single sentence where most rows have values of other columns, as of shifted ones."""
-    values = [(fault, found[1]) for fault in faults if (found := ROW.search(fault)) and not ABSENT.search(fault)]
-    count = len({row for _, row in values})
-    if count < FEWEST or 2 * count <= len(sheet.rows):
+    rows = [(fault, found[1]) for fault in faults if (found := ROW.search(fault))]
+    alien = [(fault, row) for fault, row in rows if not ABSENT.search(fault)]
+    count = len({row for _, row in rows})
+    if len({row for _, row in alien}) < FEWEST or 2 * count <= len(sheet.rows):
         return faults
-    rows = f"{count} of {len(sheet.rows)} rows"
-    return [f"{values[0][0]}; {rows} have cells that do not fit their columns, which may be shifted"]
+    words = f"{count} of {len(sheet.rows)} rows have cells that do not fit their columns, which may be shifted"
+    return [f"{alien[0][0]}; {words}"]
 
 
 def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:

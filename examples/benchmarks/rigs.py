@@ -3,11 +3,11 @@
 ``python examples/benchmarks/rigs.py surrogate`` hands rigs in closed form to the method, hundreds if asked for;
 ``python examples/benchmarks/rigs.py simulated`` simulates the example bearing, both the rigs and their calibration, in short
 runs. Kinds of rigs: ``sound`` has inputs drawn from their laws and sensors of their stated accuracy; ``ends`` has two inputs
-within 2 % of an end; of ``sensor`` the loss reads 12 % high, the impact 20 % low, or the loss 20 % high; ``law`` has other
-physics: in closed form a land without loss, or a rolling loss that the load changes less; where the bearing is simulated a dry
-land, or no rolling resistance. The first two should end "calibrated", the last "not calibrated". A sensor that the inputs can
-imitate cannot be found out: then what is stated to be able to hide must hold the offset. Of all hidden values 85 % or more should
-lie in their 90 % intervals.
+within 2 % of an end; of ``sensor`` the loss reads 12 % high, the impact 20 % low, or the loss 20 % high, which ``stated``
+gives as accuracy; ``law`` has other physics: in closed form a land without loss, or a rolling loss that the load changes less;
+where the bearing is simulated a dry land, or no rolling resistance. ``sound``, ``ends`` and ``stated`` should end "calibrated",
+``law`` "not calibrated". The offset of a sensor that inputs can imitate cannot be found: then what is stated to be able to hide
+must hold it. Of all hidden values 85 % or more should lie in their 90 % intervals.
 
 ``--rigs N`` of each kind, ``--only KIND``, ``--first N`` to skip rigs; ``--out FOLDER`` keeps runs, records and answers, and
 a rig whose answer by the same code is there is not calibrated again. ``widths`` counts how often predictions of known width
@@ -29,7 +29,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 
 EXAMPLES = Path(__file__).resolve().parents[1]
-SOUND, ENDS, SENSOR, LAW = KINDS = ("sound", "ends", "sensor", "law")
+SOUND, ENDS, SENSOR, LAW, STATED = KINDS = ("sound", "ends", "sensor", "law", "stated")
 BIASED = ((1, 1.12), (0, 0.8), (1, 1.2))  # the output that a biased sensor reads, loss or impact, and by how many times
 PARTICLES = 2000  # of rigs in closed form
 NEAR = (0.005, 0.02, 0.98, 0.995)  # hidden quantiles near an end
@@ -54,16 +54,23 @@ class Answer(NamedTuple):
         if self.kind == SENSOR and calibrated:
             place, factor = BIASED[self.number % len(BIASED)]
             return (self.hides[place] or 0.0) > np.exp(abs(np.log(factor))) - 1.0
-        return calibrated == (self.kind in (SOUND, ENDS))
+        return calibrated == (self.kind in (SOUND, ENDS, STATED))
 
 
 def offsets(kind: str, number: int, accuracies: Array, random: np.random.Generator) -> Array:
     """Factors (m,) by which sensors read the outputs: of a biased one its bias, else as their accuracies say."""
     factors = np.exp(accuracies * random.standard_normal(accuracies.size))
-    if kind == SENSOR:
+    if kind in (SENSOR, STATED):
         place, factor = BIASED[number % len(BIASED)]
         factors[place] = factor
     return factors
+
+
+def stated(kind: str, number: int, accuracies: Array) -> Array:
+    """Accuracies (m,) that a rig states: the usual ones, of a sensor whose bias is ``stated`` that bias."""
+    place, factor = BIASED[number % len(BIASED)]
+    size = abs(float(np.log(factor)))
+    return np.where((np.arange(accuracies.size) == place) & (kind == STATED), size, accuracies)
 
 
 def hidden(kind: str, inputs: int, random: np.random.Generator) -> Array:
@@ -112,7 +119,8 @@ def simulated_rig(folder: Path, kind: str, number: int) -> tuple[Path, Path, dic
     settings |= {"numerics.replicates": REPLICATES, "numerics.seed": 1000 + number}
     settings |= OTHER_LAWS[number % len(OTHER_LAWS)] if kind == LAW else {}
     base = Scene.load(EXAMPLES / "cylindrical_roller.toml")
-    reads = offsets(kind, number, np.array([ACCURACIES[name] / 100.0 for name in MEASURED]), random)
+    accuracies = np.array([ACCURACIES[name] / 100.0 for name in MEASURED])
+    reads, grades = offsets(kind, number, accuracies, random), stated(kind, number, accuracies)
     rows = []
     for speed, load in CONDITIONS:
         at = {"operation.inner_speed_rpm": speed, "operation.radial_load_N": load}
@@ -123,8 +131,9 @@ def simulated_rig(folder: Path, kind: str, number: int) -> tuple[Path, Path, dic
             # Of the runs' own scatter the table states as much as of the sensor's.
             own = np.hypot(sd, (figures[name]["statistical_error"] or 0.0) / 1.96 / figures[name]["value"])
             cells += [repr(value * (1.0 + sd * random.standard_normal())), repr(value * float(own))]
-        rows.append([speed, load, *cells])
+        rows.append([speed, load, *cells, *(100.0 * grades).tolist()])
     header = [*at, *(column for name in MEASURED for column in (name, f"{name}_sd"))]
+    header += [f"{name}_accuracy_percent" for name in MEASURED]
     scene, rig = folder / "scene.toml", folder / f"rig_{kind}_{number}.csv"
     with rig.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([header, *rows])
@@ -195,7 +204,9 @@ def surrogate(kind: str, number: int) -> Answer:
     values = closed_form(truth[None], **other)[0]
     values += np.log(offsets(kind, number, ACCURATE, random))[OUTPUT] + SENSORS * random.standard_normal(values.size)
     by_default = np.full(len(OUTPUTS), np.nan)
-    measured = Measured(values, SENSORS**2, OUTPUT, ROW, by_default, np.zeros(values.size, bool), ACCURATE)
+    measured = Measured(
+        values, SENSORS**2, OUTPUT, ROW, by_default, np.zeros(values.size, bool), stated(kind, number, ACCURATE)
+    )
 
     def simulate(quantiles: Array, stage: int) -> Batch:
         simulated = closed_form(quantiles)
