@@ -149,8 +149,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {candidate.key for candidate in case.every}
     )
-    refuse(_vain_question(case, rig, targets))
-    refuse(_endless_question(case, rig, targets))
+    refuse([*_vain_question(case, rig, targets), *_endless_question(case, rig, targets)])
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
@@ -159,10 +158,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    cases = cases_of(case, rig)
-    refuse(_too_fast_a_cage(cases, rig))
-    # A fault at several conditions is reported once.
-    refuse(dict.fromkeys(fault for condition in cases for fault in impossible(condition)))
+    refuse(_impossible_conditions(cases_of(case, rig), rig))
     return Question(case, targets, rig, tuple(notes))
 
 
@@ -186,21 +182,21 @@ def _endless_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterato
         yield f"{rig.path}: {conditions} take up to {most} runs, {MOST_RUNS} at most; {fix}"
 
 
-def _too_fast_a_cage(cases: Sequence[Case], rig: Rig) -> Iterator[str]:
-    """A sentence where cages are measured faster than both rings, as rollers do not drive them so: columns are mistaken."""
-    conditions = rig.conditions
-    rows = [
-        (row.number, row.values[SPEED], fastest)
-        for row in rig.rows
-        if SPEED in row.values
-        and row.values[SPEED] > (fastest := _fastest_ring(cases[conditions.index(row.keys)].scene))
-    ]
+def _impossible_conditions(cases: Sequence[Case], rig: Rig) -> dict[str, None]:
+    """Faults of the scene at the conditions, each once, and of cages that are measured faster than both rings."""
+    faults = dict.fromkeys(fault for condition in cases for fault in impossible(condition))
+    conditions, rows = rig.conditions, list[tuple[int, float, float]]()
+    for row in rig.rows:
+        fastest = _fastest_ring(cases[conditions.index(row.keys)].scene)
+        if row.values.get(SPEED, 0.0) > fastest:
+            rows.append((row.number, row.values[SPEED], fastest))
     if rows:
         number, speed, fastest = rows[0]
-        yield (
-            f"{rig.path}: {SPEED} in row {number} = {speed:g}: is above {fastest:g} rpm, the speed of the faster ring "
-            f"({len(rows)} of {len(rig.rows)} rows); check the columns and the unit"
+        where = (
+            f"{rig.path}: {SPEED} in row {number} = {speed:g}: is above {fastest:g} rpm, the speed of the faster ring"
         )
+        faults[f"{where} ({len(rows)} of {len(rig.rows)} rows); check the columns and the unit"] = None
+    return faults
 
 
 def _fastest_ring(scene: Scene) -> float:
