@@ -158,7 +158,10 @@ class CalibrationAnswer(Answer):
                 for key, row in self.record["inputs"].items()
             ],
             "outputs": [
-                {"output": name, **{key: row[key] for key in ("explained", "allowed", "evidence", "resolution")}}
+                {
+                    "output": name,
+                    **{key: row[key] for key in ("explained", "allowed", "accuracy_percent", "evidence", "resolution")},
+                }
                 for name, row in self.record["outputs"].items()
             ],
             "cells": [
@@ -173,9 +176,9 @@ class CalibrationAnswer(Answer):
         }
 
     def brief(self) -> str:
-        reasons = "; ".join(self.record["reasons"])
-        runs = counted(self.record["runs"], "run")
-        return f"{self.record['verdict']}{': ' if reasons else ''}{one_line(reasons, 4 * LONGEST_NAME)}, {runs}"
+        from doe.report.sections.calibration import verdict_words
+
+        return f"{one_line(verdict_words(self.record), 4 * LONGEST_NAME)}, {counted(self.record['runs'], 'run')}"
 
 
 def _input_row(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -221,7 +224,14 @@ def calibrate(
     from doe.report.identity import scene_identity
     from doe.report.sections.calibration import FILES, RECORD, cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
-    from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
+    from doe.workflow.calibration import (
+        calibration_stages,
+        design_of,
+        find_calibration,
+        pace,
+        question_of,
+        read_question,
+    )
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
@@ -240,6 +250,11 @@ def calibrate(
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
             predicted = None if scheduler else agenda.state_first(pace(question))
+            if notice is not None:
+                if predicted is None:
+                    notice(f"{agenda.agenda.runs_left[0]} to {counted(agenda.agenda.runs_left[1], 'run')} remain")
+                if doubt := design_of(question).doubt:
+                    notice(doubt)
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
                 turns, took_s = simulations.turns, agenda.elapsed_s

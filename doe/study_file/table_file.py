@@ -14,7 +14,7 @@ from pathlib import Path
 
 from doe.study_file.decimal_marks import POINT, Marks, is_like_number, marks_of
 from doe.study_file.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
-from rbdyn.base.faults import InputError, not_utf_8, read_bytes, refuse_places
+from rbdyn.base.faults import InputError, not_utf_8, read_bytes, refuse
 from rbdyn.base.words import counted
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -23,6 +23,8 @@ SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 HINT = re.compile(r"\s*sep=([,;\t])\r?\n", re.IGNORECASE)
 # Most rows and cells of a text; those of a workbook are fewer, for it takes ten times as long to read.
 MOST_LINES, MOST_FIELDS = 1_000_000, 4_000_000
+# Rows of another length than the header that are named one by one.
+MOST_ROWS_NAMED = 2
 # Characters of no text: a file with them is something else.
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
@@ -173,12 +175,13 @@ def _tidy(path: Path, rows: list[list[str]]) -> list[list[str]]:
     lengths = [_filled_length(row) for row in rows]
     width = len(rows[0]) if any(lengths[0] < length <= len(rows[0]) for length in lengths) else max(lengths[0], 1)
     rows = [row[: max(width, length)] for row, length in zip(rows, lengths, strict=True)]
-    refuse_places(
-        [number for number, row in enumerate(rows) if len(row) != width],
-        lambda number: (
-            f"{path}: row {number} has {counted(len(rows[number]), 'field')} and the header {width}; give it a field for "
-            f"each column, in their order{SEMICOLONS if len(rows[number]) > width else ''}"
-        ),
+    wrong = [(number, len(row)) for number, row in enumerate(rows) if len(row) != width]
+    # Of columns without a name every row is a case; one stands for them.
+    others = f"; {len(wrong) - 1} more rows are like it" if len(wrong) > MOST_ROWS_NAMED else ""
+    refuse(
+        f"{path}: row {number} has {counted(length, 'field')} and the header {width}; give it a field for each column, "
+        f"in their order{SEMICOLONS if length > width else ''}{others}"
+        for number, length in (wrong[:1] if others else wrong)
     )
     return rows
 

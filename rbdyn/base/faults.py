@@ -129,11 +129,6 @@ def refuse(faults: Iterable[str]) -> None:
         raise InputError(sentences)
 
 
-def refuse_places(places: Sequence[int], sentence: Callable[[int], str]) -> None:
-    """Raises InputError with the sentence of each place, if there are any; only those that the message lists are made."""
-    refuse([*map(sentence, places[:MOST_FAULTS]), *[""] * (len(places) - MOST_FAULTS)])
-
-
 def check_all(checks: Iterable[Callable[[], object]]) -> None:
     """Make all checks. Raises InputError with the faults of all of them."""
     faults: list[str] = []
