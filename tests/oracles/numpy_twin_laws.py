@@ -277,20 +277,35 @@ def roller_mass(scene):
     return scene.material("roller").density * volume
 
 
-def elastic_traction(scene, load, steady, coefficient, slip, stiffness):
-    """Traction coefficient that acts and the rate of the state: the steady law in series with a spring of the contact's normal
-    stiffness and a damper beside it; no relaxation is shorter than a radian of the most loaded roller's vibration."""
+def elastic_traction(scene, load, curve, coefficient, slip, stiffness):
+    """Traction coefficient that acts and the rate of the state: the steady ``curve`` over the slip, a power law near it, in series
+    with a spring of the contact's normal stiffness and a damper beside it. Times below a radian of the most loaded roller's
+    vibration are as long as that, and what acts at once keeps the integral of the lag."""
     if not scene.traction.elasticity:
-        return steady, 0.0
+        return curve(slip) if load > 0.0 else 0.0, 0.0
     most = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
     length, mass = scene.bearing.effective_length_mm * 1e-3, roller_mass(scene)
     approach = (most / palmgren_stiffness(scene, "roller", "rings", length)) ** 0.9
     spring = 10.0 / 9.0 * most / approach
-    creep = abs(steady * load / slip) / stiffness if load > 0.0 else 0.0
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
-    relaxation, damping = creep + (mass / (2.0 * spring)) ** 0.5, 2.0 * ratio * (mass / 3.0 / spring) ** 0.5
-    acting = (relaxation * coefficient + damping * steady) / (relaxation + damping)
-    return acting, ((steady if load > 0.0 else 0.0) - coefficient) / (relaxation + damping)
+    shortest, damping = 0.75 * (mass / (2.0 * spring)) ** 0.5, 2.0 * ratio * (mass / 3.0 / spring) ** 0.5
+    dying = coefficient / (shortest + damping)
+    if load == 0.0:
+        return coefficient, -dying
+    steady, step = curve(slip), 1e-5
+    steepness = math.log(curve(slip * math.exp(step)) / curve(slip * math.exp(-step))) / (2.0 * step)
+    rise = steady * load / slip / stiffness
+    last = rise * float(np.clip(steepness, 1.0 / 12.0, 1.0))
+    longer, later = max(rise, shortest), max(last, shortest)
+    exponent = (longer + damping) / (later + damping)
+    along = coefficient / steady
+    size = abs(along) ** exponent if abs(along) < 1.0 else 1.0 + exponent * (abs(along) - 1.0)
+    rate = steady * (1.0 - math.copysign(size, along)) / (longer + damping)
+    acting = coefficient + rate * (damping + longer - longer * (rise + last) / (longer + later))
+    # The state fades in over the first hundredth of the load of the most loaded roller.
+    share = float(np.clip(100.0 * load / most, 0.0, 1.0))
+    share = 3.0 * share**2 - 2.0 * share**3
+    return acting, share * rate - (1.0 - share) * dying
 
 
 def open_film(scene, gap):

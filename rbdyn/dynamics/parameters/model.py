@@ -25,7 +25,8 @@ from rbdyn.contact.rolling_resistance import (
     starved,
     touching_gap,
 )
-from rbdyn.contact.traction import CoulombTraction, ElasticContact, NoTraction, RigidContact, dry_friction
+from rbdyn.contact.tangential import ElasticContact, RigidContact
+from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.bodies import (
     BalancedCage,
     Gravity,
@@ -213,6 +214,8 @@ def _lambda(scene: Scene, film: Any) -> Any:
     return film_thickness.lambda_ratio(film, lubricant.roller_roughness, lubricant.race_roughness)
 
 
+# Load up to which the traction coefficient of an elastic contact fades in, as a share of the load of the most loaded roller.
+LIGHT_LOAD = 0.01
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
 
@@ -310,8 +313,8 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
     mass = scene.geometry.roller_mass
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
     # Translation acts with the mass of the roller on two springs, traction with the third of it that turns with the slip.
-    shortest, damping = math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
-    return ElasticContact(start + place * scene.bearing.rollers, shortest, damping)
+    shortest, damping = 0.75 * math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
+    return ElasticContact(start + place * scene.bearing.rollers, shortest, damping, 1.0 / (LIGHT_LOAD * load))
 
 
 def _form(harmonics: list[Harmonic]) -> Any:
