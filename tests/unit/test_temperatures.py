@@ -327,7 +327,7 @@ def test_unit_ranges_hold_what_inputs_leave_open(hot):
     stated = alone.thermal
     assert stated["inputs"] == [] and all(low == high for low, _, high in stated["ranges"].values())
     for node, figure in alone.temperatures_C.items():
-        assert stated["ranges"][node][1] == pytest.approx(figure.value, abs=1e-6)
+        assert stated["ranges"][node][1] == pytest.approx(figure.value, abs=1e-3)
     assert stated["ranges"]["guide_um"][1] == pytest.approx(alone.clearance_um["guide"]["operating"], abs=0.05)
 
 
