@@ -132,7 +132,7 @@ def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, over
     path = study.path_of(study.scene.file)
     scene = Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
     keys = [factor.key for factor in study.file.factor]
-    refuse(f"{study.path}: factor.key = {fault}" for fault in first_guess_faults(scene, keys))
+    refuse(f"{study.path}: factor.key = {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, keys))
     return scene
 
 

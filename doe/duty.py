@@ -200,7 +200,11 @@ def over_duty(
     for name, overrides in duty.overrides.items():
         try:
             points[name] = scene(overrides)
-            refuse(first_guess_faults(points[name], {".".join(key_path(text) or ()) for text in overrides}))
+            refuse(
+                first_guess_faults(
+                    points[name].thermal, points[name].lubricant, {".".join(key_path(text) or ()) for text in overrides}
+                )
+            )
         except InputError as error:
             faults[name] = error.faults
     # A fault at all points is none of the duty.

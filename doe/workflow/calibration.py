@@ -107,7 +107,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     override_claims = Claims({key_path(override): override for override in uncertain.assignments})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
-        + [f"{data}: column {fault}" for fault in first_guess_faults(base, rig.keys)]
+        + [f"{data}: column {fault}" for fault in first_guess_faults(base.thermal, base.lubricant, rig.keys)]
         + [
             f"{data}: column {key} is a target too ({path}: uncertain or --free); take it out of one of them"
             for key in rig.keys

@@ -38,7 +38,6 @@ from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean, quantity, work_done
-from rbdyn.mounting.fits import RunningSpeeds, cage_clearances, operating_clearance
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import heat_notes
@@ -313,17 +312,10 @@ def _ranges(scene: Scene, hot: Scene, state: State, slopes: Array) -> Ranges:
     """Ranges over the unknown inputs of the balance, about the steady state next to a state."""
     mounting = hot.mounting
     assert mounting is not None
-    speeds = hot.operation.speeds
-    running = RunningSpeeds(*speeds, hot.geometry.motion.cage_speed)
 
     def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
-        parts = part_temperatures(thermal, Temperatures(*nodes.tolist()))
-        mounted = mounting.model_copy(update=parts)
-        land = 1e-3 * hot.land_diameter_mm
-        cage = cage_clearances(mounted, hot.bearing, hot.cage, hot.materials, land, running)
-        radial = operating_clearance(mounted, hot.bearing, hot.materials, *speeds)
-        plays = {"radial_um": radial, "guide_um": cage.guide, "pocket_um": cage.pocket}
-        return {name: 1e6 * play.operating for name, play in plays.items() if play is not None}
+        mounted = mounting.model_copy(update=part_temperatures(thermal, Temperatures(*nodes.tolist())))
+        return {f"{name}_um": 1e6 * play for name, play in hot.clearances_of(mounted).items()}
 
     about = state.model.with_image_slopes(slopes)
     estimated = [] if scene.uncertain is None else scene.uncertain.estimated

@@ -429,7 +429,7 @@ def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis
     if not keys:
         raise InputError(["sweep: no key to sweep; name one, such as operation.inner_speed_rpm"])
     data = tables(scene)
-    faults = first_guess_faults(scene, keys)
+    faults = first_guess_faults(scene.thermal, scene.lubricant, keys)
     axes = []
     for key, values in keys.items():
         try:

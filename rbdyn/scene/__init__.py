@@ -309,22 +309,31 @@ class Scene(SceneFile):
     @cached_property
     def mounted_clearance(self) -> "MountedClearance | None":
         """Radial clearance with the effects of fits, temperature and rotation; None where the scene has no mounting."""
-        if self.mounting is None:
-            return None
-        from rbdyn.mounting.fits import operating_clearance
-
-        return operating_clearance(self.mounting, self.bearing, self.materials, *self.operation.speeds)
+        return None if self.mounting is None else self._mounted_clearance(self.mounting)
 
     @cached_property
     def cage_clearances(self) -> "CageClearances | None":
         """Cage clearances with the effects of fits, temperature and rotation; None where the scene has no mounting."""
-        if self.mounting is None:
-            return None
+        return None if self.mounting is None else self._cage_clearances(self.mounting)
+
+    def _mounted_clearance(self, mounting: Mounting) -> "MountedClearance":
+        from rbdyn.mounting.fits import operating_clearance
+
+        return operating_clearance(mounting, self.bearing, self.materials, *self.operation.speeds)
+
+    def _cage_clearances(self, mounting: Mounting) -> "CageClearances":
         from rbdyn.mounting.fits import RunningSpeeds, cage_clearances
 
         speeds = RunningSpeeds(*self.operation.speeds, self.geometry.motion.cage_speed)
         land = 1e-3 * self.land_diameter_mm
-        return cage_clearances(self.mounting, self.bearing, self.cage, self.materials, land, speeds)
+        return cage_clearances(mounting, self.bearing, self.cage, self.materials, land, speeds)
+
+    def clearances_of(self, mounting: Mounting) -> dict[str, float]:
+        """Diametral clearances in operation [m] "radial", "guide" (not under guidance by the rollers) and "pocket" with another mounting,
+        at the speeds of the scene."""
+        cage = self._cage_clearances(mounting)
+        plays = {"radial": self._mounted_clearance(mounting), "guide": cage.guide, "pocket": cage.pocket}
+        return {name: play.operating for name, play in plays.items() if play is not None}
 
     @property
     def clearances(self) -> "dict[str, OperatingClearance | None]":

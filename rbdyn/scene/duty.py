@@ -92,7 +92,11 @@ def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[
     for point in points:
         try:
             scenes.append(scene.overridden(point.set))
-            refuse(first_guess_faults(scenes[-1], {".".join(key_path(text) or ()) for text in point.set}))
+            refuse(
+                first_guess_faults(
+                    scenes[-1].thermal, scenes[-1].lubricant, {".".join(key_path(text) or ()) for text in point.set}
+                )
+            )
         except InputError as error:
             faults += [f"{source}: duty {point.name!r}: {fault.removeprefix('scene: ')}" for fault in error.faults]
     refuse(faults)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedRings
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
-    from rbdyn.scene.ball import BallScene
 
 # Supplies whose oil stays in the bearing or leaves with air, so that the housing alone cools it.
 COOLED_BY_HOUSING = ("bath", "drop", "oil_air", "grease")
@@ -60,8 +59,8 @@ class Thermal(Strict):
     """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
     surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
     sump_factor: NonNegative = 1.0
-    """Factor on the heat that the oil of a bath loses through the walls of the housing that it wets, 150 W/(m2 K) over the seat of the
-    outer ring. It counts with lubricant.supply = "bath" only."""
+    """Factor on the heat that the oil of a bath loses through the walls of the housing, which have 150 W/(m2 K) over
+    the seat of the outer ring. It counts with lubricant.supply = "bath" only."""
     film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
     a contact in 1e-5 s, and heat is conducted to the walls in 1e-7 s, so little stays in the oil."""
@@ -154,13 +153,12 @@ def with_first_guess(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**tables, "lubricant": {**oil, "temperature_C": guess}}
 
 
-def first_guess_faults(scene: "Scene | BallScene", keys: Iterable[str]) -> list[str]:
+def first_guess_faults(thermal: Thermal | None, lubricant: Lubricant | None, keys: Iterable[str]) -> list[str]:
     """A sentence if the ``keys`` that vary have the oil's temperature, which changes nothing where [thermal] computes it.
 
     A stated viscosity holds at that temperature, so it counts there.
     """
-    lubricant = scene.lubricant
-    computed = scene.thermal is not None and lubricant is not None and lubricant.viscosity_mPas is None
+    computed = thermal is not None and lubricant is not None and lubricant.viscosity_mPas is None
     if not computed or FIRST_GUESS not in keys:
         return []
     return [

@@ -71,7 +71,7 @@ def inputs_of(
         for key in uncertain.estimated
         if key not in documented_keys
     ]
-    faults += [f"uncertain: {fault}" for fault in first_guess_faults(scene, keys)]
+    faults += [f"uncertain: {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, keys)]
     refuse(f"{source}: {fault}" for fault in faults)
     inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]

@@ -30,7 +30,7 @@ TOLERANCE, VAGUE, CLEAR = 0.2, 20.0, 3.0
 NEARLY_UNSTABLE = 0.95
 # States from which the rest of a model is learned, and their distance at most [K].
 LEARNED, NEAR = 3, 40.0
-# Part of the steps between states in a direction, over the largest, from which they teach it.
+# Part of the steps between states in a direction, over the largest, from which slopes there are learned.
 ALIKE = 0.1
 # Smallest change of the logarithm of the viscosity, and share of the heat, from which the exponent of a film is learned.
 VISCOSITY_CHANGE, POWER_SHARE = 0.2, 0.01
@@ -86,7 +86,7 @@ class Search(NamedTuple):
 def learned(slopes: Array, steps: Array, changes: Array, alike: float = 1e-12) -> Array:
     """Slopes changed least (Frobenius) so that they give the ``changes`` (k, n) along the ``steps`` (k, n).
 
-    Directions in which these have less than the part ``alike`` of the largest teach nothing.
+    Directions in which these have less than the part ``alike`` of the largest show nothing.
     """
     steps, changes = np.atleast_2d(steps), np.atleast_2d(changes)
     return np.asarray(slopes + (changes - steps @ slopes.T).T @ np.linalg.pinv(steps.T, rcond=alike))
@@ -118,7 +118,7 @@ def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
     if model.is_stable(balanced, NEARLY_UNSTABLE):
         step = balanced - state.temperatures
     elif gain(slopes) < NEARLY_UNSTABLE:
-        step = np.linalg.solve(np.eye(len(slopes)) - slopes, state.deviation)
+        step = np.asarray(np.linalg.solve(np.eye(len(slopes)) - slopes, state.deviation), float)
     else:
         step = model._replace(rest=no_rest()).balanced() - state.temperatures
     longest = LONGEST_STEP

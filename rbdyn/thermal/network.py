@@ -21,7 +21,7 @@ class Conductances(NamedTuple):
 
     ``flow``: heat capacity of the oil stream through the cavity. ``oil_outer``, ``oil_inner``, ``oil_rollers``: surfaces to the oil.
     ``outer_rollers``, ``inner_rollers``: race contacts. ``outer_ambient``, ``inner_ambient``: through housing and shaft.
-    ``sump``: from the oil of a bath through the walls of the housing, beside the seat.
+    ``sump``: from the oil of a bath through the walls of the housing, not through the seat.
     """
 
     flow: float

@@ -9,7 +9,6 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOSSES, POWERS, ROLLING, RollerBearing
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
 from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
@@ -165,23 +164,12 @@ DISTANCES = np.geomspace(1.0, 200.0, 17)
 def loss_levels(hot: Scene, bearing: RollerBearing) -> dict[str, Callable[[float], Array]]:
     """By key of a scene, the losses (terms,) at a value of it over those at its own, at the static loads of the rollers.
 
-    Rolling resistance follows its factor and the inlet, drag and windage the density of the mixture of oil and air.
+    Rolling resistance follows its factor and the inlet; without any there are no such keys.
     """
-    factor, distance, oil = hot.model.rolling_resistance_factor, hot.lubricant.inlet_distance, hot.oil()
-    rolling = np.array([term.endswith("rolling_resistance") for term in TERMS])
-    drag = np.array([term in ("roller_drag", "spin_windage") for term in TERMS])
-
-    def density(share: float) -> float:
-        return share * oil.density + (1.0 - share) * AIR_DENSITY
-
-    share = hot.lubricant.oil_fraction
-    scale = share / hot.lubricant.oil_fraction_factor
-    levels = {
-        "lubricant.oil_fraction": lambda value: np.where(drag, density(value) / density(share), 1.0),
-        "lubricant.oil_fraction_factor": lambda value: np.where(drag, density(value * scale) / density(share), 1.0),
-    }
+    factor, distance = hot.model.rolling_resistance_factor, hot.lubricant.inlet_distance
     if hot.model.rolling_resistance == "off" or factor == 0.0:
-        return levels
+        return {}
+    rolling = np.array([term.endswith("rolling_resistance") for term in TERMS])
     loads = load_distribution(hot, bearing, hot.operation.largest_load_N)
     forces = np.log([_rolling_force(hot, loads, one) for one in DISTANCES])
     usual = math.log(_rolling_force(hot, loads, distance))
@@ -190,7 +178,7 @@ def loss_levels(hot: Scene, bearing: RollerBearing) -> dict[str, Callable[[float
         level = np.exp(np.interp(math.log(value), np.log(DISTANCES), forces) - usual)
         return np.where(rolling, level, 1.0)
 
-    return levels | {
+    return {
         "model.rolling_resistance_factor": lambda value: np.where(rolling, value / factor, 1.0),
         "lubricant.inlet_distance": at_distance,
     }
