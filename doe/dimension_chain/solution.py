@@ -239,12 +239,22 @@ def _accepted(chain: Chain, samples: int, seed: int) -> tuple[bool, SelectiveAss
     return status is not None, judged.matched if (status or "").startswith(MATCHED) else None
 
 
+def _with_sizes(chain: Chain, parts: Sequence[Part]) -> Chain:
+    """The chain with the sizes of parts stated in its links."""
+    sizes = {part.name: {key: getattr(part, key) for key in ("nominal_mm", "upper_mm", "lower_mm")} for part in parts}
+    free = {link.name for link in chain.free}
+    links = [link.model_copy(update=sizes[link.name]) if link.name in free else link for link in chain.link]
+    return chain.model_copy(update={"link": links})
+
+
 def _verdict(search: Allocation, judged: _Judged, accepted: Judge) -> _Verdict:
     if judged.status is not None:
         return _Verdict(judged.status)
     chain, parts, share = search.chain, judged.parts, judged.share
     # Sizes that a code states, such as those of bought rings, are no proposals.
     nearest = search.allocated() if chain.is_stated and any(link.fit is None for link in chain.free) else None
+    if nearest is not None and not accepted(_with_sizes(chain, nearest))[0]:
+        nearest = None
     reason = stated_reason(search, parts, share, nearest) if chain.is_stated else allocated_reason(search)
     remedy = remedy_of(search, parts, share, accepted)
     return _Verdict(f"refused: {reason}", miss_of(search, parts, share), remedy, nearest)

@@ -126,10 +126,9 @@ def _prediction(pace: Pace) -> dict[str, float]:
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
+    figures: dict[str, Any] = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
-    tighter = TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
     races = race_report(scene, inner_load, outer_load)
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
@@ -139,12 +138,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",
-        impact_force_N=figures["impact_force_N"],
-        impact_contact_force_N=figures["impact_contact_force_N"],
-        whirl_deviation_ratio=figures["whirl_deviation_ratio"],
-        power_loss_W=figures["power_loss_W"],
-        cage_speed_rpm=figures["cage_speed_rpm"],
-        cage_slip=figures["cage_slip"],
+        **figures,
         power_balance={"relative_gap": power_gap},
         power_terms_W=terms,
         rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
@@ -174,7 +168,9 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *scene.catalogue_notes,
             *_balance_notes(scene, power_gap),
             *ensemble.notes,
-            *error_notes(scene, figures, ensemble.fault, tighter),
+            *error_notes(
+                scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
+            ),
             *whirl_notes(scene, orbit),
             *pulse_notes(scene, pulses),
             *heat_notes(scene, figures["power_loss_W"].value),
