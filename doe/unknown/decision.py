@@ -142,7 +142,8 @@ def _shares(values: Array, variances: Array, counts: Whole, hits: Hits, random: 
     for step in range(1, STEPS + 1):
         share = share * (likelihood.T @ (weights / np.maximum(likelihood @ share, 1e-300)))
         if step in (EARLIER, STEPS):
-            shares.append(share @ hits(points))
+            # A share of all is 1, which rounding of a sum may miss.
+            shares.append(np.round(share @ hits(points), 12))
     return np.array(shares)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.unknown.decision import better, odds
+from doe.unknown.decision import _shares, better, odds
 
 ROWS = 128
 
@@ -34,10 +34,13 @@ def gains_with_noise(kind: str, noise: float, seed: int) -> tuple[np.ndarray, np
 
 @pytest.mark.parametrize("kind", CHANCE)
 def test_chance_of_gains_of_any_form(kind: str) -> None:
-    """Mean of a few samples; a normal law in place of the form gives 0.52 for skewed gains and 0.89 with rare bad cases."""
-    found = [better(*gains_with_noise(kind, 0.6, seed), seed).gains[0] for seed in range(4)]
-    assert np.mean([share.value for share in found]) == pytest.approx(CHANCE[kind], abs=0.06)
-    assert sum(share.low <= CHANCE[kind] <= share.high for share in found) >= 3
+    """Mean of twelve samples; a normal law in place of the form gives 0.52 for skewed gains and 0.87 with rare bad cases."""
+    shares, random = [], np.random.default_rng(1)
+    for seed in range(12):
+        gains, variances = gains_with_noise(kind, 0.6, seed)
+        every = np.ones(ROWS, dtype=np.int64)
+        shares.append(_shares(gains, variances, every, lambda points: points > 0.0, random)[1, 0])
+    assert np.mean(shares) == pytest.approx(CHANCE[kind], abs=0.05)
 
 
 def test_odds_of_a_limit_are_of_any_form_too() -> None:

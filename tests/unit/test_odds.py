@@ -42,6 +42,7 @@ def test_limit_case_without_noise_counts_the_rows():
     assert none[:2] == (0.0, 0.0) and 0.0 < none.high < 0.05 and every.value == every.high == 1.0 and every.low > 0.95
 
 
+@pytest.mark.slow
 def test_invariant_intervals_hold_the_probability():
     """Invariant: in 90 to 99 of 100 repeats of 128 input sets."""
     truth = special.ndtr(0.8)
