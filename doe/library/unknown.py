@@ -1,6 +1,5 @@
 """Unknown inputs of a scene: ``uncertainty`` and ``calibrate``, and their answers."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -229,16 +228,16 @@ def calibrate(
     with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)
         identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
-        output.claim(path)
         if not retry and (record := stored(folder, identity)) is not None:
             return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
+        output.claim(path)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
             predicted = None if scheduler else agenda.state_first(pace(question))
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
-                turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
+                turns, took_s = simulations.turns, agenda.elapsed_s
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
             output.write(lambda stage: write(result, record, stage, scene), last=RECORD)

@@ -155,9 +155,9 @@ def study(
     with output_folder(folder, "doe", STUDY_FILES, force=force) as output, registered(path, folder):
         loaded = Study.load(path)
         digest = inputs_digest(loaded, adaptive, robust)
-        output.claim(path)
         if not retry and (record := finished_record(folder, digest)):
             return StudyAnswer(record, folder, tuple(record["files"]), finished_before=True)
+        output.claim(path)
         from doe.report.files import write
         from doe.workflow.whole import run_study, unmet_chains
 

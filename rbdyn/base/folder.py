@@ -46,7 +46,7 @@ class OutputFolder:
         self.path, self._command, self._force, self._keeps = path, command, force, keeps
         self._patterns = [_folded(name) for name in (*files, *keeps, MARK)]
         self._mark: dict[str, Any] = {}
-        self._locked = False
+        self._locked = self._new = False
 
     def claim(self, source: Path | None = None, *others: Path) -> None:
         """Make the folder and lock it for results of the file ``source``; ``others``: files that are read later.
@@ -62,6 +62,7 @@ class OutputFolder:
             record_read(other)
         try:
             self._check(path, own)
+            self._new = not path.exists()
             path.mkdir(parents=True, exist_ok=True)
             if lock.seize_lock(path, alone=True) is None:
                 raise InputError(
@@ -96,17 +97,22 @@ class OutputFolder:
         return made
 
     def close(self) -> None:
-        """Free the lock."""
+        """Free the lock; a folder that the command made for nothing goes."""
         if self.path is None or not self._locked:
             return
         with suppress(OSError):
-            # A folder that was removed meanwhile is not made again.
-            if self.path.is_dir():
+            names = set(os.listdir(self.path))
+            if self._new and names <= OWN:
+                (self.path / MARK).unlink()
+            else:
                 made = self._mark["files"].items()
-                self._mark["files"] = {name: digest for name, digest in made if digest or (self.path / name).exists()}
+                self._mark["files"] = {name: digest for name, digest in made if digest or name in names}
                 write_json(self.path / MARK, {key: value for key, value in self._mark.items() if key != "process"})
         self._locked = False
         lock.free_lock(self.path)
+        if self._new:
+            with suppress(OSError):
+                self.path.rmdir()
 
     def _owner(self, path: Path, source: Path | None) -> dict[str, str]:
         """The command, its file relative to the folder, so that both can move together, and the digest of that file.

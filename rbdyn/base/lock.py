@@ -1,7 +1,8 @@
 """Lock of a folder: one process at a time writes to it, any number may read it.
 
 The lock is an exclusive transaction of an empty sqlite database in the folder. The system ends it with its process, so no lock
-outlives its owner and no clock is read. All users in one process share the lock, unless one asks to be alone.
+outlives its owner and no clock is read. All users in one process share the lock, unless one asks to be alone. The last one
+removes the file.
 """
 
 import os
@@ -41,19 +42,41 @@ def seize_lock(folder: Path, alone: bool = False) -> str | None:
         if path in _sessions and alone:
             return None
         if path not in _sessions:
-            connection = sqlite3.connect(
-                Path(path, NAME), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False
-            )
-            try:
-                connection.execute("BEGIN EXCLUSIVE")
-            except sqlite3.Error as error:
-                connection.close()
-                if is_busy(error):
-                    return None
-                raise
+            connection = _connected(Path(path, NAME))
+            if connection is None:
+                return None
             _sessions[path] = _Session(connection)
         _sessions[path].users += 1
         return _sessions[path].token
+
+
+def _connected(file: Path) -> sqlite3.Connection | None:
+    """A connection that holds the file for itself; None if another process does."""
+    while True:
+        file.touch()
+        before = _identity(file)
+        connection = sqlite3.connect(file, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
+        try:
+            connection.execute("BEGIN EXCLUSIVE")
+        except sqlite3.Error as error:
+            connection.close()
+            if is_busy(error):
+                return None
+            if _identity(file) != before:
+                continue
+            raise
+        if before is not None and _identity(file) == before:
+            return connection
+        # The former owner has removed the file that was opened.
+        connection.close()
+
+
+def _identity(file: Path) -> tuple[int, int] | None:
+    """What tells a file from a later one of its name; None without a file."""
+    with suppress(OSError):
+        status = file.stat()
+        return status.st_ino, status.st_ctime_ns
+    return None
 
 
 def free_lock(folder: Path) -> None:
@@ -63,6 +86,8 @@ def free_lock(folder: Path) -> None:
         session = _sessions[path]
         session.users -= 1
         if not session.users:
+            with suppress(OSError):
+                Path(path, NAME).unlink(missing_ok=True)
             session.connection.close()
             del _sessions[path]
 
