@@ -96,6 +96,10 @@ class Answer(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self.record)
 
+    def __hash__(self) -> int:
+        """Equal answers have equal keys."""
+        return hash(frozenset(self.record))
+
     def __str__(self) -> str:
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
         return terminal.text(self.screen(), Detail.USUAL, width).rstrip("\n")

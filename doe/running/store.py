@@ -28,7 +28,7 @@ from rbdyn.base.digests import user_cache
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.lock import free_lock, is_busy, is_locked, seize_lock
 from rbdyn.base.storage import digest_of
-from rbdyn.base.streams import Uninterrupted
+from rbdyn.base.streams import Uninterrupted, escaped
 from rbdyn.result import read_json
 
 T = TypeVar("T")
@@ -167,7 +167,7 @@ class Database:
         """Print a sentence on standard error, unless all ``things`` were reported before."""
         if not self._reported.issuperset(things):
             self._reported.update(things)
-            print(f"{self.path}: {sentence}", file=sys.stderr)
+            print(escaped(f"{self.path}: {sentence}"), file=sys.stderr)
 
     @contextmanager
     def _transaction(self, durable: bool) -> Iterator[sqlite3.Connection]:

@@ -368,8 +368,8 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
         if begun and content.alive and stage.since is not None:
             at_once = _at_once(stage.since, content, now) or at_once
             seconds -= sum(min(_for_s(run, now), pace * work / len(content.running)) for run in content.running)
-            overdue_s = OVERDUE * (now - stage.since) if stage.besides_s else 0.0
-            besides_s = max(stage.besides_s - (now - stage.since), overdue_s)
+            spent_s = max(now - stage.since, 0.0)  # the clock may have gone back
+            besides_s = max(stage.besides_s - spent_s, OVERDUE * spent_s if stage.besides_s else 0.0)
         else:
             besides_s = stage.besides_s
         left_s += max(seconds, 0.0) / at_once + besides_s

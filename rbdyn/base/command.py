@@ -16,20 +16,23 @@ import typer
 from typer.core import TyperCommand
 
 from rbdyn.base.blocks import Table
-from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.streams import FAILED
+from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
 
 # Exit code of a command whose input is at fault.
 BAD_INPUT = 2
+# Whole numbers that numba and matplotlib read of the environment, with their ends.
+VARIABLES = {"NUMBA_NUM_THREADS": (1, 10_000), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
 
 
 @contextmanager
 def guarded(as_json: bool) -> Iterator[None]:
     """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
     try:
+        refuse(_environment_faults())
         yield
     except InputError as error:
         _leave(as_json, BAD_INPUT, error.faults)
@@ -42,6 +45,15 @@ def guarded(as_json: bool) -> Iterator[None]:
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
+
+
+def _environment_faults() -> Iterator[str]:
+    """Sentences on variables of the environment that end a library in the middle of a command."""
+    for name, (least, most) in VARIABLES.items():
+        value = os.environ.get(name, "").strip() or str(least)
+        if not (value.isdecimal() and value.isascii() and least <= int(value[:LONGEST_NAME]) <= most):
+            shown = one_line(value, LONGEST_NAME)
+            yield f"environment variable {name} = {shown}: must be a whole number from {least} to {most}; unset it"
 
 
 def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
@@ -112,7 +124,12 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
         bar.update(task, completed=count, total=total)
 
     with Progress(
-        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeLeft(),
+        console=Console(file=styled(sys.stderr)),
+        transient=True,
     ) as bar:
         task = bar.add_task(title, total=None)
         yield progress
@@ -120,7 +137,7 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
     """Function that prints a note to standard error at once; None for a quiet command."""
-    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
+    return None if quiet else lambda sentence: print(f"note: {escaped(sentence)}", file=sys.stderr, flush=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

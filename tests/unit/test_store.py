@@ -287,6 +287,46 @@ def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, m
         assert store.outcomes(POINTS) == {}
 
 
+INTERRUPTED = """
+import os, random, signal, sys, threading, time
+from pathlib import Path
+from doe.running.store import Point, Store
+signals, draw, done = int(sys.argv[2]), random.Random(1), threading.Event()
+with Store(Path(sys.argv[1])) as store, Store(Path(sys.argv[1])) as other:
+    def work():
+        while not done.is_set():
+            store.begin(Point("worker", "worker"))
+    def interrupt():
+        for _ in range(signals):
+            time.sleep(draw.uniform(0.0, 0.004))
+            os.kill(os.getpid(), signal.SIGINT)
+        done.set()
+    caught, threads = 0, [threading.Thread(target=each) for each in (work, interrupt)]
+    for each in threads:
+        each.start()
+    while not done.is_set():
+        try:
+            while not done.is_set():
+                store.note("agenda ", "text")
+                other.release()
+        except KeyboardInterrupt:
+            caught += 1
+    for _ in range(20):
+        try:
+            time.sleep(0.01)
+        except KeyboardInterrupt:
+            caught += 1
+    store.put("last", {"x": 1})
+    print(caught > 0, store._connection.in_transaction or other._connection.in_transaction)
+"""
+
+
+def test_ctrl_c_at_any_moment_leaves_no_transaction_and_no_lock(path):
+    line = [sys.executable, "-c", INTERRUPTED, str(path), "200"]
+    shown = subprocess.run(line, capture_output=True, text=True, timeout=120)
+    assert (shown.returncode, shown.stdout) == (0, "True False\n"), shown.stderr
+
+
 def test_stores_of_one_process_share_its_lock_until_the_last_is_closed(path):
     one, two = Store(path), Store(path)
     one.close()
