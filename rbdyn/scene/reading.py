@@ -47,7 +47,7 @@ def _copied(value: T, source: str) -> T:
     """A copy that shares nothing. Raises InputError for what cannot be copied, such as a generator."""
     try:
         return deepcopy(value)
-    except (TypeError, ValueError, RecursionError) as error:
+    except (TypeError, RecursionError) as error:
         raise InputError(
             [f"{source}: holds a value that cannot be copied ({error}); give numbers, texts, lists and tables"]
         ) from None

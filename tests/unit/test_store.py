@@ -317,7 +317,7 @@ with Store(Path(sys.argv[1])) as store, Store(Path(sys.argv[1])) as other:
         except KeyboardInterrupt:
             caught += 1
     store.put("last", {"x": 1})
-    print(caught > signals // 4, store._connection.in_transaction or other._connection.in_transaction)
+    print(caught > 0, store._connection.in_transaction or other._connection.in_transaction)
 """
 
 
