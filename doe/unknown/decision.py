@@ -4,12 +4,11 @@ Gains. Rows are pairs: both designs at the same input set, with relative gains D
 simulation. Single gains scatter more than the true ones, so the noise is removed from their distribution. It begins as if the true
 gains were normal, those of row i about m + V (V + S_i)^-1 (D_i - m), V = cov D - mean S, with a few points drawn for each row.
 Steps of expectation maximisation then move the weights of all points to the distribution under which the gains are likeliest,
-whatever its form: skewed, of several parts, or with rare bad cases. They end before it follows the noise, and how far the share
-still moves lengthens its interval on that side. A probability is the weight of the points at which all gains are positive; its
-interval is by resampling rows. Gains are joint: their probabilities are never multiplied.
+whatever its form. They end before it follows the noise, and how far the share still moves lengthens its interval on that side.
+A probability is the weight of the points at which all gains are positive; its interval is by resampling rows, and no shorter than
+Wilson's. Gains are joint: their probabilities are never multiplied.
 
-Limits. Rows are input sets at which the design was simulated, and the noise of their values is removed alike. The probability is the
-weight of the points between the limits; its interval is no shorter than Wilson's.
+Limits. The noise is removed alike from values at input sets. The probability is the weight of the points between the limits.
 
 Worth. Gains are emulated over all inputs; the joint residuals of a row may occur at any input set. p(t) is the probability that
 all gains are positive, given the value t of an input. Its flip is where p(t) crosses a half. Its worth is
@@ -48,12 +47,10 @@ from rbdyn.base.arrays import Array, Whole
 
 # Points of true values for a row and at most, steps of their weights and earlier ones, and the cases that an interval holds.
 POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER, CONFIDENCE = 4, 1024, 100, 25, 0.95
-# Resamplings of rows, so many of up to 512 rows; of more rows fewer, as each takes longer.
+# Resamplings of up to 512 rows; of more rows fewer.
 RESAMPLES, FEWEST_RESAMPLES, USUAL_ROWS = 200, 50, 512
 # Least standard deviation of noise over the size of the values: smaller noise is lost in rounding.
 LEAST_NOISE = 1e-9
-
-
 Hits = Callable[[Array], NDArray[np.bool_]]  # from points (k, m) to whether each hits (k, q)
 
 
@@ -142,8 +139,7 @@ def _shares(values: Array, variances: Array, counts: Whole, hits: Hits, random: 
     for step in range(1, STEPS + 1):
         share = share * (likelihood.T @ (weights / np.maximum(likelihood @ share, 1e-300)))
         if step in (EARLIER, STEPS):
-            # A share of all is 1, which rounding of a sum may miss.
-            shares.append(np.round(share @ hits(points), 12))
+            shares.append(np.round(share @ hits(points), 12))  # sums of shares are 1 but for rounding
     return np.array(shares)
 
 
