@@ -162,7 +162,7 @@ class Numerics(Consistent):
     """Longest run with extend, as a multiple of turns."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
     """Number of runs of the scene from different starts, whose scatter gives the statistical error. Every second one starts with
-    slip, its cage near the guide and its rollers at one side of their pockets, so that runs that have not settled differ."""
+    slip, its cage near the guide and its rollers at one side of their pockets. So runs that have not settled differ."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all random starts and spreads. Equal scenes of equal seed and version give equal bits."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
