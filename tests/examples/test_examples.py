@@ -181,7 +181,9 @@ def test_literature_table4(effort):
 
 def test_literature_rolling_torque():
     """Literature: 32216 at 6 kN and 50 C, flooded, has the torques of an independent evaluation of the same law within 1 %."""
-    frame = script("published.rolling_torque").check().frame
+    from published.rolling_torque import check
+
+    frame = check().frame
     assert frame["flooded"].tolist() == pytest.approx([2748.0, 4443.0, 6684.0, 8440.0], rel=0.01)
     assert (frame["2 half-widths"] < frame["5 half-widths"]).all() and (frame["5 half-widths"] < frame["flooded"]).all()
 
