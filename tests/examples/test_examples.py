@@ -174,13 +174,16 @@ def test_literature_table4(effort):
     assert frame["spearman"]["impact_force_N"] > 0.5
     # With the contacts of the paper its levels follow, and the ranks of the impact do no better.
     theirs = every[every["law"] == "their contacts"].set_index("response")
-    assert theirs["level_ratio"]["impact_force_N"] == pytest.approx(1.1, abs=0.2)
-    assert theirs["level_ratio"]["power_loss_W"] == pytest.approx(0.9, abs=0.1)
+    assert theirs["level_ratio"]["impact_force_N"] == pytest.approx(1.24, abs=0.1)
+    assert theirs["level_ratio"]["power_loss_W"] == pytest.approx(0.85, abs=0.05)
+    assert theirs["spearman"]["whirl_deviation_ratio"] < 0.0
 
 
 def test_literature_rolling_torque():
     """Literature: 32216 at 6 kN and 50 C, flooded, has the torques of an independent evaluation of the same law within 1 %."""
-    frame = script("published.rolling_torque").check().frame
+    from published.rolling_torque import check
+
+    frame = check().frame
     assert frame["flooded"].tolist() == pytest.approx([2748.0, 4443.0, 6684.0, 8440.0], rel=0.01)
     assert (frame["2 half-widths"] < frame["5 half-widths"]).all() and (frame["5 half-widths"] < frame["flooded"]).all()
 
