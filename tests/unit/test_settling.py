@@ -401,6 +401,9 @@ def test_unit_replicates_start_in_two_groups(outer, make_scene):
         within = wall * (away - moved) / outer.pocket_clearance_m
         assert within.min() >= 0.1 - 1e-9 and within.max() <= 0.5 + 1e-9
     assert record(Run(with_numerics(outer, turns=1.0, discard_turns=0.0), bearing, 1, 0.01, Stop())).group == 1
+    tight = make_scene("cage.guide_clearance_mm=0.001", "model.land_film_floor_um=0.1")
+    cage = start_state(tight, roller_bearing(tight), np.random.default_rng(8), 1)[5 * z :]
+    assert np.hypot(*cage[[CAGE_X, CAGE_Y]]) == pytest.approx(0.05e-6)
 
 
 @pytest.mark.slow
