@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 Hear = Callable[[str, float, float], None] | None
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
-RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+WHOLE = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Short states of a heat balance at least: two of the search, and two for the gain of its loop.
 SHORT_STATES = 4
 # Offsets of seeds that no design run has; the input sets are those of an uncertainty.
@@ -56,7 +56,7 @@ ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 def check_responses(study: Study) -> None:
     """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
     heats = any(name in TEMPERATURES for name in study.figures) and _has_balance(study)
-    names = ", ".join((*RESPONSES, *TEMPERATURES) if heats else RESPONSES)
+    names = ", ".join(responses_of(heats))
     refuse(
         f"{study.path}: response.name = {name!r}: "
         + (
@@ -65,7 +65,7 @@ def check_responses(study: Study) -> None:
             else f"the simulation does not give it; choose one of {names}"
         )
         for name in study.figures
-        if name not in RESPONSES and not (heats and name in TEMPERATURES)
+        if name not in responses_of(heats)
     )
     refuse(
         f'{study.path}: response.aggregate of {response.name} = "worst_relative": temperatures in °C have no ratio; write '
@@ -73,6 +73,13 @@ def check_responses(study: Study) -> None:
         for response in study.file.response
         if response.name in TEMPERATURES and response.aggregate == "worst_relative"
     )
+
+
+def responses_of(heats: bool) -> tuple[str, ...]:
+    """Names of all figures that may be responses; ``heats``: whether a heat balance gives temperatures."""
+    from rbdyn.dynamics import part_figures
+
+    return (*WHOLE, *(TEMPERATURES if heats else ()), *part_figures.NAMES)
 
 
 def _has_balance(study: Study) -> bool:
@@ -504,7 +511,7 @@ def quantity_of(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Figure of a response in the JSON form of a result; empty where the run does not report it."""
     if name in TEMPERATURES and "temperatures_C" in record:
         return record["temperatures_C"].get(TEMPERATURES[name]) or {}
-    return record.get(name) or {}
+    return record.get(name) or (record.get("part_figures") or {}).get(name) or {}
 
 
 def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResult]) -> tuple[Array, Array, Whole]:

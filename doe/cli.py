@@ -3,17 +3,15 @@
 from rbdyn.base.loading import Loading
 
 with Loading():
-    import typer
-
     from doe.commands.keys import keys
     from doe.commands.new import new
     from doe.commands.steps import chain, design, fit, front
     from doe.commands.study import status, study
     from doe.commands.unknown import calibrate, uncertainty
     from rbdyn.base import streams
-    from rbdyn.base.command import Version, refusing
+    from rbdyn.base.command import Program, Version, refusing
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+app = Program()
 
 for command in (new, status, design, fit, chain, uncertainty, calibrate, keys):
     app.command()(command)

@@ -292,8 +292,8 @@ class DutyResult:
         return {point: self._figures(result) for point, result in self.baseline.items()}
 
     def _figures(self, result: SimulationResult) -> dict[str, Quantity]:
-        quantities = result.quantities
-        return {name: quantities[name] for name in self.duty.rules if name in quantities}
+        responses = result.responses
+        return {name: responses[name] for name in self.duty.rules if name in responses}
 
     @property
     def worst(self) -> dict[str, tuple[str, float]]:

@@ -17,14 +17,15 @@ from typing import Annotated
 import typer
 from published.ball_papers import angular_contact, double_decker_search
 from published.cage_speed import cage_speed
+from published.chen_2022 import table4
 from published.common import Check, Effort, Finding, tally_table
 from published.friction_totals import friction_totals
 from published.minimum_load import minimum_load
 from published.operating import figure14, friction
+from published.rolling_torque import check as rolling_torque
 from published.sensitivity import QUICK, sensitivity
 from published.skidding import QUICK as QUICK_ASSUMPTIONS
 from published.skidding import nu215
-from published.table4 import table4
 from published.whirl import whirl
 
 SHORT = Effort(replicates=3, turns=20, discard_turns=5)
@@ -47,6 +48,7 @@ FULL: dict[str, Callable[[], Check]] = {
     "sensitivity": lambda: sensitivity(SHORT),
     "whirl": lambda: whirl(MEDIUM),
     "cage_speed": lambda: cage_speed(SHORT),
+    "torque": rolling_torque,
     "search": double_decker_search,
     "angular": angular_contact,
 }
@@ -62,6 +64,7 @@ BRIEF: dict[str, Callable[[], Check]] = {
     "sensitivity": lambda: sensitivity(SHORT, QUICK, whole_design=False),
     "whirl": lambda: whirl(SHORT, (1.0, 0.1, 0.01, 0.001), ("four_constant",), 5.0),
     "cage_speed": lambda: cage_speed(SHORT, (20000, 26000, 32000)),
+    "torque": rolling_torque,
     "search": double_decker_search,
     "angular": angular_contact,
 }  # fmt: skip

@@ -121,6 +121,8 @@ class SimulationResult(Brief, SavedRecord):
     - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
+    - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
+      (``rbdyn.dynamics.part_figures``)
     - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
       None unless numerics.pulse_threshold_N is stated
     """
@@ -157,6 +159,12 @@ class SimulationResult(Brief, SavedRecord):
     pulse_impulse_N_s: Quantity | None = None  # noqa: N815
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
+    part_figures: dict[str, Quantity] | None = None
+
+    @property
+    def responses(self) -> dict[str, Quantity]:
+        """All figures with errors that a study may name: those of the whole bearing and of its parts."""
+        return self.quantities | (self.part_figures or {})
 
     @property
     def jitters(self) -> bool:
@@ -234,15 +242,31 @@ def write_json(path: Path | str, data: dict[str, Any]) -> None:
 def whole_file(path: Path | str) -> Iterator[Path]:
     """A file to write, which then replaces ``path``: a reader gets the old one or the new one.
 
-    A failure or an interruption leaves no part of the new one.
+    A failure or an interruption leaves no part of the new one. Raises InputError for a path where no file can be.
     """
-    path = Path(path)
+    path = path_of(path)
+    if path.is_dir() or not path.name:
+        raise InputError([f"{path}: is a folder; name a file in it"])
+    if not path.parent.is_dir():
+        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
-        yield partial
-        os.replace(partial, path)
+        with naming(lambda: path):
+            yield partial
+            os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: Callable[[], Path]) -> Iterator[None]:
+    """Let an error of the disk name a file, which it does not do where writing fails: ``path`` finds it then."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            error.filename = str(path())
+        raise
 
 
 def versions() -> dict[str, str]:

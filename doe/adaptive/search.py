@@ -79,8 +79,8 @@ class Batch:
     """State of the search after ``runs`` runs that went well, those of the design included.
 
     ``hypervolume`` of the predicted front and its standard ``deviation`` over the functions drawn from the emulators; ``gained``
-    by the last batch (NaN before the first); ``remaining`` to be gained if all were known. All are on the scale of the predicted
-    front at that time. ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front.
+    by the last batch (NaN before the first); ``remaining``: mean of what would be gained if all were known, and its standard
+    deviation ``remaining_error`` over these functions. All are on the scale of the predicted front at that time. ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front.
     ``why`` the next batch was made: "improvement", "check" of the predicted front, or "extension"; "" after the last.
     """
 
@@ -89,6 +89,7 @@ class Batch:
     deviation: float
     gained: float
     remaining: float
+    remaining_error: float
     why: str
     reached: float = float("nan")
 
@@ -274,6 +275,7 @@ class _Search:
             deviation=float(now.std()),
             gained=float((now - previous).mean()) if len(self.fronts) > 1 else float("nan"),
             remaining=float((best - now).mean()),
+            remaining_error=float((best - now).std()),
             why="",
         )
         return levels, by_runs.improvable, state

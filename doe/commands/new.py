@@ -107,8 +107,9 @@ def new(
 
 def limits_of(texts: Sequence[str]) -> Limits:
     """Limits by response. Raises InputError with all faults at once."""
-    from doe.clearance import RESPONSES, TEMPERATURES
+    from doe.clearance import responses_of
     from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
+    from rbdyn.base.words import quantity
 
     limits: Limits = {}
     faults = []
@@ -118,11 +119,11 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
             continue
         name, sign, number = match.groups()
-        if name not in RESPONSES and name not in TEMPERATURES:
-            faults.append(f"{where}: no response has that name; choose one of {', '.join(RESPONSES)}")
+        if name not in (names := responses_of(heats=True)):
+            faults.append(f"{where}: no response has that name; choose one of {', '.join(names)}")
             continue
         try:
-            value = plain_number(number)
+            value = plain_number(number, quantity(name)[1])
         except MethodError as error:
             faults.append(f"{where}: {one_line(number, LONGEST_NAME)} {error}")
             continue

@@ -8,13 +8,14 @@ import typer
 
 from doe.commands.options import Data, Out, Quiet, Retry, Save, Scheduler, StudyPath, bars, keeping_runs
 from rbdyn.base.blocks import Detail
-from rbdyn.base.command import FAILED, Json, Workers, flag, guarded, hand_over, valued
+from rbdyn.base.command import FAILED, Force, Json, Workers, flag, guarded, hand_over, valued
 from rbdyn.base.terminal import show
 
 
 def design(
     path: StudyPath,
     out: Save = None,
+    force: Force = False,
     as_json: Json = False,
     as_csv: Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")] = False,
     quiet: Annotated[bool, flag("--quiet", "-q", says="Actual values only.")] = False,
@@ -25,7 +26,7 @@ def design(
         from doe.library.steps import design
         from doe.report.sections.design import print_csv
 
-        answer, detail = design(path, out), Detail.of(quiet, verbose)
+        answer, detail = design(path, out, force), Detail.of(quiet, verbose)
         record = answer.as_dict()
         hand_over(
             lambda: record,
@@ -54,6 +55,7 @@ def fit(
         valued("NAME", "linear, interaction, pure_quadratic, quadratic or reduced, without STUDY.", "quadratic"),
     ] = None,
     out: Out = None,
+    force: Force = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -68,7 +70,9 @@ def fit(
         from doe.library.steps import fit
 
         with bars(quiet or as_json, workers) as progress:
-            answer = fit(path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress)
+            answer = fit(
+                path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress, force
+            )
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 
@@ -87,6 +91,7 @@ def front(
     path: StudyPath,
     data: Data = None,
     out: Out = None,
+    force: Force = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -100,7 +105,7 @@ def front(
         from doe.library.steps import front
 
         with bars(quiet or as_json, workers) as progress:
-            answer = front(path, data, out, point, workers, scheduler, retry, progress)
+            answer = front(path, data, out, point, workers, scheduler, retry, progress, force)
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 
@@ -110,6 +115,7 @@ def chain(
         Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
     ],
     out: Save = None,
+    force: Force = False,
     as_json: Json = False,
     quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
@@ -118,7 +124,7 @@ def chain(
     with guarded(as_json):
         from doe.library.steps import chain
 
-        answer = chain(path, out)
+        answer = chain(path, out, force)
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
         several = "chains" in answer

@@ -21,7 +21,7 @@ from doe.commands.options import (
     print_predicted,
 )
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
-from rbdyn.base.command import FAILED, Json, Workers, folder_option, guarded, hand_over, notice, print_json
+from rbdyn.base.command import FAILED, Force, Json, Workers, folder_option, guarded, hand_over, notice, print_json
 from rbdyn.base.faults import InputError
 from rbdyn.base.forecast import duration, span
 from rbdyn.base.terminal import show
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 def study(
     path: StudyPath,
     out: StudyOut = None,
+    force: Force = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -49,7 +50,7 @@ def study(
         from doe.library.whole import study
 
         with bars(quiet or as_json, workers) as progress:
-            answer = study(path, folder, adaptive, robust, workers, scheduler, retry, progress, notice(quiet))
+            answer = study(path, folder, adaptive, robust, workers, scheduler, retry, progress, notice(quiet), force)
         record = answer.as_dict()
         if not as_json:
             _print(answer, Detail.of(quiet, verbose))

@@ -7,7 +7,7 @@ import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler, bars, keeping_runs, print_predicted
 from rbdyn.base.blocks import Detail
-from rbdyn.base.command import Json, Set, Workers, folder_option, guarded, hand_over, notice, valued
+from rbdyn.base.command import Force, Json, Set, Workers, folder_option, guarded, hand_over, notice, valued
 from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
@@ -22,10 +22,20 @@ def uncertainty(
     target: Annotated[
         str, typer.Option(metavar="SHARE", help="Standard error of the ends of a range, as a share of its width.")
     ] = "10%",
+    figure: Annotated[
+        list[str] | None,
+        valued(
+            "NAME",
+            "A further output, such as land_film_power_W or outer_max_pressure_MPa; repeatable.",
+            "impact, whirl, loss, cage speed, temperatures",
+            "--figure",
+        ),
+    ] = None,
     overrides: Set = None,
     out: Annotated[
         Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_uncertainty")
     ] = None,
+    force: Force = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -50,6 +60,8 @@ def uncertainty(
                 retry,
                 progress,
                 notice(quiet),
+                figure or (),
+                force,
             )
         _hand_over(answer, as_json, quiet)
 
@@ -67,6 +79,7 @@ def calibrate(
     out: Annotated[
         Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_calibration")
     ] = None,
+    force: Force = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -80,7 +93,17 @@ def calibrate(
 
         with bars(quiet or as_json, workers) as progress:
             answer = calibrate(
-                path, data, free or (), overrides or (), folder, workers, scheduler, retry, progress, notice(quiet)
+                path,
+                data,
+                free or (),
+                overrides or (),
+                folder,
+                workers,
+                scheduler,
+                retry,
+                progress,
+                notice(quiet),
+                force,
             )
         _hand_over(answer, as_json, quiet)
 

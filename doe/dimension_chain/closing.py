@@ -142,7 +142,11 @@ class Function:
         lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
         first = {name: np.broadcast_to(sizes[name], values.shape)[lost[0]] for name in _varies_with(link)}
         place = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
-        what = f"expression = {quotation(link.expression)}" if link.expression else "press_fit or thermal_growth"
+        what = (
+            f"expression = {quotation(link.expression)}"
+            if link.expression is not None
+            else "press_fit or thermal_growth"
+        )
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
         return NoValueError(
             f'link "{link.name}": {what}: is {values[lost[0]]:g} at {place or "any size"}{share}, which gives no '
@@ -223,7 +227,7 @@ def used_links(link: Link) -> list[str]:
         return [link.press_fit.shaft, link.press_fit.bore]
     if link.thermal_growth:
         return [link.thermal_growth.of]
-    return names_in(link.expression) if link.expression else []
+    return names_in(link.expression) if link.expression is not None else []
 
 
 def middle(parts: Sequence[Part]) -> dict[str, float]:

@@ -1,15 +1,19 @@
 """A chain that misses its limits: by how much, why, and whether a yield or selective assembly would meet them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from doe.dimension_chain.allocation import Allocation, cheapest
+from doe.dimension_chain.allocation import SAMPLES, Allocation, cheapest
 from doe.dimension_chain.closing import interval, middle
-from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Mode, Part, Selective
-from doe.dimension_chain.yields import SelectiveAssembly, moments, selective_assembly
+from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Mode, Part, Selective, stated_parts
+from doe.dimension_chain.yields import SelectiveAssembly, classes_needed, moments, standard_error
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
 
 FEWEST_CLASSES = 2
+# Largest yield that random assemblies can show to be reached, two standard errors below 1.
+SURE_YIELD = 1.0 - 2.0 * standard_error(1.0, SAMPLES)
+# Whether a changed chain is accepted, and its matched assemblies where only they keep the limits.
+Judge = Callable[[Chain], tuple[bool, SelectiveAssembly | None]]
 
 
 class Miss(Record):
@@ -73,6 +77,11 @@ def allocated_reason(search: Allocation) -> str:
     """Why no tolerances can be allocated: the fixed links, the narrowest processes, or the resolution of the drawing."""
     chain, limits = search.chain, search.chain.closing_link
     bare = search.parts({link.name: 0.0 for link in chain.free})
+    if search.mode == "yield" and not search.function.linear and chain.allocate.target_yield > SURE_YIELD:
+        return (
+            f"allocate.target_yield = {chain.allocate.target_yield:g}: {SAMPLES} random assemblies cannot show it for a chain with "
+            f'functions; write at most {SURE_YIELD:g}, or mode = "worst_case"'
+        )
     if search.mode == "yield" and (share := search.sure_yield(bare)) < chain.allocate.target_yield:
         low, high = search.tails(bare)
         return (
@@ -116,15 +125,21 @@ def _interval(limits: ClosingLink, width: float) -> str:
     return f"{middle_mm - width / 2:.4f} to {middle_mm + width / 2:.4f} mm"
 
 
-def remedy_of(search: Allocation, parts: Sequence[Part], share: float) -> Remedy:
-    """Whether mode = "yield", or selective assembly of two parts, would meet the limits that ``parts`` miss."""
+def remedy_of(search: Allocation, parts: Sequence[Part], share: float, accepted: Judge) -> Remedy:
+    """Whether mode = "yield", or selective assembly of two parts, would meet the limits that ``parts`` miss.
+
+    ``share``: of their random assemblies within the limits. ``accepted``: judges a changed chain as it will be judged once its file has the change.
+    """
     chain, target = search.chain, search.chain.allocate.target_yield
-    reached = None if search.mode == "yield" else _yield_mode(chain, share)
-    meets = reached is not None and reached >= target
-    selective = _selective(search, parts)
+    reached, meets = None, False
+    if search.mode != "yield":
+        changed = chain.model_copy(update={"allocate": chain.allocate.model_copy(update={"mode": "yield"})})
+        meets = accepted(changed)[0]
+        reached = share if chain.is_stated and not search.function.linear else _yield_of(changed)
+    selective = _selective(search, parts, accepted)
     sentences = [
         *([_yield_sentence(reached, target)] if meets and reached is not None else []),
-        *([_selective_sentence(*selective)] if selective is not None else []),
+        *([_selective_sentence(chain, *selective)] if selective is not None else []),
     ]
     if not sentences:
         other = "" if reached is None else f'mode = "yield" (yield {reached:.4g} of {target:g}) nor '
@@ -135,7 +150,7 @@ def remedy_of(search: Allocation, parts: Sequence[Part], share: float) -> Remedy
         mode_yield_meets=meets,
         selective_yield=None if selective is None else selective[1].good,
         selective_classes=None if selective is None else selective[1].classes,
-        selective_pair=None if selective is None else selective[0],
+        selective_pair=None if selective is None else (selective[0].first, selective[0].second),
     )
 
 
@@ -143,22 +158,24 @@ def _yield_sentence(reached: float, target: float) -> str:
     return f'Write mode = "yield" under allocate to meet the limits: a yield of {reached:.6f}, where target_yield is {target:g}.'
 
 
-def _selective_sentence(pair: tuple[str, str], assembly: SelectiveAssembly) -> str:
-    table = f'selective = {{ first = "{pair[0]}", second = "{pair[1]}", classes = {assembly.classes} }}'
+def _selective_sentence(chain: Chain, settings: Selective, assembly: SelectiveAssembly) -> str:
+    pair = f'first = "{settings.first}", second = "{settings.second}"'
+    table = f"selective = {{ {pair}, classes = {settings.classes} }}"
+    if chain.selective is not None:
+        table = f"classes = {settings.classes} under selective"
     return (
         f"Write {table} to meet the limits by matching: a yield of {assembly.good:.6f} of the pairs, "
         f"with {100 * assembly.matched:.1f} % of the parts paired."
     )
 
 
-def _yield_mode(chain: Chain, share: float) -> float:
-    """Yield of the chain with mode = "yield": of its stated parts, or of those that this mode allocates."""
-    if chain.is_stated:
-        return share
-    rule = chain.allocate.model_copy(update={"mode": "yield"})
-    search = Allocation(chain.model_copy(update={"allocate": rule}))
+def _yield_of(chain: Chain) -> float:
+    """Yield by which a chain with mode = "yield" is judged: of its stated parts, or of those that this mode allocates."""
+    search = Allocation(chain)
     try:
-        return search.sure_yield(search.allocated() or search.narrowest())
+        return search.sure_yield(
+            stated_parts(chain.link) if chain.is_stated else search.allocated() or search.narrowest()
+        )
     except MethodError:
         return 0.0
 
@@ -171,8 +188,10 @@ def keeps_limits(chain: Chain, assembly: SelectiveAssembly) -> bool:
     return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
 
 
-def _selective(search: Allocation, parts: Sequence[Part]) -> tuple[tuple[str, str], SelectiveAssembly] | None:
-    """Two parts with the fewest classes that keep the limits: those of the chain, or the two that scatter most."""
+def _selective(
+    search: Allocation, parts: Sequence[Part], accepted: Judge
+) -> tuple[Selective, SelectiveAssembly] | None:
+    """The fewest classes of two parts that keep the limits: those of the chain, or the two that scatter most."""
     chain = search.chain
     slopes = search.function.sensitivities(middle(parts))
     spreads = {
@@ -181,22 +200,19 @@ def _selective(search: Allocation, parts: Sequence[Part]) -> tuple[tuple[str, st
         if part.origin != "temperature"
     }
     varying = sorted((name for name, spread in spreads.items() if spread > SLACK**2), key=lambda name: -spreads[name])
-    if chain.selective is not None:
-        pair = (chain.selective.first, chain.selective.second)
-    elif len(varying) < FEWEST_CLASSES:
+    if chain.selective is None and len(varying) < FEWEST_CLASSES:
         return None
-    else:
-        pair = (varying[0], varying[1])
-    settings = chain.selective or Selective(first=pair[0], second=pair[1], classes=FEWEST_CLASSES)
-    first = selective_assembly(search.function, parts, chain.closing_link, settings)
-    candidates = [first.classes_needed] if chain.allocate.mode != "yield" else [2, 3, 4, 6, 8, 12]
+    settings = chain.selective or Selective(first=varying[0], second=varying[1], classes=FEWEST_CLASSES)
+    candidates = [2, 3, 4, 6, 8, 12]
+    if chain.allocate.mode != "yield":
+        candidates = [
+            max(count, FEWEST_CLASSES)
+            for count in (classes_needed(search.function, parts, chain.closing_link, settings),)
+            if count is not None
+        ]
     for classes in candidates:
-        if classes is None:
-            continue
-        number = max(classes, FEWEST_CLASSES)
-        assembly = selective_assembly(
-            search.function, parts, chain.closing_link, settings.model_copy(update={"classes": number})
-        )
-        if keeps_limits(chain, assembly):
-            return pair, assembly
+        changed = settings.model_copy(update={"classes": classes})
+        _, matched = accepted(chain.model_copy(update={"selective": changed}))
+        if matched is not None:
+            return changed, matched
     return None

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,16 @@ from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval,
 from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, stated_parts
 from doe.dimension_chain.reading import faults
-from doe.dimension_chain.refusal import Miss, Remedy, allocated_reason, keeps_limits, miss_of, remedy_of, stated_reason
+from doe.dimension_chain.refusal import (
+    Judge,
+    Miss,
+    Remedy,
+    allocated_reason,
+    keeps_limits,
+    miss_of,
+    remedy_of,
+    stated_reason,
+)
 from doe.dimension_chain.yields import (
     COMMON_LAWS,
     Assemblies,
@@ -26,11 +36,12 @@ from doe.dimension_chain.yields import (
     selective_assembly,
     standard_error,
 )
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.records import Record, derived, keyed, outside_json
 
 # Probabilities of the quantiles, up to those of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
+MATCHED = "ok: matched in"
 # Figures of an allocated part.
 ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
@@ -140,15 +151,12 @@ def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, 
 
 def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     chain, function, limits = search.chain, search.function, search.chain.closing_link
-    allocation = None if chain.is_stated else search.allocated()
-    parts = stated_parts(chain.link) if chain.is_stated else allocation or search.narrowest()
-    assemblies = draw(function, parts, limits, samples=samples, seed=seed)
-    share = assemblies.yields["as_given"]
+    judged = _judged(search, samples, seed)
+    parts, assemblies, matched = judged.parts, judged.assemblies, judged.matched
     mean, deviation = float(assemblies.values.mean()), float(assemblies.values.std())
     nearer = min(limits.upper_mm - mean, mean - limits.lower_mm)
     varies = deviation > SLACK
-    matched = None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective)
-    verdict = _verdict(search, parts, allocation, share, matched)
+    verdict = _verdict(search, judged, partial(_accepted, samples=samples, seed=seed))
     return ChainResult(
         nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
         worst_case_mm=interval(function, parts, "worst_case"),
@@ -190,24 +198,66 @@ class _Verdict:
     nearest: list[Part] | None = None
 
 
-def _verdict(
-    search: Allocation,
-    parts: list[Part],
-    allocation: list[Part] | None,
-    share: float,
-    matched: SelectiveAssembly | None,
-) -> _Verdict:
-    chain = search.chain
+class _Judged(NamedTuple):
+    """The parts of a chain with their random and matched assemblies, and the status that accepts them; None: refused."""
+
+    parts: list[Part]
+    assemblies: Assemblies
+    matched: SelectiveAssembly | None
+    status: str | None
+
+    @property
+    def share(self) -> float:
+        """Share of the random assemblies within the limits."""
+        return self.assemblies.yields["as_given"]
+
+
+def _judged(search: Allocation, samples: int, seed: int) -> _Judged:
+    chain, function, limits = search.chain, search.function, search.chain.closing_link
+    allocation = None if chain.is_stated else search.allocated()
+    parts = stated_parts(chain.link) if chain.is_stated else allocation or search.narrowest()
+    assemblies = draw(function, parts, limits, samples=samples, seed=seed)
+    matched = None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective)
+    status = None
     if allocation is not None:
-        return _Verdict(_allocated_status(chain))
-    if chain.is_stated and _fits(search, parts, share):
-        return _Verdict("ok")
-    if matched is not None and keeps_limits(chain, matched):
-        return _Verdict(f"ok: matched in {matched.classes} classes; random assemblies miss the limits")
+        status = _allocated_status(chain)
+    elif chain.is_stated and _fits(search, parts, assemblies.yields["as_given"]):
+        status = "ok"
+    elif matched is not None and keeps_limits(chain, matched):
+        status = f"{MATCHED} {matched.classes} classes; random assemblies miss the limits"
+    return _Judged(parts, assemblies, matched, status)
+
+
+def _accepted(chain: Chain, samples: int, seed: int) -> tuple[bool, SelectiveAssembly | None]:
+    """Whether `solve` accepts a changed chain, and its matched assemblies where only they keep the limits."""
+    if faults(chain):
+        return False, None
+    try:
+        status = (judged := _judged(Allocation(chain), samples, seed)).status
+    except MethodError:
+        return False, None
+    return status is not None, judged.matched if (status or "").startswith(MATCHED) else None
+
+
+def _with_sizes(chain: Chain, parts: Sequence[Part]) -> Chain:
+    """The chain with the sizes of parts stated in its links."""
+    sizes = {part.name: {key: getattr(part, key) for key in ("nominal_mm", "upper_mm", "lower_mm")} for part in parts}
+    free = {link.name for link in chain.free}
+    links = [link.model_copy(update=sizes[link.name]) if link.name in free else link for link in chain.link]
+    return chain.model_copy(update={"link": links})
+
+
+def _verdict(search: Allocation, judged: _Judged, accepted: Judge) -> _Verdict:
+    if judged.status is not None:
+        return _Verdict(judged.status)
+    chain, parts, share = search.chain, judged.parts, judged.share
     # Sizes that a code states, such as those of bought rings, are no proposals.
     nearest = search.allocated() if chain.is_stated and any(link.fit is None for link in chain.free) else None
+    if nearest is not None and not accepted(_with_sizes(chain, nearest))[0]:
+        nearest = None
     reason = stated_reason(search, parts, share, nearest) if chain.is_stated else allocated_reason(search)
-    return _Verdict(f"refused: {reason}", miss_of(search, parts, share), remedy_of(search, parts, share), nearest)
+    remedy = remedy_of(search, parts, share, accepted)
+    return _Verdict(f"refused: {reason}", miss_of(search, parts, share), remedy, nearest)
 
 
 def _allocated_status(chain: Chain) -> str:

@@ -388,7 +388,7 @@ def selective_assembly(
         random_deviation_mm=float(closing.std()),
         worst_case_mm=class_worst_case(function, parts, settings),
         edges_mm={part.name: np.round(edge, DIGITS).tolist() for part, edge in zip(pair, edges, strict=True)},
-        classes_needed=_classes_needed(function, parts, limits, settings),
+        classes_needed=classes_needed(function, parts, limits, settings),
     )
 
 
@@ -423,9 +423,11 @@ def class_worst_case(function: ClosingFunction, parts: Sequence[Part], settings:
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
-def _classes_needed(
+def classes_needed(
     function: ClosingFunction, parts: Sequence[Part], limits: ClosingLink, settings: Selective
 ) -> int | None:
+    """Fewest classes of a pair whose worst case keeps the limits; None where none do."""
+
     def enough(classes: int) -> bool:
         low, high = class_worst_case(function, parts, settings.model_copy(update={"classes": classes}))
         return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK

@@ -88,13 +88,18 @@ class Answer(Mapping[str, Any]):
         return pd.DataFrame(list(rows[name]))
 
     def __getitem__(self, key: str) -> Any:
-        return self.record[key]
+        """A value of the record, which shares nothing with the answer."""
+        return copy.deepcopy(self.record[key])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.record)
 
     def __len__(self) -> int:
         return len(self.record)
+
+    def __hash__(self) -> int:
+        """Equal answers have equal keys."""
+        return hash(frozenset(self.record))
 
     def __str__(self) -> str:
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None

@@ -2,16 +2,17 @@
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doe.running.runner import AgendaKeeper, Progress, agenda_in
 from doe.running.store import StoppedError, Store, at_work
 from doe.workflow.runs import STORE
-from rbdyn.base.command import output_folder
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line, path_of, refuse
+from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.forecast import Notice
+from rbdyn.base.page import REPORT_FILES, with_report
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -78,10 +79,10 @@ class Effort(NamedTuple):
             yield Simulations(store, self.workers, self.scheduler, self.retry, progress, agenda)
 
     @contextmanager
-    def folder(self, out: Path | None, source: Path) -> Iterator[Path]:
+    def folder(self, out: Path | None) -> Iterator[Path]:
         """The stated folder, or one that lasts as long as the runs."""
         if out is not None:
-            yield output_folder(out, "doe", source)
+            yield out
             return
         with tempfile.TemporaryDirectory() as folder:
             try:
@@ -103,10 +104,11 @@ def texts_given(argument: Any, name: str, example: str) -> list[str]:
     """The argument ``name`` of a call as a list of texts; None is an empty one. Raises InputError for anything else."""
     if argument is None:
         return []
-    texts = list(argument) if isinstance(argument, list | tuple | set | frozenset) else [argument]
-    wrong = not isinstance(argument, list | tuple | set | frozenset) or not all(isinstance(text, str) for text in texts)
-    refuse([f"{name} = {one_line(repr(argument), LONGEST_NAME)}: must be a list such as {example}"] if wrong else [])
-    return texts
+    # The order of a set changes from one process to the next.
+    words = "a set has no order; write" if isinstance(argument, set | frozenset) else "must be"
+    valid = isinstance(argument, list | tuple) and all(isinstance(text, str) for text in argument)
+    refuse([] if valid else [f"{name} = {one_line(repr(argument), LONGEST_NAME)}: {words} a list such as {example}"])
+    return list(argument)
 
 
 @contextmanager
@@ -119,25 +121,31 @@ def registered(source: Path, folder: Path | None) -> Iterator[None]:
         yield
 
 
-def saved(out: Path | None, source: Path, name: str, answer: "Answer", tables: Callable[[], Tables]) -> tuple[str, ...]:
-    """Write the answer of a step on the file ``source`` into a folder, if there is one; names of the files.
+def step_folder(
+    out: Path | None, step: str, tables: Sequence[str], force: bool
+) -> AbstractContextManager[OutputFolder]:
+    """Folder of a step alone, such as "fit", and of the CSV files of its ``tables``; see ``saved``."""
+    reports = (*REPORT_FILES, *(f"{step}_{name}" for name in REPORT_FILES))
+    return output_folder(out, "doe", (f"{step}.json", *(f"{table}.csv" for table in tables), *reports), force=force)
+
+
+def saved(folder: OutputFolder, name: str, answer: "Answer", tables: Callable[[], Tables]) -> tuple[str, ...]:
+    """Write the answer of a step into its folder, if there is one; names of the files.
 
     These are its JSON record ``name``, its ``tables`` as CSV, report.html of its blocks and tables.xlsx. In the folder of a
     finished study the last two begin with the name of the step, so that the study keeps its own.
     """
-    if out is None or answer.identity is None:
+    if folder.path is None or answer.identity is None:
         return ()
-    from rbdyn.base.page import write_with_report
     from rbdyn.base.records import save_table
 
-    folder = output_folder(out, "doe", source)
-
-    def write() -> list[str]:
-        write_json(folder / name, answer.as_dict())
+    def write(stage: Path) -> list[str]:
+        write_json(stage / name, answer.as_dict())
         rows_by_file = tables()
         for table, rows in rows_by_file.items():
-            save_table(rows, folder / table)
+            save_table(rows, stage / table)
         return [name, *rows_by_file]
 
-    prefix = f"{Path(name).stem}_" if (folder / "summary.json").exists() else ""
-    return tuple(write_with_report(folder, answer.identity, answer.blocks, write, prefix))
+    prefix = f"{Path(name).stem}_" if (folder.path / "summary.json").exists() else ""
+    identity = answer.identity
+    return tuple(folder.write(lambda stage: with_report(stage, identity, answer.blocks, write, prefix)))

@@ -1,13 +1,14 @@
 """One step of a study alone: ``design``, ``fit``, ``front`` and ``chain``, and their answers."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import Effort, Follow, path_given, registered, saved, texts_given
+from doe.library.effort import Effort, Follow, path_given, registered, saved, step_folder, texts_given
 from rbdyn.base.blocks import Block, Detail, Note, Paragraph
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.words import counted, quantity, with_error
@@ -48,11 +49,12 @@ class DesignAnswer(Answer):
         return f"{self.record['kind'].replace('_', ' ')}, {counted(len(self.record['runs']), 'run')} of {factors}"
 
 
-def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
+def design(path: Path | str, out: Path | str | None = None, force: bool = False) -> DesignAnswer:
     """Design of a study, as ``doe design``: every run, and how well the runs identify the terms of the models.
 
     - ``path``: STUDY.toml; where its scene is missing only the design itself is checked
     - ``out``: folder for design.json; by default nothing is written
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of the study.
     """
@@ -63,15 +65,17 @@ def design(path: Path | str, out: Path | str | None = None) -> DesignAnswer:
     from doe.workflow.whole import check_study
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
-    study = Study.load(path)
-    # Without a scene the runs are made elsewhere, and only the design itself is checked.
-    if study.file.scene and study.path_of(study.scene.file).exists():
-        check_study(study)
-    points = design_of(study)
-    notes = augment_notes(study)
-    record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
-    answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
-    return replace(answer, files=saved(folder, path, "design.json", answer, partial(design_tables, record)))
+    with step_folder(folder, "design", ("design",), force) as output:
+        study = Study.load(path)
+        # Without a scene the runs are made elsewhere, and only the design itself is checked.
+        if study.file.scene and study.path_of(study.scene.file).exists():
+            check_study(study)
+        points = design_of(study)
+        notes = augment_notes(study)
+        output.claim(path)
+        record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
+        answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
+        return replace(answer, files=saved(output, "design.json", answer, partial(design_tables, record)))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -139,6 +143,7 @@ def fit(
     scheduler: str | None = None,
     retry: bool = False,
     progress: Follow = None,
+    force: bool = False,
 ) -> FitAnswer:
     """Response surfaces with their analysis of variance, as ``doe fit``.
 
@@ -149,6 +154,7 @@ def fit(
     - ``out``: folder for the files and the store of runs; by default nothing is written
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of study, table or arguments, RunError where runs fail.
     """
@@ -160,8 +166,10 @@ def fit(
         None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
     )
     study_path = None if path is None else path_given(path, "path")
-    study, notes = _study_or_table(study_path, table, factors, responses, model)
-    with registered(study.path, folder):
+    with step_folder(folder, "fit", ("anova", "coefficients", "runs"), force) as output, ExitStack() as stack:
+        study, notes = _study_or_table(study_path, table, factors, responses, model)
+        output.claim(study.path, *_read_later(study, table))
+        stack.enter_context(registered(study.path, folder))
         surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         surfaces = with_rivals(surfaces)
         remarks = [*reading, *notes, *unrivalled(surfaces)]
@@ -177,7 +185,7 @@ def fit(
             columns=columns if path is None else "",
             identity=study_identity("doe fit", study, table),
         )
-        return replace(answer, files=saved(folder, study.path, "fit.json", answer, partial(fit_tables, surfaces)))
+        return replace(answer, files=saved(output, "fit.json", answer, partial(fit_tables, surfaces)))
 
 
 def _study_or_table(
@@ -205,6 +213,15 @@ def _study_or_table(
     return study_of_table(data, factors, responses, model or "quadratic")
 
 
+def _read_later(study: "Study", data: Path | None) -> list[Path]:
+    """Files that a step reads only as it runs: those that its study names, and the table of runs."""
+    from doe.study_file.workbook import split_path
+    from doe.workflow.status import named_files
+
+    named = [] if study.file.scene is None else named_files(study)
+    return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]
+
+
 def _surfaces(
     study: "Study", data: Path | None, out: Path | None, effort: Effort
 ) -> "tuple[list[Surface], tuple[str, ...]]":
@@ -218,7 +235,7 @@ def _surfaces(
     if data is not None:
         runs = read_runs(study, data)
         return fit_surfaces(study, runs), runs.notes
-    with effort.folder(out, study.path) as folder:
+    with effort.folder(out) as folder:
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
         return fit_surfaces(study, runs), ()
@@ -270,6 +287,7 @@ def front(
     scheduler: str | None = None,
     retry: bool = False,
     progress: Follow = None,
+    force: bool = False,
 ) -> FrontAnswer:
     """Pareto front on the response surfaces of a study, as ``doe front``.
 
@@ -279,6 +297,7 @@ def front(
       of the factors
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of study, table or point, RunError where runs fail.
     """
@@ -294,10 +313,11 @@ def front(
     table, folder = (
         None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
     )
-    with registered(path, folder):
+    with step_folder(folder, "front", ("front",), force) as output, registered(path, folder):
         study = Study.load(path)
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
+        output.claim(path, *_read_later(study, table))
         surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
         record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
@@ -305,7 +325,7 @@ def front(
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
         identity = study_identity("doe front", study, table)
         answer = FrontAnswer(record, folder, asked=asked_record(study), identity=identity)
-        return replace(answer, files=saved(folder, path, "front.json", answer, partial(front_tables, record)))
+        return replace(answer, files=saved(output, "front.json", answer, partial(front_tables, record)))
 
 
 def _point_text(point: Any) -> str:
@@ -405,11 +425,12 @@ def _closing_row(chain: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
+def chain(path: Path | str, out: Path | str | None = None, force: bool = False) -> ChainAnswer:
     """Solution of a dimension chain, or of several, as ``doe chain``: limits, yield, contributions, tolerances of the parts.
 
     - ``path``: CHAIN.toml with one chain, or with several in tables named chain; sizes in mm
     - ``out``: folder for chain.json; by default nothing is written
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     A chain that misses its limits is listed in ``refused`` of the answer. Raises InputError with the faults of every chain.
     """
@@ -418,16 +439,19 @@ def chain(path: Path | str, out: Path | str | None = None) -> ChainAnswer:
     from rbdyn.base.identity import identity_of
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
-    several = is_several(path)
-    results, faults = {}, []
-    for name, chain_table in read_chains(path).items():
-        try:
-            results[name] = solve(chain_table, source=f'{path}: chain "{name}"' if several else str(path))
-        except InputError as error:
-            faults += error.faults
-    refuse(faults)
-    record = chains_record(results) if several else next(iter(results.values())).as_dict()
-    refused = {name: result.status for name, result in results.items() if result.refused}
-    solutions, identity = {name: r.as_dict() for name, r in results.items()}, identity_of("doe chain", {}, [path])
-    answer = ChainAnswer(record, folder, chains=solutions, refused=refused, identity=identity)
-    return replace(answer, files=saved(folder, path, "chain.json", answer, partial(chain_tables, results)))
+    with step_folder(folder, "chain", ("part_dimensions", "contributions"), force) as output:
+        several = is_several(path)
+        chains = read_chains(path)
+        output.claim(path)
+        results, faults = {}, []
+        for name, chain_table in chains.items():
+            try:
+                results[name] = solve(chain_table, source=f'{path}: chain "{name}"' if several else str(path))
+            except InputError as error:
+                faults += error.faults
+        refuse(faults)
+        record = chains_record(results) if several else next(iter(results.values())).as_dict()
+        refused = {name: result.status for name, result in results.items() if result.refused}
+        solutions, identity = {name: r.as_dict() for name, r in results.items()}, identity_of("doe chain", {}, [path])
+        answer = ChainAnswer(record, folder, chains=solutions, refused=refused, identity=identity)
+        return replace(answer, files=saved(output, "chain.json", answer, partial(chain_tables, results)))

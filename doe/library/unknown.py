@@ -1,17 +1,17 @@
 """Unknown inputs of a scene: ``uncertainty`` and ``calibrate``, and their answers."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered, texts_given
 from rbdyn.base.blocks import Block
-from rbdyn.base.command import output_folder
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
+from rbdyn.base.folder import output_folder
 from rbdyn.base.forecast import Notice
 from rbdyn.base.words import counted, quantity, shown
 
@@ -79,6 +79,8 @@ def uncertainty(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
 ) -> UncertaintyAnswer:
     """Range of every output of a scene over its unknown inputs, and the share of each input, as ``doe uncertainty``.
 
@@ -88,6 +90,8 @@ def uncertainty(
     - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``figures``: further outputs, such as ``["outer_max_pressure_MPa"]``
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
@@ -96,31 +100,35 @@ def uncertainty(
     from doe.running.runner import ANSWER
     from doe.workflow.status import content_digest, runs_digest
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
-    from rbdyn.base.page import write_with_report
+    from rbdyn.base.page import REPORT_FILES, write_with_report
     from rbdyn.dynamics.target import valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
     folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
     effort = Effort(workers, scheduler, retry, progress, notice)
+    outputs = texts_given(figures, "figures", '["outer_max_pressure_MPa"]')
     refuse(_points_faults(points))
+    points = None if points is None else int(points)
     accuracy = valid_target(target)
-    with registered(path, folder):
+    names = (*UNCERTAINTY_FILES, *REPORT_FILES)
+    with output_folder(folder, "doe", names, force=force) as output, registered(path, folder):
         inputs, runs = content_digest(path), runs_digest(path, assignments)
-        output_folder(folder, "doe", path)
+        output.claim(path)
         with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
             agenda.plan(uncertainty_stages(path, assignments, points))
             with effort.simulations(folder, path, agenda) as simulations:
-                result = find_uncertainty(path, assignments, simulations, points, accuracy)
+                result = find_uncertainty(path, assignments, simulations, points, accuracy, outputs)
             agenda.enter(ANSWER)
             identity = scene_identity("doe uncertainty", path, assignments)
             answer = UncertaintyAnswer(
                 uncertainty_record(result), folder, (), agenda.agenda, identity=identity, uncertainty=result
             )
-            files = write_with_report(folder, identity, answer.blocks, partial(write_uncertainty, result, folder))
+            files = write_with_report(output, identity, answer.blocks, partial(write_uncertainty, result))
             agenda.finish(files)
     return replace(answer, files=tuple(files))
 
 
+UNCERTAINTY_FILES = ("uncertainty.json", "input_sets.csv", "ranges.csv", "shares.csv", "uncertainty.png")
 FEWEST_SETS, MOST_SETS = 16, 512
 
 
@@ -128,10 +136,10 @@ def _points_faults(points: Any) -> list[str]:
     """Faults of the number of input sets."""
     if points is None:
         return []
-    if isinstance(points, bool) or not isinstance(points, int) or not FEWEST_SETS <= points <= MOST_SETS:
+    if isinstance(points, bool) or not isinstance(points, Integral) or not FEWEST_SETS <= int(points) <= MOST_SETS:
         value = one_line(repr(points), LONGEST_NAME)
         return [f"points = {value}: must be a power of two from {FEWEST_SETS} to {MOST_SETS}"]
-    return no_power_of_two("--points ", points)
+    return no_power_of_two("--points ", int(points))
 
 
 class CalibrationAnswer(Answer):
@@ -150,7 +158,10 @@ class CalibrationAnswer(Answer):
                 for key, row in self.record["inputs"].items()
             ],
             "outputs": [
-                {"output": name, **{key: row[key] for key in ("explained", "allowed", "evidence", "resolution")}}
+                {
+                    "output": name,
+                    **{key: row[key] for key in ("explained", "allowed", "accuracy_percent", "evidence", "resolution")},
+                }
                 for name, row in self.record["outputs"].items()
             ],
             "cells": [
@@ -165,9 +176,9 @@ class CalibrationAnswer(Answer):
         }
 
     def brief(self) -> str:
-        reasons = "; ".join(self.record["reasons"])
-        runs = counted(self.record["runs"], "run")
-        return f"{self.record['verdict']}{': ' if reasons else ''}{one_line(reasons, 4 * LONGEST_NAME)}, {runs}"
+        from doe.report.sections.calibration import verdict_words
+
+        return f"{one_line(verdict_words(self.record), 4 * LONGEST_NAME)}, {counted(self.record['runs'], 'run')}"
 
 
 def _input_row(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -195,6 +206,7 @@ def calibrate(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    force: bool = False,
 ) -> CalibrationAnswer:
     """Unknown inputs of a scene from measurements on a rig, and whether it may be called calibrated, as ``doe calibrate``.
 
@@ -205,13 +217,21 @@ def calibrate(
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
       and the answer
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
     from doe.report.identity import scene_identity
-    from doe.report.sections.calibration import cost_of, files_of, record_of, stored, write
+    from doe.report.sections.calibration import FILES, RECORD, cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
-    from doe.workflow.calibration import calibration_stages, find_calibration, pace, question_of, read_question
+    from doe.workflow.calibration import (
+        calibration_stages,
+        design_of,
+        find_calibration,
+        pace,
+        question_of,
+        read_question,
+    )
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
@@ -220,21 +240,26 @@ def calibrate(
         texts_given(given, name, '["cage.mass_g"]') for given, name in ((free, "free"), (overrides, "overrides"))
     )
     effort = Effort(workers, scheduler, retry, progress, notice)
-    with registered(path, folder):
+    with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)
         identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
-        output_folder(folder, "doe", path)
         if not retry and (record := stored(folder, identity)) is not None:
             return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
+        output.claim(path)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
             agenda.plan(calibration_stages(question))
             predicted = None if scheduler else agenda.state_first(pace(question))
+            if notice is not None:
+                if predicted is None:
+                    notice(f"{agenda.agenda.runs_left[0]} to {counted(agenda.agenda.runs_left[1], 'run')} remain")
+                if doubt := design_of(question).doubt:
+                    notice(doubt)
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
-                turns, took_s = simulations.turns, time.time() - agenda.agenda.begin
+                turns, took_s = simulations.turns, agenda.elapsed_s
             agenda.enter(ANSWER)
             record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
-            write(result, record, folder, scene)
+            output.write(lambda stage: write(result, record, stage, scene), last=RECORD)
             agenda.finish(files_of(record))
     return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda, identity=scene)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,17 @@ from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered
 from doe.library.steps import fit_rows, part_rows, point_row
 from rbdyn.base.blocks import Block, Section
-from rbdyn.base.command import output_folder
+from rbdyn.base.folder import output_folder
 from rbdyn.base.forecast import Notice
 from rbdyn.base.words import improvement, quantity
+
+# Patterns of the names of all files of a study.
+STUDY_FILES = (
+    "report.html", "report.md", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
+    "runs.csv", "front.csv", "confirmation.csv", "part_dimensions.csv", "duty_points.csv", "unknown_inputs.csv", "decides.csv",
+    "beside_reference.csv", "surface_*.png", "pareto_front.png", "robust_front.png", "adaptive_search.png", "duty_gains.png",
+    "cage_orbit.png", "pocket_forces.png",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -121,6 +130,7 @@ def study(
     retry: bool = False,
     progress: Follow = None,
     notice: Notice = None,
+    force: bool = False,
 ) -> StudyAnswer:
     """The whole study of a bearing's clearances, as ``doe study``: design, runs, surfaces, front, pick, tolerances, parts.
 
@@ -131,6 +141,7 @@ def study(
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
       and with what no run can change
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     A broken limit is in ``answer["status"]`` and ``answer["limits_sentence"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
@@ -141,12 +152,12 @@ def study(
     path = path_given(path, "path")
     folder = Path(f"{path.stem}_results") if out is None else path_given(out, "out")
     effort = Effort(workers, scheduler, retry, progress, notice)
-    with registered(path, folder):
+    with output_folder(folder, "doe", STUDY_FILES, force=force) as output, registered(path, folder):
         loaded = Study.load(path)
-        output_folder(folder, "doe", path)
         digest = inputs_digest(loaded, adaptive, robust)
         if not retry and (record := finished_record(folder, digest)):
             return StudyAnswer(record, folder, tuple(record["files"]), finished_before=True)
+        output.claim(path)
         from doe.report.files import write
         from doe.workflow.whole import run_study, unmet_chains
 
@@ -157,6 +168,6 @@ def study(
         with effort.agenda(folder, "doe study", options, digest) as agenda:
             bars = agenda.announced(effort.progress)
             outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
-            record = write(outcome, folder)
+            record = output.write(partial(write, outcome), last="summary.json")
             agenda.finish(record["files"])
     return StudyAnswer(record, folder, tuple(record["files"]), agenda.agenda)

@@ -66,7 +66,6 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     from doe.report import pictures as plots
 
     study, record = outcome.study, summary(outcome)
-    (folder / "summary.json").unlink(missing_ok=True)
     tables = {
         RUNS_TABLE: _runs_table(record),
         **fit_tables(outcome.surfaces),

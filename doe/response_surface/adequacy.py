@@ -13,12 +13,14 @@ repeated design points. Repeated points show whether the replicates contain all 
 is itself uncertain, and the tests allow for it. With weights from few replicates they are conservative: with 8 replicates,
 5 % tests reject a true surface in 1 to 2 % of fits, with equal weights in 5 %.
 
-Where lack of fit is significant, the response is the model plus a random field of mean zero and constant variance. Its
-correlation length is one coded unit, so that distinct runs of a design are nearly independent. The variance of the field is
-a variance component, estimated by the expectation of the sum of squares: the mean square of lack of fit less that of pure
-error, over the share of the runs in it. An interval combines the error of the coefficients and the field as root sum square.
-Student's t has the degrees of freedom of the source of the field. Without significant lack of fit there is no field, and
-intervals are those of textbooks.
+The response is the model plus a random field of mean zero and constant variance. Its correlation length is one coded unit, so
+that distinct runs of a design are nearly independent. The variance of the field is a variance component, estimated by the
+expectation of a sum of squares: the residual beyond the known variance of the runs, or beyond the pure error of repeated runs
+where that refutes the known variance or no variance is known, over the share of the field in it. Where nothing shows the scatter of
+a run, the whole residual counts as field. An interval combines the error of the coefficients and the field as root sum square.
+Student's t has the degrees of freedom of the source of the field. No test decides whether the field counts: a small field that a
+test overlooks would make intervals too narrow. Where the estimate is not positive there is no field, and intervals are those of
+textbooks.
 
 Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.4-2.7 and 7.5; Belsley, Kuh and Welsch,
 Regression Diagnostics (1980); Cook and Weisberg, Residuals and Influence in Regression (1982); Shapiro and Wilk (1965).
@@ -44,9 +46,9 @@ KEEP_BELOW = 0.05  # p-value up to which a term stays in a reduced model
 EXACT = 1e-12  # 1 - leverage below which the fit passes through a run, whatever its value
 INFLUENTIAL = 1.0  # Cook's distance above which omitting a run moves the surface beyond its own error
 HIGH_LEVERAGE = 2.0  # leverage in units of the mean leverage
-SIGNIFICANT = 0.05  # p-value up to which a test shows a model error
+REFUTED = 0.05  # p-value up to which repeated runs refute known variances
 REACH = 1.0  # correlation length of the model error in coded units, half the edge of the cube of a design
-Source = Literal["repeats", "known variance"]
+Source = Literal["repeats", "known variance", "residual"]
 
 
 class AnovaRow(TypedDict):
@@ -118,7 +120,11 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tupl
         return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)
     pure = sum_within(response, solution.weights, groups)
     lack = max(solution.residual_sum - pure, 0.0)
-    return (row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df), row("pure_error", pure, pure_df))
+    tested = row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df)
+    if pure == 0.0 < lack:
+        # Any miss is lack of fit where repeated runs agree exactly.
+        tested["p"] = 0.0
+    return tested, row("pure_error", pure, pure_df)
 
 
 def sum_within(values: Array, weights: Array, group: Whole) -> float:
@@ -314,15 +320,17 @@ def _list(runs: list[int]) -> str:
 class KnownVariance(Record):
     """Comparison of a fit with known variances.
 
-    ``chi_square``: of the residual over the known variance, with ``df`` and ``p``. ``pure_error``: ANOVA row of the replicate
-    variance at the repeated points. Its ``f`` is pure error over this variance and its ``p`` two-sided, both None without
-    repeats. ``covariance``: of the surface's coefficients by the known variances alone, with ``standard_errors``. ``dof``: of
-    the variance of one run, None where it is known exactly.
+    ``chi_square``: of the residual over the known variance, with ``df`` and ``p``. ``expected``: its mean for a true model,
+    infinite for weights of too few replicates. ``pure_error``: ANOVA row of the replicate variance at the repeated points. Its
+    ``f`` is pure error over this variance and its ``p`` two-sided, both None without repeats. ``covariance``: of the surface's
+    coefficients by the known variances alone, with ``standard_errors``. ``dof``: of the variance of one run, None where it is
+    known exactly.
     """
 
     chi_square: float
     df: int
     p: float | None
+    expected: float = outside_json()
     mean_square_ratio: float = derived(lambda self: self.chi_square / self.df)
     pure_error_ratio: float | None = derived(lambda self: self.pure_error["f"])
     pure_error_p: float | None = derived(lambda self: self.pure_error["p"])
@@ -330,6 +338,11 @@ class KnownVariance(Record):
     standard_errors: Array = derived(lambda self: np.sqrt(np.diag(self.covariance)))
     covariance: Array
     pure_error: AnovaRow = outside_json()
+
+    @property
+    def refuted(self) -> bool:
+        """Whether repeated runs scatter by another variance."""
+        return self.pure_error_p is not None and self.pure_error_p <= REFUTED
 
 
 def compare(
@@ -352,6 +365,8 @@ def compare(
         chi_square=chi_square,
         df=df,
         p=_upper_tail(unit, dof, weighted, chi_square, df),
+        # A squared residual over its own estimated variance is an F(1, dof).
+        expected=df * (1.0 if dof is None or not weighted else dof / (dof - 2) if dof > 2 else math.inf),
         pure_error=_pure_error_row(fit, response, unit, groups, dof, weighted),
         covariance=(project * variances) @ project.T,
         dof=dof,
@@ -359,32 +374,25 @@ def compare(
 
 
 def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
-    """The comparison in sentences."""
-    chi_square = f"chi-square of the residual over the known variance is {variance.chi_square:.4g} on {variance.df} degrees of freedom"
-    if variance.p is None:
-        test = f"{chi_square}; a test needs more replicates a run."
-    elif variance.p > alpha:
-        test = f"{chi_square} ({p_text(variance.p)}): the known variance explains the residual."
-    else:
-        test = f"{chi_square} ({p_text(variance.p)}): the residual exceeds the known variance."
+    """The comparison in sentences; the test of the residual belongs to that of lack of fit."""
     share = math.sqrt(variance.mean_square_ratio)
-    errors = f"standard errors come from the residual and are {share:.3g} times those of the known variance alone."
-    sentences = [test, errors]
+    sentences = [
+        f"chi-square of the residual over the known variance is {variance.chi_square:.4g} on {variance.df} degrees of freedom"
+        f"{'; a test needs more replicates a run' if variance.p is None else ''}. Standard errors come from the residual and are "
+        f"{share:.3g} times those of the known variance alone."
+    ]
     f, p = variance.pure_error_ratio, variance.pure_error_p
     if f is None or p is None:
         return sentences
     scatter = f"the variance of repeated runs is {f:.3g} times that of their replicates ({p_text(p)})"
     if p > alpha:
         return [*sentences, f"{scatter}: the two agree, so the errors of the runs are reliable."]
-    if f > 1:
-        return [
-            *sentences,
-            f"{scatter}: the runs differ by more than their replicates show; rely on tests against pure error.",
-        ]
-    return [
-        *sentences,
-        f"{scatter}: the errors of the runs are too large, or repeated runs share seeds; rely on tests against pure error.",
-    ]
+    cause = (
+        "the runs differ by more than their replicates show"
+        if f > 1
+        else "the errors of the runs are too large, or repeated runs share seeds"
+    )
+    return [*sentences, f"{scatter}: {cause}; rely on tests against pure error."]
 
 
 def _upper_tail(unit: Array, dof: float | None, weighted: bool, chi_square: float, df: int) -> float | None:
@@ -438,33 +446,20 @@ class ModelError(Record):
 def model_error(
     solution: LeastSquares, matrix: Array, groups: Whole, table: list[AnovaRow], known_variance: KnownVariance | None
 ) -> ModelError | None:
-    """The model error of a fit, None without a significant test at 5 %.
+    """The model error of a fit, None where the scatter of the runs explains the residual.
 
-    ``matrix`` (n, p): of the fit. ``groups`` (n,): repeated points. The tests compare lack of fit with pure error, and the
-    residual with the known variance of the replicates; the larger significant error counts. A known variance that the
-    repeated runs refute does not count.
+    ``matrix`` (n, p): of the fit. ``groups`` (n,): repeated points. Known variances that the repeated runs refute do not count.
     """
     share = _share(solution, matrix, groups)
-    if share <= 0.0:
-        return None
     lack, pure = find(table, "lack_of_fit"), find(table, "pure_error")
-    candidates = []
-    if lack["p"] is not None and lack["p"] <= SIGNIFICANT and lack["ss"] is not None and lack["df"]:
-        beyond = lack["ss"] - lack["df"] * (pure["ms"] or 0.0)
-        candidates.append(ModelError(beyond / share, lack["df"], "repeats"))
-    if (
-        known_variance is not None
-        and known_variance.p is not None
-        and known_variance.p <= SIGNIFICANT
-        and not _is_refuted(known_variance)
-    ):
-        beyond = solution.residual_sum * (1.0 - known_variance.df / known_variance.chi_square)
-        candidates.append(ModelError(beyond / share, known_variance.df, "known variance"))
-    return max(
-        (candidate for candidate in candidates if candidate.variance > 0.0),
-        key=lambda candidate: candidate.variance,
-        default=None,
-    )
+    beyond, dof = solution.residual_sum, solution.dof
+    source: Source = "residual"
+    if known_variance is not None and not known_variance.refuted and math.isfinite(known_variance.expected):
+        beyond *= 1.0 - known_variance.expected / known_variance.chi_square if known_variance.chi_square else 0.0
+        source = "known variance"
+    elif pure["df"]:
+        beyond, dof, source = (lack["ss"] or 0.0) - (lack["df"] or 0) * (pure["ms"] or 0.0), lack["df"] or 0, "repeats"
+    return ModelError(beyond / share, dof, source) if share > 0.0 and dof > 0 and beyond > 0.0 else None
 
 
 def correlation(one: Array, other: Array) -> Array:
@@ -489,8 +484,3 @@ def _share(solution: LeastSquares, matrix: Array, groups: Whole) -> float:
     scaled = matrix * np.sqrt(solution.weights)[:, None]
     inside = scaled.T @ member
     return float((member**2).sum() - np.einsum("pg,pq,qg", inside, solution.inverse, inside))
-
-
-def _is_refuted(known_variance: KnownVariance) -> bool:
-    f, p = known_variance.pure_error["f"], known_variance.pure_error["p"]
-    return f is not None and p is not None and f > 1.0 and p <= SIGNIFICANT

@@ -26,6 +26,7 @@ from doe.response_surface.adequacy import (
     KnownVariance,
     ModelError,
     Removal,
+    Source,
     anova,
     compare,
     describe_diagnostics,
@@ -182,7 +183,7 @@ class Surface(Record):
     - ``actual_coefficients``: of the same terms in actual units
     - ``box_cox``: advice on a power transform of an untransformed fit, None where values or fit allow none
     - ``stationary_point``: None without a single one; ``canonical``: None without curvature
-    - ``known_variance``: None without errors of the runs; ``model_error``: None without significant lack of fit
+    - ``known_variance``: None without errors of the runs; ``model_error``: None where scatter explains the residual
     - ``rival``: None until `doe.workflow.surfaces.with_rivals` has compared the surface with a Gaussian process
     """
 
@@ -432,13 +433,14 @@ def _block_effects(data: Data, effects: Array) -> dict[str, float]:
 ALPHA = 0.05  # p-value up to which something is significant
 FAR_APART = 0.2  # difference of adjusted and predicted R2 above which they disagree
 DISCERNIBLE = 4.0  # adequate precision above which the surface can steer a search
+INFLATED = 10.0  # variance inflation factor above which runs hardly tell a term from the others
 
 
 def describe(surface: Surface) -> list[str]:
     """Sentences on significance at `ALPHA`, on the adequacy of the surface, and on what to check."""
     known_variance, canonical = surface.known_variance, surface.canonical
     sentences = [
-        *(_terms(surface), _lack_of_fit(surface), _removed(surface), _blocks(surface)),
+        *(_terms(surface), _collinearity(surface), _lack_of_fit(surface), _removed(surface), _blocks(surface)),
         *([] if known_variance is None else describe_known_variance(known_variance, ALPHA)),
         *(_model_error(surface), _summary(surface)),
         *describe_diagnostics(surface.diagnostics, ALPHA),
@@ -460,34 +462,64 @@ def _terms(surface: Surface) -> str:
     weak = [source for source, p in p_values.items() if p > ALPHA]
     listed = ", ".join(f"{source} ({p_text(p)})" for p, source in strong)
     if not strong:
-        return f"no term is significant at {ALPHA:g}."
+        f, p = (find(surface.anova, "model")[key] for key in ("f", "p"))
+        whole = f", but the model as a whole is (F = {f:.3g}, {p_text(p)})" if p is not None and p <= ALPHA else ""
+        return f"no term alone is significant at {ALPHA:g}{whole}."
     if not weak:
         return f"significant at {ALPHA:g}: {listed}."
     return f"significant at {ALPHA:g}: {listed}; not significant: {', '.join(weak)}."
 
 
+def _collinearity(surface: Surface) -> str:
+    inflated = [term for term, vif in surface.inflation.items() if vif is not None and vif > INFLATED]
+    if not inflated:
+        return ""
+    return (
+        f"the runs hardly separate {', '.join(inflated)} from the other terms (variance inflation factor up to "
+        f"{np.nanmax(surface.vif):.2g}): their coefficients and p values say little; drop one of them, or add runs that vary them apart."
+    )
+
+
 def _lack_of_fit(surface: Surface) -> str:
-    p = surface.lack_of_fit["p"]
-    if p is not None and p <= ALPHA:
-        return (
-            f"lack of fit is significant ({p_text(p)}): the error of the surface exceeds the scatter of replicates; enlarge the model, "
-            "transform the response or narrow the region, and confirm predictions by runs."
-        )
-    if p is not None:
-        return f"lack of fit is not significant ({p_text(p)}): the error of the surface is within the scatter of replicates."
-    if surface.pure_error["df"] == 0:
+    known = surface.known_variance
+    tests = {
+        "pure error": surface.lack_of_fit["p"],
+        "the known variance": None if known is None or known.refuted else known.p,
+    }
+    values = {what: p for what, p in tests.items() if p is not None}
+    if not values and surface.pure_error["df"] == 0:
         return "lack of fit cannot be tested, for no run is replicated; add centre replicates."
-    if surface.lack_of_fit["df"] == 0:
+    if not values and surface.lack_of_fit["df"] == 0:
         return "lack of fit cannot be tested, for the model has as many terms as distinct points."
-    return "lack of fit cannot be tested, for the replicates agree exactly."
+    if surface.pure_error["ms"] == 0.0:
+        verdict = "certain" if surface.lack_of_fit["ss"] else "none"
+        return f"lack of fit is {verdict}, for the replicates agree exactly and the residual is {'not ' if verdict == 'certain' else ''}zero."
+    listed = ", ".join(f"{p_text(p)} against {what}" for what, p in values.items())
+    if min(values.values()) > ALPHA:
+        return (
+            f"lack of fit is not significant ({listed}): the error of the surface is within the scatter of replicates."
+        )
+    if max(values.values()) > ALPHA:
+        return f"lack of fit is in doubt, for the tests disagree ({listed}): confirm predictions by runs, or add replicates."
+    return (
+        f"lack of fit is significant ({listed}): the error of the surface exceeds the scatter of replicates; enlarge the model, "
+        "transform the response or narrow the region, and confirm predictions by runs."
+    )
+
+
+SHOWN_BY: Mapping[Source, str] = {
+    "repeats": "shown by repeats",
+    "known variance": "shown by the known variance",
+    "residual": "which is the whole residual, for no scatter of a run is known",
+}
 
 
 def _model_error(surface: Surface) -> str:
     if (error := surface.model_error) is None:
         return ""
     return (
-        f"the 95 % intervals of its mean include a model error of standard deviation {error.variance**0.5:.3g}, shown by "
-        f"{error.source} ({error.dof} degrees of freedom)."
+        f"the 95 % intervals of its mean include a model error of standard deviation {error.variance**0.5:.3g}, "
+        f"{SHOWN_BY[error.source]} ({error.dof} degrees of freedom)."
     )
 
 

@@ -260,6 +260,12 @@ class AgendaKeeper:
     _engine_since: tuple[float, float, int] | None = None
     _shared: float = 1.0
     _lock: threading.RLock = field(default_factory=threading.RLock)
+    _began: float = field(default_factory=time.monotonic)
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall time [s] of the command so far, whatever the clock was set to meanwhile."""
+        return time.monotonic() - self._began
 
     def plan(self, stages: Sequence[Stage]) -> None:
         """Plan the stages, after all checks and before anything runs. Raises as ``Store``.
@@ -285,8 +291,7 @@ class AgendaKeeper:
             forecast = forecast_of(self.agenda, float(self.agenda.threads), pace) if self.agenda.stages else None
             if forecast is None or not forecast.runs[1]:
                 return forecast
-            elapsed_s = time.time() - self.agenda.begin
-            self.agenda.prediction_s = forecast.whole_s(elapsed_s)
+            self.agenda.prediction_s = forecast.whole_s(self.elapsed_s)
             self._stated_s = self.agenda.prediction_s[1]
             self._note()
         if self.notice is not None:
@@ -400,7 +405,7 @@ class AgendaKeeper:
             forecast = forecast_of(self.agenda, self._at_once, measured, growth) if self.agenda.stages else None
             if forecast is None or not forecast.notable:
                 return
-            whole_s = forecast.whole_s(time.time() - self.agenda.begin)
+            whole_s = forecast.whole_s(self.elapsed_s)
             if whole_s[0] <= self._stated_s:
                 return
             self._stated_s = whole_s[1]
@@ -427,7 +432,7 @@ class AgendaKeeper:
 
     def finish(self, files: Sequence[str]) -> None:
         """Note that all files of the answer are written."""
-        self.agenda.files, self.agenda.took_s = list(files), time.time() - self.agenda.begin
+        self.agenda.files, self.agenda.took_s = list(files), self.elapsed_s
         self._note()
 
     def fail(self, fault: str) -> None:

@@ -5,9 +5,8 @@ truncated log up to the last whole transaction. Results are committed with ``syn
 ``put`` returns. Runs under way are committed with ``NORMAL``, because a power cut ends them anyway. Each result has its own
 SHA-256, so that a row spoilt later is reported and run again.
 
-One process at a time writes to a store; any number may read it. The lock is an exclusive transaction of an empty database
-next to the store. The system ends it with its process, so that no lock outlives its owner and no clock is read. All stores
-of one process on one file share the lock. A registration states which study runs in which folder.
+One process at a time writes to a store, by the lock of its folder; any number may read it. All stores of one process in one
+folder share the lock. A registration states which study runs in which folder.
 """
 
 import json
@@ -20,14 +19,16 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
 from rbdyn.base.digests import user_cache
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.lock import free_lock, is_busy, is_locked, seize_lock
 from rbdyn.base.storage import digest_of
+from rbdyn.base.streams import Uninterrupted, escaped
 from rbdyn.result import read_json
 
 T = TypeVar("T")
@@ -166,11 +167,12 @@ class Database:
         """Print a sentence on standard error, unless all ``things`` were reported before."""
         if not self._reported.issuperset(things):
             self._reported.update(things)
-            print(f"{self.path}: {sentence}", file=sys.stderr)
+            print(escaped(f"{self.path}: {sentence}"), file=sys.stderr)
 
     @contextmanager
     def _transaction(self, durable: bool) -> Iterator[sqlite3.Connection]:
-        with self._lock, self._faults():
+        # Ctrl-C between the lock, the begin of the transaction and its end would leave both taken.
+        with Uninterrupted(), self._lock, self._faults():
             connection = self._connection
             connection.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
             connection.execute("BEGIN IMMEDIATE")
@@ -209,8 +211,7 @@ def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
         try:
             return connection.execute(statement).fetchall()
         except sqlite3.OperationalError as error:
-            busy = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
-            if not busy or time.monotonic() > deadline:
+            if not is_busy(error) or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
 
@@ -278,7 +279,7 @@ class Store(Database):
     def _enter(self) -> None:
         """Take the lock, and end the current runs of earlier processes."""
         with self._faults():
-            token = seize_lock(self.path)
+            token = seize_lock(self.path.parent)
         if token is None:
             raise InputError(
                 [f"{self.path}: {self._holder()} works on it; wait until it has ended, or name another folder"]
@@ -292,7 +293,7 @@ class Store(Database):
                 facts = {"lock": token, "holder": f"process {os.getpid()} on {socket.gethostname()}"}
                 connection.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", facts.items())
         except BaseException:
-            free_lock(self.path)
+            free_lock(self.path.parent)
             raise
 
     def _meta(self, name: str) -> str | None:
@@ -384,7 +385,7 @@ class Store(Database):
 
     def notes(self, kind: str) -> list[tuple[str, bool]]:
         """Notes of a ``kind``, each with whether its process lives."""
-        live = kind + (self._meta("lock") or "") if is_locked(self.path) else None
+        live = kind + (self._meta("lock") or "") if is_locked(self.path.parent) else None
         with self._lock, self._faults():
             rows = self._connection.execute("SELECT name, value FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
         return [(text, name == live) for name, text in rows]
@@ -396,7 +397,7 @@ class Store(Database):
 
     def running(self) -> list[CurrentRun]:
         """Runs that a live process has under way."""
-        if not is_locked(self.path):
+        if not is_locked(self.path.parent):
             return []
         with self._lock, self._faults():
             rows = self._connection.execute(
@@ -419,7 +420,7 @@ class Store(Database):
             self._connection.close()
         if self._token:
             self._token = ""
-            free_lock(self.path)
+            free_lock(self.path.parent)
 
     def __enter__(self) -> Self:
         return self
@@ -441,82 +442,8 @@ def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, 
     return record if isinstance(record, dict) and (sound is None or sound(record)) else None
 
 
-# Longest wait for a process that tests the lock or is just ending [s].
-LOCK_PATIENCE_S = 2.0
 # Age [s] from which a registration without a lock is stale; a younger one may be about to begin.
 STALE_S = 60.0
-
-
-@dataclass
-class _Session:
-    """A lock of this process, and the number of stores that share it."""
-
-    connection: sqlite3.Connection
-    token: str = field(default_factory=lambda: uuid.uuid4().hex)
-    users: int = 0
-
-
-_sessions: dict[Path, _Session] = {}
-_guard = threading.Lock()
-
-
-def seize_lock(store: Path) -> str | None:
-    """Take or share the lock of a store for this process. Returns its token, None if another process has it.
-
-    Each token needs one ``free_lock``. Raises sqlite3.Error for a folder that cannot be written.
-    """
-    path = store.resolve()
-    with _guard:
-        if path not in _sessions:
-            connection = sqlite3.connect(
-                _lock_file(path), timeout=LOCK_PATIENCE_S, isolation_level=None, check_same_thread=False
-            )
-            try:
-                connection.execute("BEGIN EXCLUSIVE")
-            except sqlite3.Error as error:
-                connection.close()
-                if _is_busy(error):
-                    return None
-                raise
-            _sessions[path] = _Session(connection)
-        _sessions[path].users += 1
-        return _sessions[path].token
-
-
-def free_lock(store: Path) -> None:
-    """Give back a token of ``seize_lock``; the last one frees the lock."""
-    path = store.resolve()
-    with _guard:
-        session = _sessions[path]
-        session.users -= 1
-        if not session.users:
-            session.connection.close()
-            del _sessions[path]
-
-
-def is_locked(store: Path) -> bool:
-    """Whether a process works on a store. It changes nothing."""
-    path = store.resolve()
-    with _guard:
-        if path in _sessions:
-            return True
-    with suppress(OSError):
-        if not _lock_file(path).exists():
-            return False
-        with closing(sqlite3.connect(f"{_lock_file(path).as_uri()}?mode=ro", timeout=0.0, uri=True)) as connection:
-            try:
-                connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            except sqlite3.Error as error:
-                return _is_busy(error)
-    return False
-
-
-def _lock_file(store: Path) -> Path:
-    return store.with_name(f"{store.name}-lock")
-
-
-def _is_busy(error: sqlite3.Error) -> bool:
-    return getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 
 
 @contextmanager
@@ -530,11 +457,11 @@ def at_work(study: Path, store: Path) -> Iterator[None]:
     with suppress(OSError):
         # A killed process leaves its registration behind.
         for other in _registrations():
-            if time.time() - other.path.stat().st_mtime > STALE_S and not is_locked(Path(other.store)):
+            if time.time() - other.path.stat().st_mtime > STALE_S and not is_locked(Path(other.store).parent):
                 other.path.unlink(missing_ok=True)
         if note is not None:
             note.parent.mkdir(parents=True, exist_ok=True)
-            content = {"study": str(study.resolve()), "store": str(store.resolve())}
+            content = {"study": os.path.realpath(study), "store": os.path.realpath(store)}
             note.write_text(json.dumps(content), encoding="utf-8")
     try:
         yield
@@ -547,8 +474,8 @@ def at_work(study: Path, store: Path) -> Iterator[None]:
 def folders_of(study: Path) -> list[Path]:
     """Folders in which live processes of this machine and user run the study of a file."""
     with suppress(OSError):
-        mine = {Path(note.store) for note in _registrations() if note.study == str(study.resolve())}
-        return sorted(store.parent for store in mine if is_locked(store))
+        mine = {Path(note.store) for note in _registrations() if note.study == os.path.realpath(study)}
+        return sorted(store.parent for store in mine if is_locked(store.parent))
     return []
 
 

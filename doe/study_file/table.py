@@ -19,7 +19,7 @@ import numpy as np
 from doe.study_file.decimal_marks import Marks
 from doe.study_file.table_file import TableFile, read_table_file
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
+from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, one_line, refuse
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
 
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
@@ -27,8 +27,9 @@ WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 LONGEST_NUMBER = 400
 # Cells of an unknown number.
 UNKNOWN = ("", "nan")
-# Beginnings of a date or a time of day, and of a day and a month as Excel shows them in English or German.
+# Beginnings of a date, of a time of day or a span of time, and of a day and a month as Excel shows them in English or German.
 DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}|\d{1,2}:\d\d")
+SPAN = re.compile(r"-?\d+:\d\d(:\d\d)?", re.ASCII)
 MONTH = "(?:jan|feb|m[aä]r|apr|ma[iy]|ju[nl]|aug|sep|o[ck]t|nov|de[cz])[a-zä]*"
 DAY_AND_MONTH = re.compile(rf"\d{{1,2}}[-. ]{{1,2}}{MONTH}\b|{MONTH}[-. ]{{1,2}}\d", re.IGNORECASE)
 # Most names that a message lists.
@@ -107,6 +108,10 @@ class Column:
         faults, doubts = list[str](), Counter[str]()
         for row in limits.broken(values):
             if self.texts[row].lower() in unknown:
+                continue
+            if len(faults) > MOST_FAULTS:
+                # It is counted, but no message lists it.
+                faults.append("")
                 continue
             doubt = self.doubt(row)
             kind = doubt.partition(" ")[0]
@@ -206,11 +211,15 @@ def _slip(text: str) -> str | None:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter number"
     if text.lower() in UNKNOWN:
         return "is not a finite number; fill it in or remove the row"
+    if SPAN.fullmatch(text):
+        return "is a time of day or a span of time; format the cell as a number and write a plain one"
     if DATE.match(text) or DAY_AND_MONTH.match(text):
         return "is a date, which Excel makes of numbers such as 1.2; format the cell as text and write the number again"
     if text.startswith("#"):
         return "is the fault of a formula; correct it in the spreadsheet"
-    return "is not a finite number; write a point for the decimal comma" if "," in text else None
+    # A comma between words is no decimal one.
+    comma = re.search(r"\d,\d", text)
+    return "is not a finite number; write a point for the decimal comma" if comma else None
 
 
 # Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.

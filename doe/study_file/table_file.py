@@ -21,6 +21,10 @@ SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 # Excel's own line on the separator of a file.
 HINT = re.compile(r"\s*sep=([,;\t])\r?\n", re.IGNORECASE)
+# Most rows and cells of a text; those of a workbook are fewer, for it takes ten times as long to read.
+MOST_LINES, MOST_FIELDS = 1_000_000, 4_000_000
+# Rows of another length than the header that are named one by one.
+MOST_ROWS_NAMED = 2
 # Characters of no text: a file with them is something else.
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
@@ -47,8 +51,7 @@ def read_table_file(path: Path) -> TableFile:
     """Read a table of any of the formats. Raises InputError where none or more than one reading is possible."""
     file, sheet = split_path(path)
     if file.suffix.lower() in SUFFIXES:
-        read_bytes(file)
-        table = read_workbook(file, sheet)
+        table = read_workbook(file, read_bytes(file), sheet)
         rows, numbers = table.rows, table.numbers
         width = max(map(len, rows), default=0)
         rows = [[*row, *[""] * (width - len(row))] for row in rows]
@@ -148,9 +151,13 @@ def _share_of_numbers(rows: list[list[str]]) -> float:
 def _parsed(path: Path, text: str, separator: str) -> list[list[str]]:
     """Rows of fields, without blank lines. Raises InputError."""
     lines = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
-    rows, start = list[list[str]](), 1
+    rows, start, fields = list[list[str]](), 1, 0
     try:
         for row in lines:
+            fields += len(row)
+            if fields > MOST_FIELDS or len(rows) >= MOST_LINES:
+                most = f"{MOST_LINES} rows or {MOST_FIELDS} fields"
+                raise InputError([f"{path}: has more than {most}; check that it is the right file"])
             # A quoted empty field is a cell; a blank line, also one of separators, is none.
             if (len(row) == 1 and row[0] == "") or any(field.strip() for field in row):
                 rows.append(row)
@@ -168,11 +175,13 @@ def _tidy(path: Path, rows: list[list[str]]) -> list[list[str]]:
     lengths = [_filled_length(row) for row in rows]
     width = len(rows[0]) if any(lengths[0] < length <= len(rows[0]) for length in lengths) else max(lengths[0], 1)
     rows = [row[: max(width, length)] for row, length in zip(rows, lengths, strict=True)]
+    wrong = [(number, len(row)) for number, row in enumerate(rows) if len(row) != width]
+    # Of columns without a name every row is a case; one stands for them.
+    others = f"; {len(wrong) - 1} more rows are like it" if len(wrong) > MOST_ROWS_NAMED else ""
     refuse(
-        f"{path}: row {number} has {counted(len(row), 'field')} and the header {width}; give it a field for each column, "
-        f"in their order{SEMICOLONS if len(row) > width else ''}"
-        for number, row in enumerate(rows)
-        if len(row) != width
+        f"{path}: row {number} has {counted(length, 'field')} and the header {width}; give it a field for each column, "
+        f"in their order{SEMICOLONS if length > width else ''}{others}"
+        for number, length in (wrong[:1] if others else wrong)
     )
     return rows
 

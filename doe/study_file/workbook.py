@@ -1,28 +1,34 @@
 """Excel workbooks as tables: the cells of one sheet as texts, numbers with all their digits.
 
-``file.xlsx:Sheet`` names a sheet; without a name it is the first one. openpyxl reads them and is imported only then.
+``file.xlsx:Sheet`` names a sheet; without a name it is the first visible one. Only the parts that hold its cells are read, within
+bounds, so that no file takes long or much memory.
 """
 
 import re
-import warnings
-import zipfile
-from collections.abc import Iterator
-from datetime import date, datetime, time
+from collections.abc import Mapping
+from datetime import datetime, time, timedelta
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from doe.study_file.decimal_marks import Exact
-from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
-
-if TYPE_CHECKING:
-    from openpyxl.workbook import Workbook
+from doe.study_file.workbook_parts import DamageError, Parts
+from rbdyn.base.faults import LARGEST_FILE, LONGEST_NAME, MOST_FAULTS, InputError, one_line, refuse
+from rbdyn.base.records import NUMBER
+from rbdyn.base.words import counted
 
 NAMED = re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)
 SUFFIXES = (".xlsx", ".xlsm")
 # First bytes of a zip archive, which an .xlsx is, and of an old or encrypted workbook.
 ARCHIVE, OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
-# Most bytes of a workbook's parts once they are unpacked, and most cells of a sheet.
-LARGEST_PARTS, MOST_CELLS = 200_000_000, 4_000_000
+# Most rows with cells, columns, and cells of all rows up to the last column.
+MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 200_000, 16_384, 1_000_000
+# Rows of a sheet, characters of a cell and of a format, sheets and formats that a workbook has at most.
+LAST_ROW, LONGEST_CELL, LONGEST_FORMAT, MOST_SHEETS, MOST_FORMATS = 1_048_576, 32_767, 1000, 10_000, 65_536
+PLACE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})", re.ASCII)
+# Numbers of the East Asian formats of dates, which have no code in a file.
+DATE_FORMATS = {*range(27, 37), *range(50, 59)}
+UNCALCULATED = "has a formula without a saved value; open the file in Excel and save it"
 
 
 class SheetCells(NamedTuple):
@@ -33,30 +39,62 @@ class SheetCells(NamedTuple):
     note: str
 
 
+class _Listed(NamedTuple):
+    """A sheet of a workbook: its name, the part with its cells, and whether it is visible."""
+
+    name: str
+    part: str
+    visible: bool
+
+
+class _Book(NamedTuple):
+    """Sheets, the kind of each format of cells ("", "date" or "span"), the texts that cells share, the day 0 of dates, and
+    whether the program that wrote the formulas left their values to the next one.
+    """
+
+    sheets: list[_Listed]
+    kinds: list[str]
+    shared: list[str]
+    epoch: datetime
+    uncalculated: bool
+
+
 def split_path(path: Path) -> tuple[Path, str | None]:
     """The file of a path, and the sheet that ``file.xlsx:Sheet`` names, if any."""
     named = None if path.exists() else NAMED.fullmatch(str(path))
     return (Path(named[1]), named[2]) if named else (path, None)
 
 
-def read_workbook(path: Path, sheet: str | None) -> SheetCells:
-    """The cells of a sheet. Raises InputError for a damaged, encrypted or old workbook, and a sheet that is not there."""
-    _check_parts(path)
-    book = _opened(path, as_values=True)
-    names = [worksheet.title for worksheet in book.worksheets]
-    listed = ", ".join(one_line(name, LONGEST_NAME) for name in names[:20])
-    if not names:
+def read_workbook(path: Path, data: bytes, sheet: str | None) -> SheetCells:
+    """The cells of a sheet of the workbook in ``data``.
+
+    Raises InputError for a damaged, encrypted, old or too large workbook, a sheet that is not there, and formulas without values.
+    """
+    if data.startswith(OLD):
+        raise InputError([f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password"])
+    if not data.startswith(ARCHIVE):
+        raise InputError([f"{path}: is no Excel workbook; give a table of text a name that ends in .csv"])
+    parts = Parts(path, data)
+    book = _book(parts)
+    listed = ", ".join(one_line(one.name, LONGEST_NAME) for one in book.sheets[:20])
+    if not book.sheets:
         raise InputError([f"{path}: has no sheet with cells; save the table in one"])
-    name = names[0] if sheet is None else next((name for name in names if name.lower() == sheet.lower()), None)
-    if name is None:
+    visible = [one for one in book.sheets if one.visible] or book.sheets
+    named = (one for one in book.sheets if sheet is not None and one.name.lower() == sheet.lower())
+    found = visible[0] if sheet is None else next(named, None)
+    if found is None:
         raise InputError([f"{path}: has no sheet {one_line(sheet or '', LONGEST_NAME)!r}; name one of {listed}"])
-    rows = _cells(path, book, name)
-    _refuse_uncalculated(path, name, rows)
-    note = f"from sheet {one_line(name, LONGEST_NAME)!r}"
-    if len(names) > 1 and sheet is None:
-        note += f", the first of {len(names)} ({listed}); {path.name}:NAME names another"
-    kept = [(number, [_text(value) for value in row]) for number, row in enumerate(rows, 1) if any(_filled(row))]
-    return SheetCells([texts for _, texts in kept], [number for number, _ in kept], note)
+    cells = _Cells(parts, book)
+    parts.parse(found.part, cells.start, cells.end, cells.text)
+    place = f"of sheet {one_line(found.name, LONGEST_NAME)!r}"
+    refuse(f"{path}: cell {name} {place}: {UNCALCULATED}" for name in cells.uncalculated())
+    note = f"from sheet {one_line(found.name, LONGEST_NAME)!r}"
+    if cells.hidden:
+        note += f" with its {counted(cells.hidden, 'hidden row')}"
+    if len(book.sheets) > 1 and sheet is None:
+        first = "first" if found is book.sheets[0] else "first visible"
+        note += f", the {first} of {len(book.sheets)} ({listed}); {path.name}:NAME names another"
+    return SheetCells(cells.rows, cells.numbers, note)
 
 
 def letters(place: int) -> str:
@@ -65,101 +103,263 @@ def letters(place: int) -> str:
     return (letters(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def _check_parts(path: Path) -> None:
-    """Raises InputError for what is no workbook, or unpacks to too much."""
-    with path.open("rb") as file:
-        start = file.read(4)
-    if start == OLD:
-        raise InputError([f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password"])
-    if start != ARCHIVE:
-        raise InputError([f"{path}: is no Excel workbook; give a table of text a name that ends in .csv"])
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(part.file_size for part in archive.infolist())
-    # A damaged directory of parts can raise anything, too.
-    except Exception:
-        raise _damaged(path) from None
-    if size > LARGEST_PARTS:
-        raise InputError([f"{path}: unpacks to more than {LARGEST_PARTS / 1e6:g} MB; check that it is the right file"])
+def _column(text: str) -> int:
+    """Place, from 0, of the column of these letters."""
+    place = 0
+    for letter in text:
+        place = 26 * place + ord(letter) - ord("A") + 1
+    return place - 1
 
 
-def _opened(path: Path, as_values: bool) -> "Workbook":
-    """The workbook, with the saved values of its formulas or else their texts."""
-    import openpyxl
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return openpyxl.load_workbook(path, read_only=True, data_only=as_values)
-        except MemoryError:
-            raise
-        # A damaged part can raise anything in the library.
-        except Exception:
-            raise _damaged(path) from None
+def _whole(text: str) -> int:
+    """The whole number of a place or a format; -1 for any other text."""
+    return int(text) if text.isdecimal() and len(text) < 8 else -1
 
 
-def _cells(path: Path, book: "Workbook", name: str) -> list[list[Any]]:
-    """Values of a sheet's cells."""
-    rows, count = list[list[Any]](), 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            worksheet = book[name]
-            # The stated size may be the whole sheet.
-            worksheet.reset_dimensions()
-            for row in worksheet.iter_rows(values_only=True):
-                values = _without_tail(list(row))
-                rows.append(values)
-                count += len(values)
-                if count > MOST_CELLS:
-                    break
-        except MemoryError:
-            raise
-        except Exception:
-            raise _damaged(path) from None
-    if count > MOST_CELLS:
-        raise InputError([f"{path}: sheet {name!r} has more than {MOST_CELLS} cells; keep the table alone"])
-    return rows
+def _book(parts: Parts) -> _Book:
+    """What the sheets of a workbook share."""
+    main = next((name for kind, name in parts.related("").values() if kind == "officeDocument"), "xl/workbook.xml")
+    related = parts.related(main)
+    sheets, switches = list[_Listed](), set[str]()
+
+    def start(tag: str, keys: Mapping[str, str]) -> None:
+        if tag == "sheet":
+            local = {key.rpartition(" ")[2]: value for key, value in keys.items()}
+            kind, name = related.get(local.get("id", ""), ("", ""))
+            if kind == "worksheet":
+                sheets.append(_Listed(local.get("name", ""), name, local.get("state", "visible") == "visible"))
+            if len(sheets) > MOST_SHEETS:
+                raise parts.too_large(f"has more than {MOST_SHEETS} sheets")
+        switches.update(key for key in ("date1904", "fullCalcOnLoad") if keys.get(key) in ("1", "true"))
+
+    parts.parse(main, start)
+    names = {kind: name for kind, name in related.values()}
+    shared = _Texts(parts)
+    if "sharedStrings" in names:
+        parts.parse(names["sharedStrings"], shared.start, shared.end, shared.text)
+    kinds = _kinds(parts, names["styles"]) if "styles" in names else []
+    epoch = datetime(1904, 1, 1) if "date1904" in switches else datetime(1899, 12, 30)
+    return _Book(sheets, kinds, shared.whole, epoch, "fullCalcOnLoad" in switches)
 
 
-def _damaged(path: Path) -> InputError:
-    return InputError([f"{path}: is a damaged workbook; open it in Excel and save it anew"])
+def _kinds(parts: Parts, name: str) -> list[str]:
+    """The kind of each format of cells: dates, spans of time, or anything else."""
+    codes, formats, inside = dict[str, str](), list[str](), list[str]()
+
+    def start(tag: str, keys: Mapping[str, str]) -> None:
+        if tag == "numFmt":
+            codes[keys.get("numFmtId", "")] = keys.get("formatCode", "")[:LONGEST_FORMAT]
+        if tag == "xf" and inside:
+            formats.append(keys.get("numFmtId", "0"))
+        if tag == "cellXfs":
+            inside.append(tag)
+        if max(len(codes), len(formats)) > MOST_FORMATS:
+            raise parts.too_large(f"has more than {MOST_FORMATS} formats of cells")
+
+    def end(tag: str) -> None:
+        if tag == "cellXfs":
+            inside.clear()
+
+    parts.parse(name, start, end)
+    kinds = {number: _kind(number, codes.get(number)) for number in set(formats)}
+    return [kinds[number] for number in formats]
 
 
-def _without_tail(row: list[Any]) -> list[Any]:
-    while row and (row[-1] is None or row[-1] == ""):
-        row.pop()
-    return row
-
-
-def _filled(row: list[Any]) -> Iterator[bool]:
-    return (value is not None and str(value).strip() != "" for value in row)
-
-
-def _refuse_uncalculated(path: Path, name: str, rows: list[list[Any]]) -> None:
-    """Raises InputError for formulas whose values were not saved: their cells look empty."""
-    formulas = _cells(path, _opened(path, as_values=False), name)
-    refuse(
-        f"{path}: cell {letters(place)}{number} of sheet {name!r}: has a formula without a saved value; open the file in "
-        "Excel and save it"
-        for number, row in enumerate(formulas, 1)
-        for place, value in enumerate(row)
-        if isinstance(value, str) and value.startswith("=") and _missing(rows, number - 1, place)
-    )
-
-
-def _missing(rows: list[list[Any]], row: int, place: int) -> bool:
-    return row >= len(rows) or place >= len(rows[row]) or rows[row][place] is None
-
-
-def _text(value: Any) -> str:
-    """Text of a cell: a number with all its digits, dates as ISO 8601 has them."""
-    if value is None:
+def _kind(number: str, code: str | None) -> str:
+    """The kind of the format with a number, and a code unless it is one of Excel's own."""
+    if number == "0":
         return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int | float):
-        return Exact(repr(value))
-    if isinstance(value, datetime):
-        return value.date().isoformat() if value.time() == time() else value.isoformat(" ")
-    return value.isoformat() if isinstance(value, date | time) else str(value)
+    if _whole(number) in DATE_FORMATS:
+        return "date"
+    from openpyxl.styles import numbers
+
+    code = numbers.BUILTIN_FORMATS.get(_whole(number), "General") if code is None else code
+    return "span" if numbers.is_timedelta_format(code) else "date" if numbers.is_date_format(code) else ""
+
+
+class _Texts:
+    """Texts that cells share, in ``whole``, as their part is parsed."""
+
+    tag = "si"
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts, self.whole = parts, list[str]()
+        self._pieces, self._length, self._open, self._spoken = list[str](), 0, False, False
+
+    def start(self, tag: str, keys: Mapping[str, str]) -> None:
+        """A tag begins."""
+        if tag == self.tag:
+            self._pieces, self._length = [], 0
+        elif tag == "rPh":
+            # How a text is spoken is no part of it.
+            self._spoken = True
+        elif tag in ("t", "v"):
+            self._open = not self._spoken
+
+    def text(self, piece: str) -> None:
+        """A piece of text within a tag."""
+        if self._open:
+            self._pieces.append(piece)
+            self._length += len(piece)
+            if self._length > LONGEST_CELL:
+                raise DamageError(f": a cell of more than {LONGEST_CELL} characters")
+
+    def end(self, tag: str) -> None:
+        """A tag ends."""
+        if tag == self.tag:
+            self.keep("".join(self._pieces))
+        elif tag == "rPh":
+            self._spoken = False
+        elif tag in ("t", "v"):
+            self._open = False
+
+    def keep(self, text: str) -> None:
+        """Take up a whole text."""
+        self.whole.append(text)
+        if len(self.whole) > MOST_CELLS:
+            raise self.parts.too_large(f"has more than {MOST_CELLS} texts")
+
+
+class _Cells(_Texts):
+    """Cells of a sheet, row by row in ``rows`` with their ``numbers``, as its part is parsed; empty rows are left out.
+
+    ``hidden``: number of rows with cells that a filter or the user has hidden.
+    """
+
+    tag = "c"
+
+    def __init__(self, parts: Parts, book: _Book) -> None:
+        super().__init__(parts)
+        self.book, self.rows, self.numbers, self.hidden = book, list[list[str]](), list[int](), 0
+        self._row, self._number, self._column = list[str](), 0, -1
+        self._keys: Mapping[str, str] = {}
+        self._hides, self._formula, self._has_value = False, False, False
+        self._characters, self._width = 0, 0
+        # Formulas without values, corners of the ranges that one formula fills, and empty texts among their values.
+        self._missing, self._ranges, self._blank = list[str](), list[tuple[Any, Any]](), set[tuple[int, int]]()
+
+    def start(self, tag: str, keys: Mapping[str, str]) -> None:
+        """A tag begins."""
+        super().start(tag, keys)
+        if tag == "c":
+            self._keys, self._formula, self._has_value = keys, False, False
+            self._begin_cell(keys.get("r"))
+        elif tag == "v":
+            self._has_value = True
+        elif tag == "f":
+            self._formula = True
+            corners = [PLACE.fullmatch(corner) for corner in keys.get("ref", "").split(":")]
+            if keys.get("t") in ("array", "dataTable") and len(self._ranges) < MOST_FAULTS and all(corners):
+                self._ranges.append((corners[0], corners[-1]))
+        elif tag == "row":
+            number = keys.get("r", str(self._number + 1))
+            if not self._number < _whole(number) <= LAST_ROW:
+                raise DamageError(f": row number {one_line(number, LONGEST_NAME)} after {self._number}")
+            self._row, self._number, self._column = [], _whole(number), -1
+            self._hides = keys.get("hidden") in ("1", "true")
+
+    def end(self, tag: str) -> None:
+        """A tag ends."""
+        super().end(tag)
+        if tag == "row":
+            self._end_row()
+
+    def keep(self, text: str) -> None:
+        """Take up the value of a cell."""
+        row, column = self._row, self._column
+        value = self._value(text)
+        has_value = value != "" or (self._has_value and self._keys.get("t") == "str")
+        if self._formula and (self.book.uncalculated or not has_value) and len(self._missing) <= MOST_FAULTS:
+            self._missing.append(f"{letters(column)}{self._number}")
+        if value != "":
+            row += [""] * (column - len(row))
+            row.append(value)
+            self._characters += len(value)
+            if self._characters > LARGEST_FILE:
+                raise self.parts.too_large(f"has more than {LARGEST_FILE / 1e6:g} million characters in its cells")
+        elif has_value and self._ranges and len(self._blank) < MOST_ROWS:
+            self._blank.add((self._number, column))
+
+    def uncalculated(self) -> list[str]:
+        """Names of cells with a formula, or within that of a range, that have no saved value; of many only the first."""
+        rows = dict(zip(self.numbers, self.rows, strict=True))
+        places = (
+            (row, column)
+            for first, last in self._ranges
+            for row in range(int(first[2]), int(last[2]) + 1)
+            for column in range(_column(first[1]), _column(last[1]) + 1)
+        )
+        empty = (
+            f"{letters(column)}{row}"
+            for row, column in islice(places, MOST_CELLS)
+            if (column >= len(cells := rows.get(row, [])) or cells[column] == "") and (row, column) not in self._blank
+        )
+        return list(dict.fromkeys([*self._missing, *islice(empty, MOST_FAULTS)]))
+
+    def _begin_cell(self, reference: str | None) -> None:
+        if reference is None:
+            self._column += 1
+        else:
+            place = PLACE.fullmatch(reference)
+            column = _column(place[1]) if place else -1
+            if place is None or int(place[2]) != self._number or column <= self._column:
+                raise DamageError(f": cell {one_line(reference, LONGEST_NAME)} in row {self._number}")
+            self._column = column
+        if self._column >= MOST_COLUMNS:
+            raise self.parts.too_large(f"has more than {MOST_COLUMNS} columns")
+
+    def _end_row(self) -> None:
+        row = self._row
+        while row and not row[-1].strip():
+            row.pop()
+        if not row:
+            return
+        self.rows.append(row)
+        self.numbers.append(self._number)
+        self.hidden += self._hides
+        self._width = max(self._width, len(row))
+        for count, most, words in (
+            (len(self.rows), MOST_ROWS, "rows"),
+            (len(self.rows) * self._width, MOST_CELLS, "cells"),
+        ):
+            if count > most:
+                raise self.parts.too_large(f"has more than {most} {words}")
+
+    def _value(self, text: str) -> str:
+        """Text of a cell: a number with all its digits, dates as ISO 8601 has them."""
+        kind = self._keys.get("t", "n")
+        if kind == "s":
+            place = _whole(text.strip())
+            if not 0 <= place < len(self.book.shared):
+                raise DamageError(f": shared text of cell {letters(self._column)}{self._number}")
+            return self.book.shared[place]
+        if kind == "b":
+            return {"1": "true", "0": "false"}.get(text.strip(), text)
+        if kind != "n" or not (text := text.strip()):
+            return text
+        if not NUMBER.fullmatch(text):
+            raise DamageError(f": number of cell {letters(self._column)}{self._number}")
+        style, kinds = _whole(self._keys.get("s", "0")), self.book.kinds
+        form = kinds[style] if 0 <= style < len(kinds) else ""
+        return _time(float(text), form, self.book.epoch) if form else Exact(_number(text))
+
+
+def _number(text: str) -> str:
+    """A number with the fewest digits that give its double; a whole number as it is."""
+    return text if text.isdecimal() and len(text) < 16 else repr(float(text))
+
+
+def _time(value: float, form: str, epoch: datetime) -> str:
+    """Text of a date or a span of time, stored as a number of days."""
+    from openpyxl.utils.datetime import from_excel
+
+    try:
+        moment = from_excel(value, epoch, timedelta=form == "span")
+    except (OverflowError, ValueError):
+        return f"#{value!r}"
+    if isinstance(moment, timedelta):
+        minutes, seconds = divmod(round(abs(moment.total_seconds())), 60)
+        return f"{'-' if value < 0.0 else ''}{minutes // 60}:{minutes % 60:02}:{seconds:02}"
+    if isinstance(moment, datetime):
+        return moment.date().isoformat() if moment.time() == time() else moment.isoformat(" ")
+    return moment.isoformat()

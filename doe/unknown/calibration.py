@@ -2,23 +2,17 @@
 
 History matching. Input sets at which the simulation cannot agree with the measurements are ruled out, in waves. The
 implausibility of a cell is |z - m|/sqrt(V): the distance of the measured value from the emulator's mean in standard deviations
-of rig, emulator, integration and discrepancy together. New input sets spread over the plausible rest.
+of rig, its sensors, emulator, integration and discrepancy together. New input sets spread over the plausible rest.
 
 Predictions. Rows held out are predicted from the training rows. If there are too few of them, every row is predicted from all
 others: particles of the power that serves best are weighted by the likelihood of those others. Predicted are the measured
-values, with biases as the conditioning rows determine them and with the errors of rig and simulation.
-
-Width. Predictions that are too wide and predictions that are too narrow both count against a calibration. Rows are predicted
-in turn, each from those before it, so residuals of different rows are independent. Each cell becomes a normal score by its
-rank among the draws of its prediction. The scores of a row are made independent by their correlation among the draws. The
-sum of their squares is small if predictions are too wide and large if they are too narrow. It is judged for all cells together
-and for each output apart; the draws themselves show how small the smallest of these chances may be.
+values, with biases as the conditioning rows determine them and with the errors of rig and simulation. Rows are also predicted
+in turn, each from those before it, which shows predictions that are too wide or too narrow (``width``).
 
 Sources: Vernon, Goldstein and Bower, Galaxy formation: a Bayesian uncertainty analysis, Bayesian Analysis 5 (2010) 619
 (history matching); Gneiting and Raftery, Strictly proper scoring rules, J. Am. Statist. Assoc. 102 (2007) 359 (CRPS); Vehtari,
 Gelman and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation (2017); Kass and Raftery, Bayes
-factors, J. Am. Statist. Assoc. 90 (1995) 773; Dawid, Statistical theory: the prequential approach, J. R. Statist. Soc. A 147
-(1984) 278; Westfall and Young, Resampling-based multiple testing (1993), section 2.3, for the smallest of several chances.
+factors, J. Am. Statist. Assoc. 90 (1995) 773.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,6 +24,7 @@ import numpy as np
 from scipy import special
 
 from doe.unknown.inputs import nested, spread_out
+from doe.unknown.offsets import STRONG, Unseen, unseen_offsets
 from doe.unknown.posterior import (
     BEYOND,
     BY_ROW,
@@ -45,6 +40,7 @@ from doe.unknown.posterior import (
     joint,
     sampled,
 )
+from doe.unknown.width import Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole
 
 # Implausibility from which an input set is ruled out.
@@ -62,10 +58,10 @@ def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[
     learnt = measured.learnt
     mean, doubt = (prediction[:, learnt] for prediction in cells.predict(quantiles))
     emulator = (doubt**2).sum(axis=2) + cells.rest[learnt]
-    square = measured.scales[measured.output[learnt]] ** 2
+    output = measured.output[learnt]
     apart, rig = np.abs(measured.values[learnt] - mean), measured.variances[learnt]
-    whole = np.sqrt(emulator + rig + (1.0 + BY_ROW**2) * square)
-    return apart / whole, emulator / (rig + BY_ROW**2 * square)
+    by_row = rig + (BY_ROW * measured.scales[output]) ** 2
+    return apart / np.sqrt(emulator + by_row + measured.allowed[output] ** 2), emulator / by_row
 
 
 def plausible(implausible: Array, wave: int) -> Mask:
@@ -250,102 +246,13 @@ def _misfit(cells: Cells, trial: Batch) -> float:
     return float(((trial.values - mean) ** 2 / whole).mean())
 
 
-# Probability of a rejection, of either side, if predictions are right.
-LEVEL = 0.05
-# Predictions this factor too wide or too narrow must be rejected at least this often, else the cells are too few.
-TWICE, OFTEN = 2.0, 0.5
-
-
-class Scores(NamedTuple):
-    """Predicted cells as independent standard normal scores.
-
-    They are of the measured values (k,) and of draws of the predictions (s, k); ``output`` (k,) is that of each cell."""
-
-    measured: Array
-    draws: Array
-    output: Whole
-
-
-@dataclass(frozen=True)
-class Width:
-    """The width of predictions of ``cells`` many cells.
-
-    ratio : scatter of the residuals over the predicted scatter
-    chance : probability of as much in either direction if predictions are right
-    output, worst : place of the output that shows it most (None: all together), and its own ratio
-    power : probabilities of rejecting predictions that are twice too wide, and twice too narrow
-    """
-
-    cells: int
-    ratio: float
-    chance: float
-    output: int | None
-    worst: float
-    power: tuple[float, float]
-
-    @property
-    def rejected(self) -> bool:
-        """Whether predictions are too wide or too narrow."""
-        return self.chance <= LEVEL
-
-    @property
-    def enough(self) -> bool:
-        """Whether the cells would show predictions that are twice too wide or too narrow."""
-        return min(self.power) >= OFTEN
-
-
-def scores_of(draws: Array, measured: Array, output: Whole) -> Scores:
-    """Scores of the cells of a row, by draws (s, a) of its joint prediction."""
-    count = len(draws)
-    ranks = np.argsort(np.argsort(draws, axis=0, kind="stable"), axis=0)
-    places = np.vstack([(draws < measured).sum(axis=0) * (count / (count + 1.0)), ranks])
-    scores = special.ndtri((places + 0.5) / count)
-    correlation = np.corrcoef(scores[1:].T).reshape(measured.size, measured.size)
-    # Cells of one sensor may be almost identical.
-    root = np.linalg.cholesky(correlation + 1e-6 * np.eye(measured.size))
-    independent = np.linalg.solve(root, scores.T).T
-    return Scores(independent[0], independent[1:], output)
-
-
-def width(parts: Sequence[Scores]) -> Width:
-    """The width of predictions, from the scores of all predicted rows."""
-    output = np.concatenate([row.output for row in parts])
-    squares = np.hstack([np.vstack([row.measured, row.draws]) for row in parts]) ** 2
-    names = np.unique(output)
-    groups = np.column_stack([np.ones(output.size), *(output == name for name in names)]).astype(float)
-    groups = groups if names.size > 1 else groups[:, :1]
-    sums = squares @ groups
-    sorted_sums = np.sort(sums[1:], axis=0)
-    count = len(sorted_sums)
-
-    def chances(of: Array) -> Array:
-        """Probabilities (n, g) of sums (n, g) as small or as large among the draws, the smaller of both."""
-        below = np.column_stack([np.searchsorted(s, v, "right") for s, v in zip(sorted_sums.T, of.T, strict=True)])
-        above = count - np.column_stack([np.searchsorted(s, v) for s, v in zip(sorted_sums.T, of.T, strict=True)])
-        return (1.0 + np.minimum(below, above)) / (count + 1.0)
-
-    least = np.sort(chances(sums[1:]).min(axis=1))
-    limit = least[max(int(LEVEL * count) - 1, 0)]
-    observed = chances(sums[:1])[0]
-    worst = int(np.argmin(observed))
-    # Measured values that scatter half as much as predicted, or twice.
-    power = [float((chances(sums[1:] * by).min(axis=1) <= limit).mean()) for by in (TWICE**-2, TWICE**2)]
-    ratios = np.sqrt(sums[0] / groups.sum(axis=0))
-    chance = (1.0 + float(np.searchsorted(least, observed.min(), "right"))) / (count + 1.0)
-    name = None if worst == 0 else int(names[worst - 1])
-    return Width(output.size, float(ratios[0]), chance, name, float(ratios[worst]), (power[0], power[1]))
-
-
 # Validation rows that suffice by themselves; share of cells that an interval should hold.
 ENOUGH, INSIDE = 3, 0.9
-# Standard deviations beyond which a residual is an outlier; Bayes factor that is strong evidence that an output is not
-# explained, and the largest that particles resolve.
-FAR, STRONG, MOST = 3.0, 10.0, 1e6
+# Standard deviations beyond which a residual is an outlier; the largest Bayes factor that particles resolve.
+FAR, MOST = 3.0, 1e6
 # Draws of a cell, draws of a row for its width, and particles of each power that these are drawn from.
 DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
 ENDS = (0.5, 0.05, 0.95)
-# Standard deviations from which a bias is visible, and the fewest particles that resolve it.
-VISIBLE, FEWEST_BEYOND = 3.0, 30
 
 JointAt = Callable[[Array], Joint]
 
@@ -375,16 +282,17 @@ class Explanation(NamedTuple):
     """Whether the simulation explains an output.
 
     bias : how far measured values are constantly above simulated ones, in logarithms (median, 5 and 95 %)
-    allowed : scale of the allowed bias
-    evidence : Bayes factor of an error beyond that; None where the simulation is taken as exact
-    resolution : the least visible bias, as smaller ones are taken for inputs; None where undecided
+    allowed, accuracy : scales of the bias that is allowed of the simulation, and of the sensor's offset
+    evidence : Bayes factor of an error beyond these; None where the simulation is taken as exact
+    unseen : the largest offset that inputs could imitate, where one is sought
     """
 
     name: str
     bias: tuple[float, float, float]
     allowed: float
+    accuracy: float
     evidence: float | None
-    resolution: float | None
+    unseen: Unseen | None
 
     @property
     def explained(self) -> bool:
@@ -458,13 +366,9 @@ def _prediction(particles: Particles, conditions: Whole, targets: Whole, random:
 
 
 def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
-    """Scores of half of the training rows and of the validation rows, each by all rows before it, in random order."""
-    random, measured = np.random.default_rng(seed), particles.measured
-    rows = [
-        [places[measured.row[places] == row] for row in random.permutation(np.unique(measured.row[places]))]
-        for places in (measured.learnt, np.flatnonzero(measured.validation))
-    ]
-    order, start = [*rows[0], *rows[1]], (len(rows[0]) + 1) // 2
+    """Scores of the rows that judge the width, each by all rows before it."""
+    measured, random = particles.measured, np.random.default_rng(seed)
+    order, start = prequential(measured.row, measured.validation, random)
     for place in range(start, len(order)):
         conditions, targets = np.concatenate(order[:place]), order[place]
         draws = particles.predictions(conditions, targets, WIDTH_DRAWS, random)
@@ -487,10 +391,10 @@ def _crps(draws: Array, truth: Array) -> float:
     return float((np.abs(draws - truth).mean(axis=0) - apart).mean())
 
 
-def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measured, seed: int) -> list[Explanation]:
-    """Whether the simulation explains each output, by particles of the posterior.
-
-    ``joint``: the cells there; ``beyond`` (n, m): which errors exceed what is allowed."""
+def explanations(names: Sequence[str], match: Matched, points: Array, seed: int) -> list[Explanation]:
+    """Whether the simulation explains each output, by particles (n, d) of the posterior."""
+    measured, joint, beyond = match.measured, match.joint(points), match.errors(points).beyond
+    unseen = unseen_offsets(match.cells, measured, match.quantiles, points[:, : match.unknowns.inputs].mean(axis=0))
     middle, root = joint.latent(measured.values, measured.learnt)
     random = np.random.default_rng(seed)
     latent = middle + (root @ random.standard_normal((*middle.shape, 1)))[:, :, 0]
@@ -499,12 +403,9 @@ def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Mea
         cell = int(np.flatnonzero(measured.output == place)[0])
         biases = latent[:, place] * joint.roots[:, cell, place]
         median, low, high = np.quantile(biases, ENDS).tolist()
-        # The uncertainty of any bias beyond what is allowed.
-        wide = biases[beyond[:, place]]
-        resolution = float(VISIBLE * wide.std()) if wide.size >= FEWEST_BEYOND else None
-        exact = measured.scales[place] == 0.0
-        factor = None if exact else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
-        listed.append(Explanation(name, (median, low, high), float(measured.scales[place]), factor, resolution))
+        scale, accuracy = float(measured.scales[place]), float(measured.accuracy[place])
+        factor = None if scale == 0.0 else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
+        listed.append(Explanation(name, (median, low, high), scale, accuracy, factor, unseen[place]))
     return listed
 
 
@@ -549,7 +450,7 @@ def judge(match: Matched, names: Sequence[str], seed: int) -> Judgement:
     for part in parts:
         residuals[part.places] = part.residuals
     beyond = match.errors(points).beyond
-    outputs = explanations(names, match.joint(points), beyond, measured, seed)
+    outputs = explanations(names, match, points, seed)
     return Judgement(
         trial(parts[-1], particles, seed, validation=enough), outputs, joint_factor(beyond), residuals, particles
     )
@@ -563,7 +464,7 @@ def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[
     sentences = []
     for output in outputs:
         if not output.explained:
-            off = f"{100.0 * np.expm1(output.bias[0]):+.2g} % off its level, {100.0 * output.allowed:.2g} % allowed"
+            off = f"{100.0 * np.expm1(output.bias[0]):+.2g} % off its level, {allowance_words(output.allowed, output.accuracy)}"
             cause = "its sensor is biased or physics is missing"
             sentences.append(f"{output.name} is not explained: {off}, Bayes factor {output.evidence:.3g}; {cause}")
     if judgement.any_factor >= STRONG and not sentences:
@@ -575,12 +476,6 @@ def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[
         )
     if result.width.rejected:
         sentences.append(_width_words(result.width, [output.name for output in outputs]))
-    elif not result.width.enough:
-        wide, narrow = (100.0 * share for share in result.width.power)
-        shares = (
-            f"intervals twice too wide would show in {wide:.0f} % of such tables, twice too narrow in {narrow:.0f} %"
-        )
-        sentences.append(f"{result.width.cells} predicted values are too few to judge intervals: {shares}")
     if not result.crps < result.crps_before:
         sentences.append("measured values are predicted no better than before")
     if not anything:
@@ -588,6 +483,11 @@ def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[
     if not emulated:
         sentences.append("emulators do not predict the simulation at the inputs found")
     return sentences
+
+
+def allowance_words(allowed: float, accuracy: float) -> str:
+    """What an output may be off as a whole."""
+    return f"{100.0 * allowed:.2g} % of the simulation and {100.0 * accuracy:.2g} % of the sensor allowed"
 
 
 def _width_words(width: Width, names: list[str]) -> str:

@@ -1,13 +1,14 @@
 """Whether one design is better than another over the unknown inputs, whether it keeps its limits, and which input is decisive.
 
 Gains. Rows are pairs: both designs at the same input set, with relative gains D (n, m) and their variances s^2 (n, m) of the
-simulation. Single gains scatter more than the true ones, so each is shrunk towards the mean of all by the share of noise.
-The true gains of row i are normal about m + V (V + S_i)^-1 (D_i - m), V = cov D - mean S. A probability is the mean over rows
-that all true gains are positive; its interval is by resampling rows. Gains are joint: their probabilities are never multiplied.
+simulation. Single gains scatter more than the true ones, so the noise is removed from their distribution. It begins as if the true
+gains were normal, those of row i about m + V (V + S_i)^-1 (D_i - m), V = cov D - mean S, with a few points drawn for each row.
+Steps of expectation maximisation then move the weights of all points to the distribution under which the gains are likeliest,
+whatever its form. They end before it follows the noise, and how far the share still moves lengthens its interval on that side.
+A probability is the weight of the points at which all gains are positive; its interval is by resampling rows, and no shorter than
+Wilson's. Gains are joint: their probabilities are never multiplied.
 
-Limits. Rows are input sets at which the design was simulated. The true value of row i is normal about
-m + V/(V + s_i^2) (y_i - m) with the variance V s_i^2/(V + s_i^2), V = var y - mean s^2. The probability is the mean over rows
-that it is between the limits; its interval is by resampling rows, and no shorter than Wilson's.
+Limits. The noise is removed alike from values at input sets. The probability is the weight of the points between the limits.
 
 Worth. Gains are emulated over all inputs; the joint residuals of a row may occur at any input set. p(t) is the probability that
 all gains are positive, given the value t of an input. Its flip is where p(t) crosses a half. Its worth is
@@ -23,7 +24,8 @@ side. The blur by slices and the emulators' own errors are biases, too. The erro
 both sides. An input is decisive if it alone is worth most in nearly all resamplings, the input that does nothing included, and
 if its interval excludes 0.
 
-Sources: Efron and Morris, Journal of the American Statistical Association 68 (1973) 117; Wilson, ibid. 22 (1927) 209; Strong,
+Sources: Laird, Journal of the American Statistical Association 73 (1978) 805 (likeliest distribution by expectation
+maximisation); Lucy, Astronomical Journal 79 (1974) 745 (its end before convergence); Wilson, JASA 22 (1927) 209; Strong,
 Oakley and Brennan, Medical Decision Making 34 (2014) 311 (expected value of partial perfect information by regression); Shao and
 Wu, Annals of Statistics 17 (1989) 1176 (the delete-d jackknife).
 """
@@ -35,6 +37,7 @@ from itertools import combinations
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg, sparse, special, stats
 
 from doe.emulator import Emulator, fit_emulator, leave_one_out
@@ -42,8 +45,13 @@ from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from rbdyn.base.arrays import Array, Whole
 
-# Draws of a row's true gains, resamplings of rows, and the share of cases that an interval should hold.
-DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
+# Points of true values for a row and at most, steps of their weights and earlier ones, and the cases that an interval holds.
+POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER, CONFIDENCE = 4, 1024, 100, 25, 0.95
+# Resamplings of up to 512 rows; of more rows fewer.
+RESAMPLES, FEWEST_RESAMPLES, USUAL_ROWS = 200, 50, 512
+# Least standard deviation of noise over the size of the values: smaller noise is lost in rounding.
+LEAST_NOISE = 1e-9
+Hits = Callable[[Array], NDArray[np.bool_]]  # from points (k, m) to whether each hits (k, q)
 
 
 @dataclass(frozen=True)
@@ -57,19 +65,29 @@ class Better:
 @one_thread
 def better(gains: Array, variances: Array, seed: int) -> Better:
     """Probabilities that the true gains (n, m) are positive, from simulated gains and their variances (n, m)."""
-    random = np.random.default_rng(seed)
-    # Every resampling shrinks anew, as the amount of noise is estimated from the same rows.
-    *alone, every = resampled(lambda rows: _shares(gains[rows], variances[rows], random), len(gains), random)
+    *alone, every = _likely_shares(
+        gains, variances, lambda points: np.column_stack([points > 0.0, (points > 0.0).all(axis=1)]), seed
+    )
     return Better(alone, every)
 
 
-def resampled(shares: Callable[[Whole], Array], count: int, random: np.random.Generator) -> list[Share]:
-    """``shares`` (m,) by all of ``count`` rows, with 95 % intervals by drawing rows anew."""
-    whole = shares(np.arange(count))
-    again = [shares(rows) for rows in random.integers(0, count, (RESAMPLES, count))]
+def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> list[Share]:
+    """Shares of input sets whose true values hit, with 95 % intervals by drawing rows anew.
+
+    ``values`` (n, m) are simulated, with ``variances`` (n, m).
+    """
+    random, count = np.random.default_rng(seed), len(values)
+    noise = np.maximum(variances, LEAST_NOISE**2 * (values**2).mean(axis=0) + 1e-300)
+    earlier, whole = _shares(values, noise, np.ones(count, dtype=np.int64), hits, random)
+    # Every resampling begins anew, as the amount of noise is estimated from the same rows.
+    resamples = max(RESAMPLES * USUAL_ROWS // max(count, USUAL_ROWS), FEWEST_RESAMPLES)
+    drawn = (np.bincount(rows, minlength=count) for rows in random.integers(0, count, (resamples, count)))
+    again = [_shares(values, noise, counts, hits, random)[1] for counts in drawn]
     ends = np.quantile(again, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
+    moved = whole - earlier
+    ends += [moved.clip(max=0.0), moved.clip(min=0.0)]
     intervals = []
-    for value, low, high in zip(whole.tolist(), *ends.tolist(), strict=True):
+    for value, low, high in zip(whole.tolist(), *ends.clip(0.0, 1.0).tolist(), strict=True):
         # Resampled rows that all agree show no scatter; Wilson's interval still has one.
         least, most = wilson(value, count)
         intervals.append(Share(value, min(low, least), max(high, most)))
@@ -99,17 +117,30 @@ def in_doubt(gains: Array, variances: Array) -> Whole:
     return ranked[sure[ranked] < 2.0]
 
 
-def _shares(gains: Array, variances: Array, random: np.random.Generator) -> Array:
-    """Probability that each true gain is positive, and that all are (m + 1,)."""
-    middle = gains.mean(axis=0)
-    between = _positive(np.cov(gains.T, ddof=1).reshape(len(middle), -1) - np.diag(variances.mean(axis=0)))
-    noise = variances[:, :, None] * np.eye(len(middle))
-    weights = between @ np.linalg.pinv(between + noise)
-    roots = _root(between - weights @ between)
-    shrunk = middle + np.einsum("nij,nj->ni", weights, gains - middle)
-    normal = random.standard_normal((DRAWS, *gains.shape))
-    positive = shrunk + np.einsum("nij,snj->sni", roots, normal) > 0.0
-    return np.array([*positive.mean(axis=(0, 1)), positive.all(axis=2).mean()])
+def _shares(values: Array, variances: Array, counts: Whole, hits: Hits, random: np.random.Generator) -> Array:
+    """Shares (2, q) of true values that hit, after `EARLIER` and after all steps, of rows that occur ``counts`` (n,) times."""
+    there = counts > 0
+    values, variances, weights = values[there], variances[there], counts[there] / counts.sum()
+    middle = weights @ values
+    covariance = np.cov(values.T, fweights=counts[there], ddof=1).reshape(len(middle), -1)
+    between = _positive(covariance - np.diag(weights @ variances))
+    pull = between @ np.linalg.inv(between + variances[:, :, None] * np.eye(len(middle)))
+    # Points are spread over the rows by their weights, and evenly over their normal laws.
+    count = min(POINTS_OF_ROW * len(values), MOST_POINTS)
+    rows = np.searchsorted(np.cumsum(weights), (np.arange(count) + random.random()) / count).clip(max=len(values) - 1)
+    ranks = random.permuted(np.tile(np.arange(count)[:, None], (1, len(middle))), axis=0)
+    normal = special.ndtri((ranks + random.random(ranks.shape)) / count)
+    start = middle + np.einsum("nij,nj->ni", pull, values - middle)
+    points = start[rows] + np.einsum("nij,nj->ni", _root(between - pull @ between)[rows], normal)
+    # Likelihood (n, k) of each row at each point.
+    apart = np.sum([(values[:, [j]] - points[:, j]) ** 2 / variances[:, [j]] for j in range(len(middle))], axis=0)
+    likelihood = np.exp(-0.5 * (apart - apart.min(axis=1, keepdims=True)))
+    share, shares = np.full(count, 1.0 / count), []
+    for step in range(1, STEPS + 1):
+        share = share * (likelihood.T @ (weights / np.maximum(likelihood @ share, 1e-300)))
+        if step in (EARLIER, STEPS):
+            shares.append(np.round(share @ hits(points), 12))  # sums of shares are 1 but for rounding
+    return np.array(shares)
 
 
 def _positive(matrix: Array) -> Array:
@@ -129,22 +160,10 @@ def odds(values: Array, variances: Array, lower: float, upper: float, seed: int)
 
     ``values`` (n,) are simulated, with ``variances`` (n,).
     """
-    (share,) = resampled(
-        lambda rows: np.array([_share(values[rows], variances[rows], lower, upper)]),
-        len(values),
-        np.random.default_rng(seed),
+    (share,) = _likely_shares(
+        values[:, None], variances[:, None], lambda points: (lower <= points) & (points <= upper), seed
     )
     return share
-
-
-def _share(values: Array, variances: Array, lower: float, upper: float) -> float:
-    middle = values.mean()
-    between = max(float(values.var(ddof=1) - variances.mean()), 0.0)
-    weight = np.divide(between, between + variances, out=np.zeros_like(variances), where=between + variances > 0.0)
-    true, deviation = middle + weight * (values - middle), np.sqrt(weight * variances)
-    sure = deviation <= 1e-12 * np.abs(true)
-    below, above = (special.ndtr((end - true) / np.where(sure, 1.0, deviation)) for end in (lower, upper))
-    return float(np.where(sure, (lower <= true) & (true <= upper), above - below).mean())
 
 
 # Slices of an input's range in which the probability is taken; of a pair of inputs, along each.

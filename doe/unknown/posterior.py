@@ -4,10 +4,11 @@ Emulators. The measured cells of a table are correlated, so a few principal comp
 of them; each component has an emulator of its own. Cells are in units of their allowed deviation. Components are left out once
 the signal in the rest is small compared with it. The known part of the scatter is subtracted from components and rest.
 
-Likelihood, in logarithms: z_cj = eta_j(c, theta) + b_j + e_cj + eps. Output j has one bias b_j ~ N(0, tau_j^2) in all rows c
-and an error e_cj ~ N(0, (0.3 rho_j)^2) in each. A constant offset is absorbed by the bias; only differences between rows and
-outputs identify the inputs. Biases and errors are integrated out: cells are jointly normal with covariance diag(V) + U U'.
-U has a column for each bias and for each component of the emulators' error. tau_j and rho_j are sampled with the inputs.
+Likelihood, in logarithms: z_cj = eta_j(c, theta) + b_j + o_j + e_cj + eps. Output j has in all rows c one bias of the
+simulation, b_j ~ N(0, tau_j^2), and one offset of its sensor, o_j ~ N(0, a_j^2) of stated accuracy a_j; in each row it has an
+error e_cj ~ N(0, (0.3 rho_j)^2). All three are integrated out: cells are jointly normal with covariance diag(V) + U U'.
+U has a column for each output, of size (tau_j^2 + a_j^2)^(1/2) in its rows, and for each component of the emulators' error.
+tau_j and rho_j are sampled with the inputs.
 
 Each output is of one of three kinds, so that the sample itself shows whether the model explains it:
 - as allowed: tau_j is half-normal of the allowed scale, rho_j = tau_j
@@ -127,6 +128,7 @@ class Measured:
     output, row : (c,), to which each cell belongs
     scales : (m,), of the discrepancy that is allowed of each output; NaN until ``with_scales`` where none is stated
     validation : (c,), whether a cell is held out
+    accuracy : (m,), standard deviation of the offset of each output's sensor
     spread : (m,), scatter of each output over the prior of the inputs
     """
 
@@ -136,6 +138,7 @@ class Measured:
     row: Whole
     scales: Array
     validation: Mask
+    accuracy: Array
     spread: Array | None = None
 
     @property
@@ -144,10 +147,15 @@ class Measured:
         return np.flatnonzero(~self.validation)
 
     @property
+    def allowed(self) -> Array:
+        """Scales (m,) of offsets of whole outputs that are allowed, of simulation and sensor together."""
+        return np.hypot(self.scales, self.accuracy)
+
+    @property
     def wide(self) -> Array:
         """Scales (m,) of discrepancies beyond the allowed ones."""
         spread = np.zeros(self.scales.size) if self.spread is None else self.spread
-        return np.where(self.scales > 0.0, np.maximum(spread, WIDER * self.scales), 0.0)
+        return np.where(self.scales > 0.0, np.maximum(spread, WIDER * self.allowed), 0.0)
 
     def with_scales(self, simulated: Array) -> "Measured":
         """The same with default scales where none is stated, from cells (n, c) simulated over the prior of the inputs.
@@ -217,7 +225,7 @@ def joint(cells: Cells, measured: Measured, quantiles: Array, errors: Errors) ->
     """Measured cells at input sets (n, d) with errors of the simulation (n, m)."""
     mean, doubt = cells.predict(quantiles)
     own = measured.variances + cells.rest + (BY_ROW * errors.rows[:, measured.output]) ** 2
-    level = errors.level[:, measured.output, None]
+    level = np.hypot(errors.level, measured.accuracy)[:, measured.output, None]
     biases = level * (measured.output[:, None] == np.arange(measured.scales.size))
     return Joint(mean, own, np.concatenate([biases, doubt], axis=2))
 

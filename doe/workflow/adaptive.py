@@ -287,7 +287,7 @@ class _PointEvaluator(Evaluator):
     def report(self, state: Batch, count: int, total: int) -> None:
         """A new bar for each batch."""
         gain_percent = 100.0 * state.remaining / max(state.hypervolume, 1e-300)
-        words = f"adaptive front: hypervolume {state.hypervolume:.3f}, at most {gain_percent:.1f} % to gain"
+        words = f"adaptive front: hypervolume {state.hypervolume:.3f}, about {gain_percent:.1f} % to gain"
         self._progress = self._simulations.progress(words)
 
     def __call__(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:

@@ -35,6 +35,7 @@ from doe.unknown.calibration import (
     sets_a_wave,
 )
 from doe.unknown.posterior import Learnt, Measured, contraction, densest_intervals, learnt
+from doe.unknown.width import OFTEN, Power, power_of
 from doe.workflow.input_sets import (
     NORMAL,
     Case,
@@ -50,17 +51,24 @@ from doe.workflow.input_sets import (
     tables_of,
     work_of_set,
 )
-from doe.workflow.rig import PULSE_OUTPUTS, Rig, read_rig
+from doe.workflow.rig import MOST_CONDITIONS, PULSE_OUTPUTS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.forecast import Measured as Paces
 from rbdyn.base.storage import code_version, digest_of
-from rbdyn.base.words import quantity
+from rbdyn.base.words import counted, quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented
 from rbdyn.scene.unknown import Input, put, value_of
+
+
+class Design(NamedTuple):
+    """The power of a design to judge predictions, and a sentence on one that cannot; empty for another."""
+
+    power: Power
+    doubt: str
 
 
 class Question(NamedTuple):
@@ -78,6 +86,7 @@ def question_of(question: Question) -> str:
     target_laws = [[target.key, target.law.model_dump(mode="json")] for target in targets]
     declared = [case.uncertain.model_dump(mode="json"), case.scene.calibrate.model_dump(mode="json")]
     rows = [[row.keys, row.values, row.sds, row.turns, row.hold] for row in rig.rows]
+    rows.append([rig.accuracies])
     scene = case.scene.model_dump(mode="json")
     version = code_version(clearance.SIMULATION, "doe.workflow.calibration")
     content = [version, scene, declared, target_laws, rows, case.source, str(rig.path)]
@@ -95,7 +104,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     uncertain = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is a result of calibration; leave it out"] if uncertain.sample else [])
     documented_keys, law_keys = {entry.key for entry in documented()}, set(uncertain.laws)
-    override_claims = Claims({key_path(override): override for override in uncertain.set})
+    override_claims = Claims({key_path(override): override for override in uncertain.assignments})
     refuse(
         [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
         + [f"{data}: column {fault}" for fault in first_guess_faults(base.thermal, base.lubricant, rig.keys)]
@@ -142,7 +151,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {candidate.key for candidate in case.every}
     )
-    refuse(_vain_question(case, rig, targets))
+    refuse([*_vain_question(case, rig, targets), *_endless_question(case, rig, targets)])
     if case.scene.calibrate.discrepancy == "none":
         notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
     else:
@@ -151,18 +160,50 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    # A fault at several conditions is reported once.
-    refuse(dict.fromkeys(fault for condition in cases_of(case, rig) for fault in impossible(condition)))
+    refuse(_impossible_conditions(cases_of(case, rig), rig))
     return Question(case, targets, rig, tuple(notes))
 
 
 def _vain_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[str]:
-    """Faults of a question without targets, and of measured temperatures that no heat balance of the scene computes."""
+    """Faults of a question without targets or of one condition, and of measured temperatures that no heat balance of the scene computes."""
     if not targets:
         yield f"{case.source}: uncertain: no unknown input is declared; add one with a law"
     names = [name for name in rig.outputs if name in clearance.TEMPERATURES and case.scene.thermal is None]
+    if len(rig.conditions) == 1:
+        yield f"{rig.path}: all rows have one operating condition, so none predicts another; measure at two at least"
     fix = f"{case.source} has no [thermal], which computes temperatures; add that table there or remove the column"
     yield from (f"{rig.path}: column {name}: {fix}" for name in names)
+
+
+def _endless_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[str]:
+    """The fault of a question that takes more runs than a calibration may have."""
+    most = sum(max(stage.runs, stage.most or 0) for stage in _stages(case, rig, targets, 1.0))
+    if most > MOST_RUNS:
+        fix = "give fewer conditions, fewer targets (--free) or fewer waves (calibrate.waves)"
+        conditions = counted(len(rig.conditions), "operating condition")
+        yield f"{rig.path}: {conditions} take up to {most} runs, {MOST_RUNS} at most; {fix}"
+
+
+def _impossible_conditions(cases: Sequence[Case], rig: Rig) -> dict[str, None]:
+    """Faults of the scene at the conditions, each once, and of cages that are measured faster than both rings."""
+    faults = dict.fromkeys(fault for condition in cases for fault in impossible(condition))
+    conditions, rows = rig.conditions, list[tuple[int, float, float]]()
+    for row in rig.rows:
+        fastest = _fastest_ring(cases[conditions.index(row.keys)].scene)
+        if row.values.get(SPEED, 0.0) > fastest:
+            rows.append((row.number, row.values[SPEED], fastest))
+    if rows:
+        number, speed, fastest = rows[0]
+        where = (
+            f"{rig.path}: {SPEED} in row {number} = {speed:g}: is above {fastest:g} rpm, the speed of the faster ring"
+        )
+        faults[f"{where} ({len(rows)} of {len(rig.rows)} rows); check the columns and the unit"] = None
+    return faults
+
+
+def _fastest_ring(scene: Scene) -> float:
+    """The speed [rpm] of the faster ring."""
+    return max(abs(scene.operation.inner_speed_rpm), abs(scene.operation.outer_speed_rpm))
 
 
 def cases_of(case: Case, rig: Rig) -> list[Case]:
@@ -183,6 +224,10 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
     return cases
 
 
+# Most runs of a calibration: of 200 conditions and eight unknown inputs in two waves, or some 80 conditions in four.
+MOST_RUNS = 50_000
+# Verdicts on a calibration.
+CALIBRATED, NOT_CALIBRATED, UNDECIDABLE = "calibrated", "not calibrated", "cannot be judged by this design"
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
 # Rows of the posterior sample, and input sets of the prior.
@@ -195,6 +240,7 @@ class Calibration:
 
     ``case``: the scene with its unknown inputs; ``inputs``: the targets; ``screened``: inputs kept at their values.
     ``cells``: (row, output) of each measurement; ``nominal`` (c,): their logarithms at the scene's own inputs.
+    ``design``: what the design can judge.
     ``before`` and ``after`` (n, c): cells over the prior and the posterior. ``after`` and all that follows from it are None
     if no input set fits the measurements; ``without``: contraction by key without the outliers among the cells.
     """
@@ -209,6 +255,7 @@ class Calibration:
     before: Array
     runs: int
     notes: tuple[str, ...]
+    design: Design
     after: Array | None = None
     learnt: Learnt | None = None
     judgement: Judgement | None = None
@@ -217,12 +264,16 @@ class Calibration:
 
     @property
     def verdict(self) -> str:
-        """Either "calibrated" or "not calibrated"."""
-        return "not calibrated" if self.reasons else "calibrated"
+        """ "calibrated", "not calibrated", or that the design cannot judge it."""
+        return NOT_CALIBRATED if self._contradictions else UNDECIDABLE if self.design.doubt else CALIBRATED
 
     @property
     def reasons(self) -> list[str]:
-        """Sentences on why the inputs are not calibrated; none if they are."""
+        """Sentences on why the inputs are not calibrated, or not known to be; none if they are."""
+        return [*self._contradictions, *([self.design.doubt] if self.design.doubt else [])]
+
+    @property
+    def _contradictions(self) -> list[str]:
         cells = [self.cells[place] for place in self.match.refuted]
         cell_names = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
         return [
@@ -353,6 +404,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
         before=prior_cells,
         runs=rows.runs,
         notes=notes,
+        design=design_of(question),
     )
     return calibration if match.sampled is None else _with_judgement(calibration)
 
@@ -360,7 +412,8 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     """Cells (c,) at the scene's own inputs: logarithms, variances of one run, counted turns, numerical variances."""
     scenes = [
-        Scene.from_dict(case.data, case.source, [*case.uncertain.set, "numerics.companion=true"]) for case in rows.cases
+        Scene.from_dict(case.data, case.source, [*case.uncertain.assignments, "numerics.companion=true"])
+        for case in rows.cases
     ]
     labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
     results = rows.run(scenes, labels, "as the scene says")
@@ -397,7 +450,36 @@ def _measured(rows: _Rows, rig: Rig, variances: Array, turns: Array, numerical: 
         conditions,
         np.array([0.0 if scales == "none" else scales.get(name, np.nan) for name in rig.outputs]),
         np.array([row.hold for row, _ in cells]),
+        np.array([rig.accuracies[name] for name in rig.outputs]),
     )
+
+
+def design_of(question: Question) -> Design:
+    """What the table's conditions and outputs alone let a calibration claim, before anything runs."""
+    rig, seed = question.rig, question.case.scene.calibrate.seed
+    cells = [
+        (rig.conditions.index(row.keys), rig.outputs.index(name), row.hold) for row in rig.rows for name in row.values
+    ]
+    row, output, hold = np.array(cells).T
+    power = power_of(output, row, hold.astype(bool), seed)
+    if power.enough:
+        return Design(power, "")
+    outputs, needed = len(rig.outputs), _conditions_needed(len(rig.outputs), len(rig.conditions), seed)
+    shares = f"{100.0 * power.wide:.0f} % of such tables, twice too narrow in {100.0 * power.narrow:.0f} %"
+    return Design(
+        power,
+        f"{counted(power.cells, 'predicted value')} cannot judge intervals: twice too wide would show in {shares}, and "
+        f"{100.0 * OFTEN:.0f} % are needed; measure {counted(outputs, 'output')} at {needed} conditions",
+    )
+
+
+def _conditions_needed(outputs: int, fewest: int, seed: int) -> int:
+    """Number of conditions, ``fewest`` at least, that judge predictions where all outputs are measured at each."""
+    for conditions in range(fewest, MOST_CONDITIONS):
+        row = np.repeat(np.arange(conditions), outputs)
+        if power_of(np.tile(np.arange(outputs), conditions), row, np.zeros(row.size, bool), seed).enough:
+            return conditions
+    return MOST_CONDITIONS
 
 
 def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
@@ -469,9 +551,12 @@ def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
 
 def calibration_stages(question: Question) -> list[Stage]:
     """Stages of ``doe calibrate``; fewer waves may do. Raises InputError."""
-    case, targets = question.case, question.targets
-    conditions, work = len(cases_of(case, question.rig)), work_of_set(case)
-    screening_runs = _screening_runs(replace(case, every=targets))
+    return _stages(question.case, question.rig, question.targets, work_of_set(question.case))
+
+
+def _stages(case: Case, rig: Rig, targets: Sequence[Input], work: float) -> list[Stage]:
+    conditions = len(rig.conditions)
+    screening_runs = _screening_runs(replace(case, every=list(targets)))
     waves, sets = case.scene.calibrate.waves, sets_a_wave(min(len(targets), case.uncertain.inputs)) * conditions
     return [
         *([Stage.of("screening", screening_runs, work)] if screening_runs else []),
@@ -487,7 +572,7 @@ def pace(question: Question) -> Paces:
     """Pace of the runs by a probe at the first condition, of an input set as the scene says; none of a run that fails."""
     case = cases_of(question.case, question.rig)[0]
     try:
-        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.set))
+        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.assignments))
     except RunError:
         return Paces()
 

@@ -30,13 +30,14 @@ from rbdyn.base.faults import (
     read_toml,
     refuse,
     set_key,
+    validated,
 )
 from rbdyn.base.storage import digest_of
 from rbdyn.base.words import shown
 from rbdyn.result import read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
-from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
+from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put, value_of, with_values
 
 HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
@@ -143,7 +144,7 @@ class Case:
     def tables(self, overrides: Sequence[str] = ()) -> dict[str, Any]:
         """Tables of the scene of input sets, with these ``overrides``. Raises InputError."""
         tables = copy.deepcopy(self.data)
-        for override in (*self.uncertain.set, *overrides):
+        for override in (*self.uncertain.assignments, *overrides):
             set_key(tables, override, f"{self.home}: uncertain.set")
         return tables
 
@@ -227,7 +228,7 @@ def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list
 
 def run_notes(case: Case, overrides: Sequence[str], source: str, runs: str = "") -> list[str]:
     """A note on overrides by a ``source``, an option or a key, that uncertain.set replaces in the input sets, if any."""
-    declared = {key_path(override): override for override in case.uncertain.set}
+    declared = {key_path(override): override for override in case.uncertain.assignments}
     clashing = _clashing(case, overrides)
     if not clashing:
         return []
@@ -239,7 +240,7 @@ def run_notes(case: Case, overrides: Sequence[str], source: str, runs: str = "")
 
 def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
     """Overrides of numerics for which uncertain.set has another value."""
-    paths = {key_path(override): override for override in case.uncertain.set}
+    paths = {key_path(override): override for override in case.uncertain.assignments}
     values = {path: override for path, override in paths.items() if path[:1] == ("numerics",)}
     return [override for override in overrides if values.get(key_path(override), override) != override]
 
@@ -254,13 +255,16 @@ def case_of(
 ) -> Case:
     """Tables of a scene with its unknown inputs.
 
-    ``declared`` replaces the scene's own declarations; its paths start from the folder of the file that it is
-    ``stated_in``. ``fixed``: by key what else sets it, such as a factor. Raises InputError, also if no input is unknown.
+    ``declared`` counts before the scene's own declarations, key by key; its paths start from the folder of the file that it
+    is ``stated_in``. ``fixed``: by key what else sets it, such as a factor. Raises InputError, also if no input is unknown.
     """
     scene = rollers_only(Scene.from_dict(data, source))
-    uncertain = declared or scene.uncertain or Uncertain()
     home = stated_in if declared and stated_in else Path(source)
-    sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample, uncertain.laws)
+    uncertain = declared or scene.uncertain or Uncertain()
+    if declared and scene.uncertain:
+        uncertain = validated(Uncertain, declared.over(scene.uncertain), f"{home} over {source}: uncertain")
+    folder = (home if declared and declared.sample else Path(source)).parent
+    sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample, uncertain.laws)
     ordered = ((key, [column[place] for place in np.argsort(unknown.ranks(column))]) for key, column in sample.items())
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # Runs do not depend on declarations, and checking these again at every input set would be slow.
@@ -275,8 +279,10 @@ def case_of(
     inputs_without_set = inputs_of(case.ran, plain, uncertain, fixed, columns)
     by_set = [unknown_input.key for unknown_input in inputs_without_set if unknown_input.key not in keys]
     idle_keys = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
-    doubt = "" if uncertain.sample is None else _doubt(home.parent / uncertain.sample)
-    case = replace(case, every=inputs, doubt=doubt, remarks=tuple(_remarks(by_set, idle_keys)))
+    doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
+    constant = {*by_set, *fixed, *keys}
+    exact = [entry.key for entry in documented_of(case.ran) if not entry.on_request and entry.key not in constant]
+    case = replace(case, every=inputs, doubt=doubt, remarks=tuple(_remarks(len(keys), by_set, idle_keys, exact)))
     case.joint(inputs)
     refuse(impossible(case))
     return case
@@ -290,10 +296,12 @@ def _set_faults(uncertain: Uncertain, fixed: Mapping[str, str], sample: Iterable
     return assignment_faults("uncertain.set", uncertain.set, paths)
 
 
-def _remarks(by_set: Sequence[str], idle_keys: Sequence[str]) -> Iterator[str]:
-    """Remarks on keys that do not vary: those that ``set`` fixes, and estimates without effect in the scene."""
-    if by_set:
-        yield f"known by uncertain.set, so without their documented range: {', '.join(by_set)}"
+def _remarks(varying: int, by_set: Sequence[str], idle_keys: Sequence[str], exact: Sequence[str]) -> Iterator[str]:
+    """Remarks on keys that do not vary: stated ones, those that ``set`` fixes, and estimates without effect in the scene."""
+    reasons = {"known by uncertain.set": by_set, "stated as exact, or left out by uncertain.defaults": exact}
+    if by_set or exact:
+        others = "; ".join(f"{reason}: {', '.join(keys)}" for reason, keys in reasons.items() if keys)
+        yield f"{varying} of {varying + len(by_set) + len(exact)} inputs vary, the others count as exact ({others})"
     if idle_keys:
         yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle_keys)}"
 
@@ -491,4 +499,4 @@ def outputs_with_scatter(names: Sequence[str], results: Sequence[Simulated]) -> 
 
 def work_of_set(case: Case) -> float:
     """Shaft turns that the run of an input set takes at least."""
-    return work_of(Scene.from_dict(case.data, case.source, case.uncertain.set))
+    return work_of(Scene.from_dict(case.data, case.source, case.uncertain.assignments))

@@ -1,6 +1,7 @@
 """Measurements on a rig: a CSV table with a row for each operating condition, whose raw signals ``signals`` evaluates."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +19,14 @@ from rbdyn.base.words import counted
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
 PULSE_OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")
-OUTPUTS = (
-    "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", *PULSE_OUTPUTS,
-    *TEMPERATURES,
-)  # fmt: skip
-SD, TURNS, HOLD = "_sd", "turns", "hold"
+# Of each output the accuracy of its sensor in percent, where a table states none: a force sensor with its mounting, a torque
+# sensor, pulses of a wheel, eddy-current probes (API 670: 5 %), a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
+ACCURACIES = {
+    **dict.fromkeys(("impact_force_N", "impact_contact_force_N"), 10.0), "whirl_deviation_ratio": 5.0, "power_loss_W": 3.0,
+    "cage_speed_rpm": 0.1, **dict.fromkeys(PULSE_OUTPUTS, 10.0), **dict.fromkeys(TEMPERATURES, 1.5),
+}  # fmt: skip
+OUTPUTS = tuple(ACCURACIES)
+SD, ACCURACY, TURNS, HOLD = "_sd", "_accuracy_percent", "turns", "hold"
 FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
 ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviation_ratio"
 THRESHOLD, BANDWIDTH, DEAD_TIME, MASS = "threshold_N", "bandwidth_hz", "dead_time_ms", "sensor_mass_g"
@@ -39,9 +43,11 @@ PULSE_KEYS = "numerics.pulse_threshold_N", "numerics.pulse_bandwidth_hz", "numer
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Measured values in any unit in use; pulses per turn of the finest encoders.
 MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
-NOT_NEGATIVE = Limits(1e12, 1e-12, "not negative")
+NOT_NEGATIVE, PERCENT = Limits(1e12, 1e-12, "not negative"), Limits(100.0, 1e-6, "not negative")
 # Fewest training rows; most rows, whose joint covariance is quickly solved; most conditions, each with its own seeds.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
+# The row in a sentence on a cell, and words on a cell that no other column's value has replaced.
+ROW, ABSENT = re.compile(r" in row (\d+)"), re.compile(r": is missing;|comes from")
 
 
 @dataclass(frozen=True)
@@ -62,12 +68,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on its signals."""
+    """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on its signals.
+
+    ``accuracies``: by output, the standard deviation of an offset of all its rows, as a share."""
 
     path: Path
     rows: list[Row]
     keys: tuple[str, ...]
     outputs: tuple[str, ...]
+    accuracies: dict[str, float]
     notes: tuple[str, ...]
 
     @property
@@ -83,7 +92,9 @@ def read_rig(path: Path) -> Rig:
     if len(sheet.rows) > MOST_ROWS:
         raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
     cells, faults = _cells(sheet, keys)
+    accuracies, slips = _accuracies(cells, outputs)
     faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
+    faults = [*_shifted(sheet, faults), *slips]
     training = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
     if training < FEWEST:
         faults.append(f"{path}: only {counted(training, 'row')} not on hold; at least {FEWEST} are needed")
@@ -99,7 +110,7 @@ def read_rig(path: Path) -> Rig:
         notes += [note] if note else []
     refuse(faults)
     gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
-    rig = Rig(path, rows, keys, outputs, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))
+    rig = Rig(path, rows, keys, outputs, accuracies, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))
     if len(rig.conditions) > MOST_CONDITIONS:
         raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])
     return rig
@@ -142,7 +153,18 @@ def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
     kinds = sheet.column(KIND).texts if KIND in sheet else ()
     signals = [name for kind in kinds for name in GIVES.get(kind, ())]
     outputs = tuple(dict.fromkeys([*(name for name in names if name in OUTPUTS), *signals]))
-    columns = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
+    columns = {
+        *keys,
+        *outputs,
+        *(name + end for name in outputs for end in (SD, ACCURACY)),
+        TURNS,
+        HOLD,
+        FILE,
+        KIND,
+        PULSES,
+        CUTOFF,
+        STILL,
+    }
     columns |= {*SETTINGS, MASS}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
     faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in columns]
@@ -162,13 +184,15 @@ def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _unknown(name: str, outputs: Sequence[str]) -> str:
-    if name.endswith(SD):
-        return f"column {listed([name])}: no output {listed([name.removesuffix(SD)])} is measured here; add it or remove this"
+    for end in (SD, ACCURACY):
+        if name.endswith(end):
+            output = listed([name.removesuffix(end)])
+            return f"column {listed([name])}: no output {output} is measured here; add it or remove this"
     if name == "cage_slip":
         return "column cage_slip: may be nothing or less; give cage_speed_rpm, which means the same"
     return (
-        f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD}, "
-        f"{TURNS} nor {HOLD}; rename or remove it"
+        f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD} "
+        f"or {ACCURACY}, {TURNS} nor {HOLD}; rename or remove it"
     )
 
 
@@ -182,10 +206,37 @@ def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
         elif name in (HOLD, FILE, KIND, STILL):
             continue
         else:
-            limits = COUNTED if name == PULSES else NOT_NEGATIVE if name == DEAD_TIME else MEASURED
+            limits = {PULSES: COUNTED, DEAD_TIME: NOT_NEGATIVE}.get(
+                name, PERCENT if name.endswith(ACCURACY) else MEASURED
+            )
             numbers[name], slips = column.numbers(limits, UNKNOWN)
         faults += slips
     return _Cells(sheet.path, columns, numbers, values), faults
+
+
+def _accuracies(cells: _Cells, outputs: Sequence[str]) -> tuple[dict[str, float], list[str]]:
+    """Accuracies by output, and a sentence for each sensor with more than one."""
+    shares, faults = dict[str, float](), list[str]()
+    for name in outputs:
+        column = cells.numbers.get(name + ACCURACY, np.empty(0))
+        stated: list[int] = np.flatnonzero(~np.isnan(column)).tolist()
+        other = [place for place in stated if column[place] != column[stated[0]]]
+        if other:
+            words = f"is {column[stated[0]]:g} in row {stated[0] + 1}; a sensor has one accuracy in all rows"
+            faults.append(cells.fault(name + ACCURACY, other[0], words))
+        shares[name] = (float(column[stated[0]]) if stated else ACCURACIES[name]) / 100.0
+    return shares, faults
+
+
+def _shifted(sheet: Sheet, faults: list[str]) -> list[str]:
+    """The faults of cells, or a single sentence where most rows have values of other columns, as of shifted ones."""
+    rows = [(fault, found[1]) for fault in faults if (found := ROW.search(fault))]
+    alien = [(fault, row) for fault, row in rows if not ABSENT.search(fault)]
+    count = len({row for _, row in rows})
+    if len({row for _, row in alien}) < FEWEST or 2 * count <= len(sheet.rows):
+        return faults
+    words = f"{count} of {len(sheet.rows)} rows have cells that do not fit their columns, which may be shifted"
+    return [f"{alien[0][0]}; {words}"]
 
 
 def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
@@ -206,6 +257,9 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
                 name, place, "has no use in this row; leave it out, or add the measurement that it belongs to"
             )
     for name in measured:
+        value, sd = cells.number(name, place), cells.number(name + SD, place)
+        if value is not None and sd is not None and sd >= value:
+            yield cells.fault(name + SD, place, f"is not below the value itself, {value:g}; check the columns")
         if name in TEMPERATURES and not cells.states(name + SD, place):
             yield cells.fault(name + SD, place, "is missing; give the standard deviation of the thermometer [K]")
         elif not (cells.states(name + SD, place) or cells.states(TURNS, place)):

@@ -174,18 +174,6 @@ def beyond_runs(study: Study, coded: Array) -> bool:
     return bool(distance > design.extent * (1.0 + 1e-4))
 
 
-def check_augment(study: Study, folder: Path) -> None:
-    """Raises InputError if the table of stated runs is the one that the study writes into its folder."""
-    name = study.file.design.augment
-    if name is not None and study.path_of(name).resolve() == (folder / RUNS_TABLE).resolve():
-        raise InputError(
-            [
-                f"{study.path}: design.augment = {name!r}: the study writes its own runs to this file; copy it next to the "
-                "study and name the copy"
-            ]
-        )
-
-
 def check_runs(study: Study, design: Design) -> None:
     """Raises InputError with every response whose model needs more or other runs."""
     from doe.designs.model import lost_terms

@@ -23,7 +23,7 @@ from doe.study_file.sections import Front
 from doe.study_file.workbook import split_path
 from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
-from rbdyn.base.faults import InputError, read_toml
+from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.result import read_json, versions
 
@@ -129,8 +129,8 @@ def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:
 
 def _samples(study: Study) -> list[str]:
     """The posterior sample of unknown inputs that the study names, or else its scene."""
-    if study.file.uncertain is not None:
-        return list(filter(None, [study.file.uncertain.sample]))
+    if study.file.uncertain is not None and study.file.uncertain.sample is not None:
+        return [study.file.uncertain.sample]
     with suppress(InputError):
         declared = read_toml(study.path_of(study.scene.file)).get("uncertain")
         if isinstance(declared, dict) and isinstance(name := declared.get("sample"), str):
@@ -141,8 +141,8 @@ def _samples(study: Study) -> list[str]:
 def _content(path: Path) -> bytes:
     """Bytes of a file; empty for one that cannot be read, which the study refuses later."""
     try:
-        return split_path(path)[0].read_bytes()
-    except (OSError, ValueError):
+        return read_bytes(split_path(path)[0])
+    except InputError:
         return b""
 
 
@@ -267,12 +267,12 @@ def folder_of(path: Path, *usual: str) -> Path:
 
 
 def content_digest(path: Path) -> str:
-    """Digest of the content of a scene's file. Raises OSError."""
-    return digest_of(path.read_bytes())
+    """Digest of the content of a scene's file. Raises InputError."""
+    return digest_of(read_bytes(path))
 
 
 def runs_digest(path: Path, overrides: Sequence[str]) -> str:
-    """Digest of what decides the runs of a scene's file: its content, its overrides, and the code. Raises OSError."""
+    """Digest of what decides the runs of a scene's file: its content, its overrides, and the code. Raises InputError."""
     return digest_of("\n".join([content_digest(path), *overrides, code_version(clearance.SIMULATION)]))
 
 
@@ -368,8 +368,8 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
         if begun and content.alive and stage.since is not None:
             at_once = _at_once(stage.since, content, now) or at_once
             seconds -= sum(min(_for_s(run, now), pace * work / len(content.running)) for run in content.running)
-            overdue_s = OVERDUE * (now - stage.since) if stage.besides_s else 0.0
-            besides_s = max(stage.besides_s - (now - stage.since), overdue_s)
+            spent_s = max(now - stage.since, 0.0)  # the clock may have gone back
+            besides_s = max(stage.besides_s - spent_s, OVERDUE * spent_s if stage.besides_s else 0.0)
         else:
             besides_s = stage.besides_s
         left_s += max(seconds, 0.0) / at_once + besides_s

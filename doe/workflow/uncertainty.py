@@ -4,7 +4,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from doe.clearance import TEMPERATURES, Simulations, quantity_of, work_of
+import numpy as np
+
+from doe.clearance import TEMPERATURES, Simulations, quantity_of, responses_of, work_of
 from doe.running.runner import ANSWER, ANSWER_S, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -33,7 +35,7 @@ from doe.workflow.input_sets import (
     work_of_set,
 )
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RunError
+from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
@@ -46,6 +48,8 @@ FRESH, MOST = 8192, 512
 TARGET = 0.1
 # Share of noise in an output's variance beyond which all runs get more replicates, and the largest factor on these.
 NOISY, MOST_EFFORT = 0.1, 4
+# Range of an output that does not vary, as a share of it.
+STILL = 1e-9
 # Share of the variance that an emulator explains; a smaller one has a note.
 WHOLE = 0.9
 
@@ -91,23 +95,33 @@ class Uncertainty:
 
 @one_thread
 def find_uncertainty(
-    path: Path, overrides: Sequence[str], simulations: Simulations, points: int | None = None, target: float = TARGET
+    path: Path,
+    overrides: Sequence[str],
+    simulations: Simulations,
+    points: int | None = None,
+    target: float = TARGET,
+    figures: Sequence[str] = (),
 ) -> Uncertainty:
     """Range of each output of a scene over its unknown inputs, and the share of each input.
 
     ``points``: input sets to begin with, a power of two; by default those of the scene. They double, up to 512, until the
     standard errors of the ends of every range are below ``target`` of its width. If noise is more than a tenth of an
-    output's variance, all sets get more replicates. Raises InputError, RunError, KeyboardInterrupt.
+    output's variance, all sets get more replicates. ``figures``: further outputs. Raises InputError, RunError, KeyboardInterrupt.
     """
-    case = _case_of(path, overrides)
+    case = _case_of(path, overrides, figures)
     count = case.uncertain.points if points is None else points
     (nominal,) = simulations.run([case.scene], ["as the scene says"], simulations.progress("as the scene says"))
     if isinstance(nominal, Failure):
         raise RunError(f"{path}: as the scene says: {nominal.cause}")
+    refuse(
+        f"--figure {name}: {path} does not give it; leave it out"
+        for name in case.outputs
+        if not quantity_of(nominal.as_dict(), name)
+    )
     seed, joint, effort = case.uncertain.seed, case.joint(case.every), 1
-    fresh_sets = joint.sets(FRESH, seed + 1)
+    fresh_sets, idle = joint.sets(FRESH, seed + 1), dict[str, float]()
     while True:
-        sets = replicated_sets(case, joint.sets(count, seed), simulations, effort)
+        case, sets = _varying(case, replicated_sets(case, joint.sets(count, seed), simulations, effort), idle)
         fitted = [_emulated(case, sets, nominal, place) for place in range(len(case.outputs))]
         spreads = [spread_of(runs, emulator, fresh_sets, seed) for runs, emulator in fitted]
         if effort < MOST_EFFORT and any(spread.variance["simulation"] > NOISY for spread in spreads):
@@ -123,7 +137,7 @@ def find_uncertainty(
     covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
     outside_shares = shares_outside(case, covered_places, sets.quantiles, sets.signals)
     notes = _notes(
-        [*case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
+        [*_idle_notes(idle), *case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
         sets,
         outputs,
         count,
@@ -132,10 +146,35 @@ def find_uncertainty(
     return Uncertainty(path, case.every, outside_shares, outputs, sets, seed, notes)
 
 
-def _case_of(path: Path, overrides: Sequence[str]) -> Case:
-    """The scene with its unknown inputs and outputs. Raises InputError."""
+def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) -> Case:
+    """The scene with its unknown inputs and outputs, ``figures`` among them. Raises InputError."""
     case = read_case(path, OUTPUTS, overrides)
-    return case if case.scene.thermal is None else replace(case, outputs=(*OUTPUTS, *TEMPERATURES))
+    names = responses_of(case.scene.thermal is not None)
+    refuse(
+        f"--figure {one_line(name, LONGEST_NAME)}: no figure of this scene; choose one of {', '.join(names)}"
+        for name in figures
+        if name not in names
+    )
+    heat = () if case.scene.thermal is None else tuple(TEMPERATURES)
+    return replace(case, outputs=tuple(dict.fromkeys((*OUTPUTS, *heat, *figures))))
+
+
+def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets]:
+    """The case and its sets with the outputs that vary; those that are one number in all sets are put into ``idle``."""
+    spread = np.ptp(sets.outputs, axis=0)
+    varies = spread > STILL * np.abs(sets.outputs).max(axis=0)
+    idle |= {name: float(sets.outputs[0, place]) for place, name in enumerate(case.outputs) if not varies[place]}
+    names = tuple(name for name, varying in zip(case.outputs, varies, strict=True) if varying)
+    kept = replace(
+        sets, outputs=sets.outputs[:, varies], variances=sets.variances[:, varies], freedom=sets.freedom[:, varies]
+    )
+    return replace(case, outputs=names), kept
+
+
+def _idle_notes(idle: Mapping[str, float]) -> list[str]:
+    return [
+        f"{name}: is {value:.5g} in every input set, for no unknown input changes it" for name, value in idle.items()
+    ]
 
 
 def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:

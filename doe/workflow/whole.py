@@ -45,17 +45,7 @@ from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
-from doe.workflow.runs import (
-    STORE,
-    Runs,
-    augment_notes,
-    check_augment,
-    check_runs,
-    design_of,
-    ordered_runs,
-    region_of,
-    run_design,
-)
+from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
@@ -350,7 +340,6 @@ def run_study(
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
-    check_augment(study, folder)
     if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)

@@ -1,9 +1,10 @@
 """Long commands are killed at random moments, started again, and must end as if nothing had happened.
 
 ``python examples/benchmarks/interruptions.py --kills 10 --seed 1 --jobs 2`` disturbs ``rbdyn map``, ``doe uncertainty``,
-``doe calibrate`` and ``doe study --robust`` on the example bearing, each about half a minute long. Of every ten kills about
-six are SIGKILL, two SIGINT (Ctrl-C) and two SIGTERM. With most runs done, every second one waits for a random result file
-to be written, so that it meets the end of a command.
+``doe calibrate``, ``doe study --robust`` and ``doe study`` over a duty on the example bearing, each about half a minute long. Of
+every ten kills about six are SIGKILL, two SIGTERM and two SIGINT (Ctrl-C), which comes one to three times, 30 to 120 ms apart;
+``--signals INT`` draws that alone. With most runs done, every second one waits for a random result file to be written, so that
+it meets the end of a command.
 
 A command passes if, after all its kills, every CSV and JSON file equals that of an undisturbed run but for times; if no
 run that had ended is made again (its row in the store keeps its dates, its line in a map's file its place); if exactly the
@@ -31,14 +32,16 @@ from typing import Any
 
 from doe.running.store import Store
 from doe.workflow.runs import STORE
-from rbdyn.dynamics.slip_map import POINTS
+from rbdyn.cli.app import MAP_POINTS as POINTS
 
 EXAMPLES = Path(__file__).resolve().parents[1]
 SHORT = (
     "numerics.turns=4", "numerics.discard_turns=2", "numerics.impact_window_turns=2", "numerics.replicates=2",
     "numerics.extend=false", "numerics.companion=false",
 )  # fmt: skip
-SIGNALS = (signal.SIGKILL,) * 6 + (signal.SIGINT,) * 2 + (signal.SIGTERM,) * 2
+SIGNALS = "KILL,KILL,KILL,INT,TERM"
+# Times and distances [s] of repeated Ctrl-C, and when a command that does not end after it counts as hanging [s].
+TIMES, APART_S, HANGS_S = (1, 2, 3), (0.03, 0.12), 60.0
 # Where so large a share of the runs is done, so large a share of the kills waits for a result file.
 MOST_DONE, AT_FILES = 0.6, 0.5
 # How often a folder is looked at for such a file [s].
@@ -50,6 +53,16 @@ points = 16
 set = {json.dumps(SHORT)}
 "model.pocket_bar_stiffness_N_m" = {{ law = "log_uniform", low = 1e7, high = 2e8 }}
 "lubricant.oil_fraction" = {{ law = "log_uniform", low = 0.005, high = 0.1 }}
+"""
+DUTY = """
+[[duty]]
+name = "cruise"
+share = 0.8
+set = []
+[[duty]]
+name = "take-off"
+share = 0.2
+set = ["operation.radial_load_N=2000"]
 """
 RIG = """operation.inner_speed_rpm,impact_force_N,impact_force_N_sd,power_loss_W,power_loss_W_sd
 12000,40,4,40,4
@@ -69,6 +82,7 @@ def inputs(folder: Path) -> None:
     study = (EXAMPLES / "clearance_study.toml").read_text("utf-8").replace("replicates = 16", "replicates = 2")
     study = re.sub(r"(?m)^set = .*numerics\.turns=40.*$", f"set = {json.dumps(SHORT)}", study)
     study = study.replace("generations = 200", "generations = 20")
+    (folder / "duty_study.toml").write_text(study + DUTY, "utf-8")
     robust = '[robust]\npoints = 32\nsettle = 0.0\nfront = "none"\n'
     (folder / "study.toml").write_text(study + UNCERTAIN + robust, "utf-8")
 
@@ -82,6 +96,7 @@ def commands(folder: Path) -> dict[str, list[str]]:
         "doe uncertainty": ["doe", "uncertainty", str(folder / "uncertain.toml"), "--points", "128", *short],
         "doe calibrate": ["doe", "calibrate", str(folder / "rig_scene.toml"), "--data", str(folder / "rig.csv")],
         "doe study --robust": ["doe", "study", str(folder / "study.toml"), "--robust"],
+        "doe study, duty": ["doe", "study", str(folder / "duty_study.toml")],
     }
 
 
@@ -116,15 +131,17 @@ def written(path: Path) -> int:
 
 
 def without_times(record: dict[str, Any]) -> dict[str, Any]:
-    """A JSON record without the seconds of its cost."""
+    """A JSON record without the seconds of its cost, and without the digest of the record as a whole."""
     cost = {key: value for key, value in record.get("cost", {}).items() if not key.endswith("_s")}
-    return record | {"cost": cost}
+    return {key: value for key, value in record.items() if key != "sha256"} | {"cost": cost}
 
 
 def results(out: Path) -> dict[str, Any]:
     """Content of all CSV and JSON files by name, without times."""
     tables = {path.name: path.read_text("utf-8") for path in out.glob("*.csv")}
     records = {path.name: without_times(json.loads(path.read_text("utf-8"))) for path in out.glob("*.json")}
+    # Digests of files that state times.
+    records["made_by.json"]["files"] = sorted(records["made_by.json"]["files"])
     return tables | records
 
 
@@ -138,6 +155,7 @@ class Disturbed:
     workers: int
     kills: int
     draw: random.Random
+    signals: list[signal.Signals]
     lines: list[str] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
 
@@ -179,12 +197,21 @@ class Disturbed:
 
     def kill(self, number: int, out: Path) -> bool:
         """Start or go on in ``out`` and kill; returns whether the command ended before that."""
-        before, chosen = ended_runs(out), self.draw.choice(SIGNALS)
+        before, chosen = ended_runs(out), self.draw.choice(self.signals)
         process = started(self.command, out, self.workers)
         when = self.moment(process, out, len(before))
         missed = process.poll() is not None
         process.send_signal(chosen)
-        _, errors = process.communicate()
+        for _ in range(self.draw.choice(TIMES) - 1 if chosen is signal.SIGINT else 0):
+            time.sleep(self.draw.uniform(*APART_S))
+            process.send_signal(chosen)
+        try:
+            _, errors = process.communicate(timeout=HANGS_S)
+        except subprocess.TimeoutExpired:
+            self.judge(False, f"hangs after {chosen.name} {when}")
+            process.kill()
+            _, errors = process.communicate()
+        self.judge("cannot be used" not in errors, f"a store is blamed after {chosen.name}: {errors[-300:]}")
         code, after = process.returncode, ended_runs(out)
         allowed = {0} if missed else {0, 130 if chosen is signal.SIGINT else -chosen}
         self.judge(code in allowed, f"exit code {code} after {chosen.name}: {errors[-300:]}")
@@ -239,6 +266,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of signals and moments (1)")
     parser.add_argument("--jobs", type=int, default=1, help="commands that are disturbed at once (1)")
     parser.add_argument("--workers", type=int, default=2, help="threads of a command (2)")
+    parser.add_argument("--signals", default=SIGNALS, help=f"signals to draw from ({SIGNALS})")
     parser.add_argument("--only", default="", help="words of the commands to disturb, such as map,calibrate (all)")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -252,6 +280,7 @@ def main() -> None:
                 asked.workers,
                 asked.kills,
                 random.Random(f"{asked.seed} {name}"),
+                [signal.Signals[f"SIG{word}"] for word in asked.signals.split(",")],
             )
             for name, line in chosen_commands(folder, asked.only)
         ]

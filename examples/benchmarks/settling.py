@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""How long runs get, and how often their statistical errors hold the truth: seven scenes, many repeats from one pool of runs.
+"""How long runs get, and how often their statistical errors hold the truth: nine scenes, many repeats from one pool of runs.
 
-    python examples/benchmarks/settling.py [SCENE ...] [--replicates 96] [--repeats 200]
+    python examples/benchmarks/settling.py [SCENE ...] [--replicates 96] [--repeats 200] [--team 4]
 
-Of every scene many long replicates are made once. A repeat draws eight of them and goes through the very code of a
-simulation: where counting starts, relaxation, drift, lengthening, errors. The truth is the later half of all replicates, at
-the same tolerance, so that the statistical error alone is judged. "In vain" are runs that a settled scene lengthens: repeats
-that begin in the later half of long replicates.
+Of every scene many long replicates are made once, half of them in each group of starts. A repeat draws as many as a run has (the
+fewest of any example unless told) from both groups in turn, and goes through the very code of a simulation: where counting
+starts, settling, lengthening, errors. The truth is the later half of all replicates, at the same tolerance, so that the
+statistical error alone is judged. "In vain" are runs that a settled scene lengthens: repeats that begin in the later half of
+long replicates. "None" are repeats that have not settled at their limit and state no interval.
 """
 
 import argparse
@@ -34,7 +35,9 @@ from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "cylindrical_roller.toml"
 FIGURES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
-TEAM, TURNS, DISCARD, SEED = 8, 40.0, 20.0, 1
+TEAM, TURNS, DISCARD, SEED = 4, 40.0, 20.0, 1
+# Kinds of starts of replicates, in turn: two of each group.
+KINDS = 4
 # Length over that asked for, beyond which a run was lengthened.
 LONGER = 1.01
 
@@ -57,6 +60,12 @@ SCENES: dict[str, tuple[tuple[str, ...], tuple[str, ...], int]] = {
     "roller-guided": ((), ("cage.guidance=roller",), 4),
     "2000 rpm, 4 kN": ((), ("operation.inner_speed_rpm=2000", "operation.radial_load_N=4000"), 4),
     "NU206": (("NU206", "--speed", "9000", "--load", "1500", "--oil", "ISO VG 32"), (), 4),
+    "own": (
+        ("own", "--rollers", "12", "--roller", "8x8", "--pitch", "60", "--speed", "20000", "--load", "1000"),
+        (),
+        8,
+    ),
+    "N308, cold": (("N308", "--load", "200", "--oil", "ISO VG 100", "--temperature", "5"), (), 8),
 }
 
 
@@ -78,7 +87,7 @@ class Pooled:
         return replace(run, first=batches.first, energy=run.energy[ends], **arrays)
 
 
-def scene_of(name: str) -> tuple[Scene, int]:
+def scene_of(name: str, team: int = TEAM) -> tuple[Scene, int]:
     """A scene as it is repeated, and how many times as long its replicates are."""
     words, keys, length = SCENES[name]
     with tempfile.TemporaryDirectory() as folder:
@@ -95,7 +104,7 @@ def scene_of(name: str) -> tuple[Scene, int]:
         scene,
         turns=TURNS,
         discard_turns=DISCARD,
-        replicates=TEAM,
+        replicates=team,
         companion=False,
         extend=True,
         extend_limit=float(length),
@@ -127,14 +136,20 @@ def repeat(scene: Scene, team: Sequence[Replicate], skip: int = 0) -> tuple[floa
     return float(ensemble.runs[0].durations.sum()) / scene.turn_s / (TURNS + DISCARD), figures
 
 
-def row(name: str, replicates: int, repeats: int, workers: int | None) -> tuple[str, list[float]]:
+def team_of(pool: Sequence[Replicate], size: int, random: np.random.Generator) -> list[Replicate]:
+    """Replicates of a repeat: as in a run, every kind of start in turn."""
+    kinds = [random.permutation(np.arange(kind, len(pool), KINDS)) for kind in range(KINDS)]
+    return [pool[kinds[place % KINDS][place // KINDS]] for place in range(size)]
+
+
+def row(name: str, replicates: int, repeats: int, team: int, workers: int | None) -> tuple[str, list[float]]:
     """A scene's row of the table, and the shares that hold the truth."""
     started = time.perf_counter()
-    scene, length = scene_of(name)
+    scene, length = scene_of(name, team)
     pool, random = pool_of(scene, length, replicates, workers), np.random.default_rng(SEED)
     middle = len(pool[0].durations) // 2
     truth = quantities(scene, [run.counted_from(middle) for run in pool], [], 1.0)
-    teams = [[pool[place] for place in random.choice(replicates, TEAM, replace=False)] for _ in range(repeats)]
+    teams = [team_of(pool, team, random) for _ in range(repeats)]
     lengths, figures = zip(*(repeat(scene, team) for team in teams), strict=True)
     # As long as the later half allows.
     settled = with_numerics(scene, extend_limit=0.5 * length)
@@ -142,17 +157,20 @@ def row(name: str, replicates: int, repeats: int, workers: int | None) -> tuple[
     cells, shares = [], []
     for figure in FIGURES:
         exact, doubt = truth[figure].value, truth[figure].statistical_error or 0.0
-        errors = [each[figure].statistical_error or 0.0 for each in figures]
-        held = [
-            abs(each[figure].value - exact) <= math.hypot(error, doubt)
-            for each, error in zip(figures, errors, strict=True)
+        stated = [
+            (each[figure].value, error) for each in figures if (error := each[figure].statistical_error) is not None
         ]
+        errors = [error for _, error in stated]
+        held = [abs(value - exact) <= math.hypot(error, doubt) for value, error in stated]
         shares.append(float(np.mean(held)))
         cells.append(f"{shares[-1]:.2f} ({100.0 * float(np.mean(errors)) / abs(exact):.2g} %)")
-    longer = float(np.mean(np.array(lengths) > LONGER))
+    longer, none = float(np.mean(np.array(lengths) > LONGER)), 1.0 - len(stated) / repeats
     spent = f"{len(pool)} x {length * (TURNS + DISCARD):g}, {time.perf_counter() - started:.0f} s"
     in_vain = f"{float(np.mean(vain)):.3f}" if vain else ""
-    return f"| {name} | {' | '.join(cells)} | {np.mean(lengths):.2f} | {longer:.2f} | {in_vain} | {spent} |", shares
+    return (
+        f"| {name} | {' | '.join(cells)} | {np.mean(lengths):.2f} | {longer:.2f} | {in_vain} | {none:.2f} | {spent} |",
+        shares,
+    )
 
 
 def main() -> None:
@@ -161,18 +179,21 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"of {', '.join(SCENES)}; all unless named")
     parser.add_argument("--replicates", type=int, default=96)
     parser.add_argument("--repeats", type=int, default=200)
+    parser.add_argument(
+        "--team", type=int, default=TEAM, help="replicates of a repeat (4, as examples/duty_study.toml)"
+    )
     parser.add_argument("--workers", type=int)
     asked = parser.parse_args()
     if alien := [name for name in asked.scenes if name not in SCENES]:
         parser.error(f"{', '.join(alien)}: no such scene")
     print(
-        f"{TEAM} replicates of {TURNS:g} turns after {DISCARD:g}; {asked.repeats} repeats; share that holds the truth (mean half-width)"
+        f"{asked.team} replicates of {TURNS:g} turns after {DISCARD:g}; {asked.repeats} repeats; share that holds the truth (mean half-width)"
     )
-    print("\n| scene | impact | whirl | loss | cage speed | length | lengthened | in vain | pool |")
-    print("|---|---|---|---|---|---|---|---|---|", flush=True)
+    print("\n| scene | impact | whirl | loss | cage speed | length | lengthened | in vain | none | pool |")
+    print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     shares: list[float] = []
     for name in asked.scenes or SCENES:
-        text, found = row(name, asked.replicates, asked.repeats, asked.workers)
+        text, found = row(name, asked.replicates, asked.repeats, asked.team, asked.workers)
         shares += found
         print(text, flush=True)
     print(f"\npooled {np.mean(shares):.3f}, lowest {min(shares):.2f}")

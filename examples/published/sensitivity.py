@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from published.chen_2022 import Theirs, level_ratio, ours, theirs
 from published.common import PLAIN, RESPONSES, Check, Effort, Table, canvas, save
-from published.table4 import Theirs, level_ratio, ours, theirs
 from rbdyn.base.words import with_error
 
 # What is changed, to what, and where the range comes from.

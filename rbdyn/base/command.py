@@ -13,27 +13,26 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from rbdyn.base.blocks import Table
-from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.storage import digest_of
-from rbdyn.base.streams import FAILED
+from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
-from rbdyn.result import read_json, write_json
 
 # Exit code of a command whose input is at fault.
 BAD_INPUT = 2
-# File that names the command and the input of a folder of results.
-MARK = "made_by.json"
+# Whole numbers that numba and matplotlib read of the environment, with their ends.
+VARIABLES = {"NUMBA_NUM_THREADS": (1, 10_000), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
 
 
 @contextmanager
 def guarded(as_json: bool) -> Iterator[None]:
     """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
     try:
+        refuse(_environment_faults())
         yield
     except InputError as error:
         _leave(as_json, BAD_INPUT, error.faults)
@@ -46,6 +45,15 @@ def guarded(as_json: bool) -> Iterator[None]:
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
+
+
+def _environment_faults() -> Iterator[str]:
+    """Sentences on variables of the environment that end a library in the middle of a command."""
+    for name, (least, most) in VARIABLES.items():
+        value = os.environ.get(name, "").strip() or str(least)
+        if not (value.isdecimal() and value.isascii() and least <= int(value[:LONGEST_NAME]) <= most):
+            shown = one_line(value, LONGEST_NAME)
+            yield f"environment variable {name} = {shown}: must be a whole number from {least} to {most}; unset it"
 
 
 def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
@@ -90,35 +98,6 @@ def checkpoint_message(path: Path | None) -> Iterator[None]:
         raise KeyboardInterrupt(f"finished parts are saved in {path}; start the command again to resume") from None
 
 
-def output_folder(path: Path, command: str, source: Path) -> Path:
-    """Make the folder that ``--out`` names for the results of ``command`` on the file ``source``.
-
-    A folder belongs to one command and one file, which its ``made_by.json`` names. Results of the same file (the same place or
-    the same content) are overwritten. A folder of another file is refused. All commands of ``doe`` count as one, because they
-    share the store of a study. Raises InputError.
-    """
-    mark, source = path / MARK, source.resolve()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        digest = digest_of(source.read_bytes())
-        # Relative to the folder, so that folder and file can move together.
-        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        owner = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if owner["command"] != command or (own["file"] != owner["file"] and digest != owner["sha256"]):
-            raise InputError(
-                [
-                    f"--out {path}: holds results of {owner['command']} from {os.path.normpath(path / owner['file'])}; "
-                    "name another folder or remove this one"
-                ]
-            )
-        write_json(mark, own)
-    except OSError as error:
-        raise InputError([f"--out {path}: cannot be written to ({error.strerror}); name another folder"]) from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
-    return path
-
-
 @contextmanager
 def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
     """Show progress on a terminal, nothing elsewhere; yields ``progress(count, total)``.
@@ -145,7 +124,12 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
         bar.update(task, completed=count, total=total)
 
     with Progress(
-        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeLeft(),
+        console=Console(file=styled(sys.stderr)),
+        transient=True,
     ) as bar:
         task = bar.add_task(title, total=None)
         yield progress
@@ -153,7 +137,7 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
     """Function that prints a note to standard error at once; None for a quiet command."""
-    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
+    return None if quiet else lambda sentence: print(f"note: {escaped(sentence)}", file=sys.stderr, flush=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -162,8 +146,8 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 def flag(*names: str, says: str, **more: Any) -> Any:
-    """An option without a value; help shows no type for it."""
-    return typer.Option(*names, metavar="", help=says, **more)
+    """An option without a value."""
+    return typer.Option(*names, help=says, **more)
 
 
 def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
@@ -171,10 +155,45 @@ def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> A
     return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
 
 
+def _without_types(params: list[Any]) -> list[Any]:
+    """The parameters of a command; help shows no type for an option without a value."""
+    for param in params:
+        if getattr(param, "is_flag", False) and param.metavar is None:
+            param.metavar = ""
+    return params
+
+
+class Command(TyperCommand):
+    """A command."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
+class Group(TyperGroup):
+    """All commands of a program."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options of the program itself, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
+class Program(typer.Typer):
+    """A program of several commands."""
+
+    def __init__(self) -> None:
+        super().__init__(cls=Group, no_args_is_help=True, pretty_exceptions_enable=False)
+
+    def command(self, name: str | None = None, *, cls: type[TyperCommand] | None = Command, **options: Any) -> Any:
+        """Take up a function as a command."""
+        return super().command(name, cls=cls, **options)
+
+
 def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
     """A class of command, for ``cls``, that refuses ``former`` options and names the replacement of each."""
 
-    class Refusing(TyperCommand):
+    class Refusing(Command):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             """Refuse former options before any other."""
             option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
@@ -214,6 +233,7 @@ Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.r
 Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
 Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
+Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
@@ -245,15 +265,46 @@ def _fill_line(line: str, values: Mapping[str, Any]) -> str:
 DECIMAL_COMMA = re.compile(r"(\d),(\d)")
 
 
-def plain_number(text: str) -> float:
-    """A number that is typed. Raises MethodError for a decimal comma and for what is no number."""
+TYPED = re.compile(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*([^\d\s.,](?:[^\d]*[^\d\s])?)\s*")
+# Units that are typed in place of another, and their factor to it.
+FACTORS = {
+    ("kN", "N"): 1e3,
+    ("m", "mm"): 1e3,
+    ("cm", "mm"): 10.0,
+    ("um", "mm"): 1e-3,
+    ("\u00b5m", "mm"): 1e-3,
+    ("krpm", "rpm"): 1e3,
+}
+
+
+def plain_number(text: str, unit: str = "", fault: Callable[[float], str | None] = lambda value: None) -> float:
+    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit and for what is no number.
+
+    ``fault``: that of a value; a value that has one is not advised.
+    """
     try:
         return float(text)
     except ValueError:
-        raise MethodError(comma_fault(text) or "is no number; write a plain number") from None
+        pass
+    comma, typed = comma_fault(text, float), TYPED.fullmatch(text)
+    factor = 1.0 if typed and typed[2] in (unit, f"\u00b0{unit}") else typed and FACTORS.get((typed[2], unit))
+    if comma:
+        value, advice = float(text.replace(",", ".")), comma
+    elif typed and factor:
+        value = factor * float(typed[1].replace(",", "."))
+        advice = f"has a unit; write {value:.10g}"
+    else:
+        raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}")
+    raise MethodError(fault(value) or advice)
 
 
-def comma_fault(text: str) -> str:
-    """What to write in place of a decimal comma; empty where there is none."""
+def comma_fault(text: str, reader: Callable[[str], Any]) -> str:
+    """What to write in place of a decimal comma; empty where there is none, or where ``reader`` does not take the rest."""
     with_point = DECIMAL_COMMA.sub(r"\1.\2", text.strip())
-    return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}" if with_point != text.strip() else ""
+    if with_point == text.strip():
+        return ""
+    try:
+        reader(with_point)
+    except (MethodError, ValueError):
+        return ""
+    return f"has a decimal comma; write {one_line(with_point, LONGEST_NAME)}"

@@ -7,8 +7,11 @@ First the number types and base classes of input tables, whose keys carry units;
 import difflib
 import math
 import re
+import stat
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from datetime import date, time
 from itertools import pairwise
 from os import PathLike
@@ -200,11 +203,46 @@ def path_of(argument: Any) -> Path:
     raise InputError([f"path = {one_line(repr(argument), LONGEST_NAME)}: must be the path of a file; check the call"])
 
 
+# Device and number of each file that a command has read; content of the pipes among them, which can be read only once.
+_reads: ContextVar[set[tuple[int, int]] | None] = ContextVar("reads", default=None)
+_pipes: dict[tuple[int, int], bytes] = {}
+
+
+@contextmanager
+def recorded_reads() -> Iterator[None]:
+    """Record all files that are read inside."""
+    token = _reads.set(set(files_read()))
+    try:
+        yield
+    finally:
+        _reads.reset(token)
+
+
+def files_read() -> set[tuple[int, int]]:
+    """Device and number of each file that was read since ``recorded_reads`` began."""
+    reads = _reads.get()
+    return set() if reads is None else reads
+
+
+def record_read(path: Path) -> None:
+    """Record a file as read before it is; one that is missing is left out."""
+    with suppress(OSError, ValueError):
+        status = path.stat()
+        files_read().add((status.st_dev, status.st_ino))
+
+
 def read_bytes(path: Path) -> bytes:
     """Bytes of a file. Raises InputError where it cannot be read or is too large."""
     try:
+        status = path.stat()
+        place = status.st_dev, status.st_ino
+        files_read().add(place)
+        if place in _pipes:
+            return _pipes[place]
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
+        if stat.S_ISFIFO(status.st_mode):
+            _pipes[place] = data
     except FileNotFoundError:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except (OSError, ValueError) as error:
@@ -279,6 +317,7 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
         return model.model_validate(data)
     except ValidationError as error:
         errors: Sequence[Any] = error.errors(include_url=False)
+    refuse(_other_kind(model, data, source))
     faults = _sentences(model, errors, data, source)
     # A table with a bad key is not checked as a whole; without that key it may show more faults.
     bad = {fault["loc"] for fault in errors}
@@ -296,10 +335,28 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     raise InputError(dict.fromkeys(faults))
 
 
+# A key that only files of one kind have, with the kind and what reads it.
+KINDS = {
+    "bearing": ("scene", "rbdyn simulate, rbdyn ball or doe new"),
+    "factor": ("study", "doe study"),
+    "closing_link": ("dimension chain", "doe chain"),
+    "chain": ("file of dimension chains", "doe chain"),
+}
+
+
+def _other_kind(model: type[BaseModel], data: Any, source: str) -> list[str]:
+    """The fault of a file of another kind, each key of which would be a fault of its own."""
+    own, other = (next((key for key in KINDS if key in keys), None) for keys in (model.model_fields, data))
+    if own is None or other is None or own in data:
+        return []
+    kind, readers = KINDS[other]
+    return [f"{source}: this is a {kind}, not a {KINDS[own][0]}; give it to {readers}"]
+
+
 def _states_absence(fault: str, name: str) -> bool:
     """Whether a sentence on a table says that a key of that ``name`` is missing."""
     return name in fault and (
-        ": missing; " in fault or re.search(rf"(needs|without) [\w.]*{re.escape(name)}\b", fault) is not None
+        ": missing; " in fault or re.search(rf"(needs|without) [^:;]*\b{re.escape(name)}\b", fault) is not None
     )
 
 

@@ -5,12 +5,14 @@ the first screen, ``identity_table`` its table for a page.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from rbdyn.base.blocks import Detail, Paragraph, Table
+from rbdyn.base.faults import InputError, read_bytes
 from rbdyn.base.records import Record
 from rbdyn.base.storage import digest_of
 from rbdyn.base.words import quantity
@@ -192,9 +194,7 @@ def _hashes(files: Iterable[Path]) -> dict[str, str]:
     """The shortened hash of each file by its name, or by its path where two have one name."""
     hashes: dict[str, str] = {}
     for path in dict.fromkeys(files):
-        try:
-            content = path.read_bytes()
-        except (OSError, ValueError):
-            continue
-        hashes[str(path) if path.name in hashes else path.name] = digest_of(content)[:DIGITS]
+        with suppress(InputError):
+            digits = digest_of(read_bytes(path))[:DIGITS]
+            hashes[str(path) if path.name in hashes else path.name] = digits
     return hashes

@@ -12,31 +12,46 @@ from pathlib import Path
 
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Figures, Section, Table
+from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import Identity, identity_table
 from rbdyn.base.vector import vector_copies
 from rbdyn.base.words import filled_page
 from rbdyn.base.workbook import NAME, write_workbook
 
 REPORT = "report.html"
+# Files that ``with_report`` adds to those of a command.
+REPORT_FILES = (REPORT, NAME)
 # Rows from which a table is folded.
 LONG = 40
 
 
 def write_with_report(
+    folder: OutputFolder,
+    identity: Identity,
+    blocks: Callable[[], Sequence[Block]],
+    write: Callable[[Path], Sequence[str]],
+) -> list[str]:
+    """Write ``with_report`` into the folder of a command; names of the files, none without a folder. Raises OSError."""
+    if folder.path is None:
+        return []
+    return folder.write(lambda stage: with_report(stage, identity, blocks, write))
+
+
+def with_report(
     folder: Path,
     identity: Identity,
     blocks: Callable[[], Sequence[Block]],
-    write: Callable[[], Sequence[str]],
+    write: Callable[[Path], Sequence[str]],
     prefix: str = "",
 ) -> list[str]:
-    """Let ``write`` write the files of a command, then report.html with its pictures and tables.xlsx of its tables.
+    """Let ``write`` write the files of a command into ``folder``, then report.html with its pictures and tables.xlsx.
 
     blocks : makes the blocks of the terminal
     write : writes the files and returns their names, which are returned with the two further ones
     prefix : before these two names, where the folder has others that must stay. Raises OSError.
     """
     with vector_copies() as pictures:
-        names = list(write())
+        names = list(write(folder))
     report, workbook = f"{prefix}{REPORT}", f"{prefix}{NAME}"
     (folder / report).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
     write_workbook(folder / workbook, [folder / name for name in names if name.endswith(".csv")], identity)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbdyn.base.digests import source_digest
-from rbdyn.result import versions
+from rbdyn.result import naming, versions
 
 
 class Checkpoint:
@@ -35,7 +35,8 @@ class Checkpoint:
             return
         text = json.dumps([key, record])
         # The line break comes first, in case an interrupted write left a partial line.
-        with self.path.open("a", encoding="utf-8") as file:
+        path = self.path
+        with naming(lambda: path), path.open("a", encoding="utf-8") as file:
             file.write(f"\n{digest_of(text)} {text}\n")
             file.flush()
             os.fsync(file.fileno())

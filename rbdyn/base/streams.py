@@ -1,12 +1,14 @@
 """Standard streams and Ctrl-C of both commands. Loads nothing heavy.
 
 Output to a closed pipe or stream is dropped silently: the command continues, completes its files and ends with its usual exit
-code. A full device is reported once.
+code. A full device is reported once. Control characters, which names and paths may hold, are escaped in all output, so none
+of them acts on a terminal; what styles its text itself escapes first and writes to ``styled``.
 """
 
 import codecs
 import errno
 import io
+import logging
 import os
 import re
 import signal
@@ -23,10 +25,63 @@ FAILED = 1
 PLAIN = {
     "±": "+-", "×": "x", "─": "-", "−": "-", "–": "-", "µ": "u", "°": " deg", "²": "^2", "³": "^3", "≤": "<=", "≥": ">=", "█": "#",
 }  # fmt: skip
+# Characters that act on a terminal or turn the direction of a text, but for line breaks and tabs.
+ACTING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]|\r(?!\n)")
 # Time [s] after which a swallowed Ctrl-C is raised again.
 AGAIN_S = 0.05
 # A path in the text of a warning, and the longest text that is printed.
 PATH, LONGEST_WARNING = re.compile(r"(?<!\w)(?:[A-Za-z]:)?[/\\][^\s/\\]+[/\\]\S+"), 300
+
+
+def escaped(text: str) -> str:
+    """The text with its control characters as Python writes them."""
+    return ACTING.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+class _Escaping(io.TextIOWrapper):
+    """A stream that escapes control characters."""
+
+    def write(self, text: str, /) -> int:
+        super().write(escaped(text))
+        return len(text)
+
+    def write_styled(self, text: str) -> int:
+        """Write a text whose control characters are meant."""
+        return super().write(text)
+
+
+class _Styled:
+    """The same stream as another, without its escapes."""
+
+    def __init__(self, stream: _Escaping) -> None:
+        self._stream, self.write = stream, stream.write_styled
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def styled(stream: Any) -> Any:
+    """A standard stream for text whose control characters are meant."""
+    return _Styled(stream) if isinstance(stream, _Escaping) else stream
+
+
+class Uninterrupted:
+    """Context in which Ctrl-C waits until its end, for a few statements of which all or none must be executed."""
+
+    def __enter__(self) -> None:
+        self._waiting, self._usual = 0, None
+        # Only the main thread hears of signals, and only a handler of Python can wait.
+        if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
+            self._usual = signal.signal(signal.SIGINT, self._wait)
+
+    def _wait(self, number: int, frame: Any) -> None:
+        self._waiting += 1
+
+    def __exit__(self, *ended: object) -> None:
+        if callable(self._usual):
+            signal.signal(signal.SIGINT, self._usual)
+            if self._waiting:
+                self._usual(signal.SIGINT, None)
 
 
 class _Losing(io.FileIO):
@@ -46,6 +101,9 @@ class _Losing(io.FileIO):
 def run(app: Callable[[], object]) -> NoReturn:
     """Run a command to its exit code, whatever its streams are."""
     code: Any = 0
+    # Pictures go to files only, whatever the user's own programs show; typer styles no text, for it may quote an argument.
+    os.environ |= {"MPLBACKEND": "agg", "_TYPER_FORCE_DISABLE_TERMINAL": "1"}
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # without a home it tells where its cache is
     out, interrupts = _replace_streams(), _pending_interrupts()
     _shorten_warnings()
     try:
@@ -121,7 +179,7 @@ def _replace_streams() -> _Losing | None:
         if standard is getattr(sys, f"__{name}__"):
             losing = _Losing(number, "w", closefd=False)
             lines, encoding = (standard.line_buffering, standard.encoding) if standard else (True, "utf-8")
-            stream = io.TextIOWrapper(io.BufferedWriter(losing), encoding, "rbdyn.plain", line_buffering=lines)
+            stream = _Escaping(io.BufferedWriter(losing), encoding, "rbdyn.plain", line_buffering=lines)
             setattr(sys, name, stream)
     return losing
 

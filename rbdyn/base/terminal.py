@@ -10,6 +10,7 @@ from textwrap import shorten, wrap
 from typing import NamedTuple
 
 from rbdyn.base.blocks import WARNING, Block, Bullets, Detail, Heading, Note, Paragraph, Table, Tiles, says
+from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
 
 # Characters around the text of each column of a table, and around the whole table.
@@ -29,7 +30,7 @@ def show(blocks: Iterable[Block], detail: Detail = Detail.USUAL) -> None:
         print(text(blocks, detail), end="")
         return
     bold = os.environ.get("TERM", "dumb") != "dumb"
-    print(text(blocks, detail, shutil.get_terminal_size().columns, bold), end="")
+    styled(sys.stdout).write(text(blocks, detail, shutil.get_terminal_size().columns, bold))
 
 
 def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | None = None, bold: bool = False) -> str:
@@ -73,7 +74,8 @@ class Page(NamedTuple):
     bold: bool
 
     def lines(self, text: str) -> str:
-        """A text with line breaks between words at the width of the page."""
+        """A text with line breaks between words at the width of the page, its control characters escaped."""
+        text = escaped(text)
         if self.width is None:
             return f"{text}\n"
         broken = (wrap(part, self.width, break_long_words=False, break_on_hyphens=False) for part in text.split("\n"))
@@ -113,7 +115,8 @@ def _table(table: Table, page: Page) -> str:
     from rich.console import Console
     from rich.table import Table as Grid
 
-    texts = [*zip(table.header, *table.rows, strict=True)]
+    rows = [[escaped(cell) for cell in row] for row in (table.header, *table.rows)]
+    texts = [*zip(*rows, strict=True)]
     words = {0, *table.text_columns}
     paper = io.StringIO()
     console = Console(file=paper, width=page.width or WIDE, highlight=False, markup=False, color_system=None)
@@ -121,8 +124,8 @@ def _table(table: Table, page: Page) -> str:
         grid = Grid(box=box.SIMPLE_HEAD)
         for place, width in part:
             justify = "left" if place in words else "right"
-            grid.add_column(table.header[place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
-        for row in table.rows:
+            grid.add_column(rows[0][place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
+        for row in rows[1:]:
             grid.add_row(*(row[place] for place, _ in part))
         console.print(grid)
     caption = page.title(table.caption) if table.caption else ""

@@ -35,6 +35,7 @@ CHANGED = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*")
 def write_workbook(path: Path, files: Iterable[Path], identity: Identity) -> None:
     """Write the workbook of CSV files; columns of numbers are numbers. Raises OSError."""
     from openpyxl import Workbook
+    from openpyxl.writer.excel import ExcelWriter
 
     day = datetime.fromisoformat(identity.date)
     book = Workbook(write_only=True)
@@ -47,8 +48,29 @@ def write_workbook(path: Path, files: Iterable[Path], identity: Identity) -> Non
         sheets.append(sheet_name(Path(name).stem, sheets))
         _sheet(book, sheets[-1], _typed(tables[name]))
     written = io.BytesIO()
-    book.save(written)
-    path.write_bytes(_dated(written, day))
+    ExcelWriter(book, _Archive(written, day)).save()
+    path.write_bytes(written.getvalue())
+
+
+class _Archive(zipfile.ZipFile):
+    """The archive of a workbook, with one date in place of the clock, so that equal tables are equal bytes.
+
+    An archive knows no year before 1980 or after 2107.
+    """
+
+    def __init__(self, target: io.BytesIO, day: datetime) -> None:
+        super().__init__(target, "w", zipfile.ZIP_DEFLATED)
+        self._changed = day.strftime("%Y-%m-%dT%H:%M:%SZ").encode()
+        self._date = (min(max(day.year, 1980), 2107), day.month, day.day, 0, 0, 0)
+
+    def writestr(self, zinfo_or_arcname: Any, data: Any, *_: Any, **__: Any) -> None:
+        entry = zipfile.ZipInfo(zinfo_or_arcname, self._date)
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        content = data.encode() if isinstance(data, str) else data
+        super().writestr(entry, CHANGED.sub(rb"\g<1>" + self._changed, content))
+
+    def write(self, filename: Any, arcname: Any = None, *_: Any, **__: Any) -> None:
+        self.writestr(arcname, Path(filename).read_bytes())
 
 
 def _rows(path: Path) -> list[list[str]]:
@@ -116,15 +138,3 @@ def _text(cell: str) -> str | None:
     """The text of a cell, which no spreadsheet takes for a formula."""
     text = CONTROL.sub(" ", cell)
     return f"'{text}" if text.startswith("=") else text or None
-
-
-def _dated(book: io.BytesIO, day: datetime) -> bytes:
-    """The workbook with one date in place of the clock, so that equal tables are equal bytes."""
-    copy = io.BytesIO()
-    with zipfile.ZipFile(book) as source, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as target:
-        for entry in source.infolist():
-            content = CHANGED.sub(rb"\g<1>" + day.strftime("%Y-%m-%dT%H:%M:%SZ").encode(), source.read(entry))
-            stamp = zipfile.ZipInfo(entry.filename, (day.year, day.month, day.day, 0, 0, 0))
-            stamp.compress_type = zipfile.ZIP_DEFLATED
-            target.writestr(stamp, content)
-    return copy.getvalue()

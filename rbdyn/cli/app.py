@@ -10,8 +10,9 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
+from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_line, identity_of
-from rbdyn.base.page import write_with_report
+from rbdyn.base.page import REPORT_FILES, write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
@@ -24,7 +25,20 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
     from rbdyn.scene import Scene
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+# Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
+SIMULATION_FILES = ("result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png")
+MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
+ACCURACY_FILES = tuple(
+    f"{name}.{kind}"
+    for name in ("accuracy", "trajectory", "methods", "coverage", "options", "stability", "solvers")
+    for kind in ("json", "csv", "png")
+)
+SHOW_FILES = (
+    "orbit.json", "history.csv", "cage_orbit.png", "forces.png", "whirl.png", "poincare.png", "spectra.png", "roller_loads.png",
+    "sliding.png", "power.png", "bearing.html", "bearing.mp4", "bearing.gif",
+)  # fmt: skip
+
+app = command.Program()
 
 # Former options of ``rbdyn accuracy``, and what replaces them.
 SCRIPT = "run python examples/benchmarks/{}"
@@ -73,15 +87,17 @@ def simulate(
         ),
     ] = None,
     out: command.Out = None,
+    force: command.Force = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: command.Verbose = False,
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
-    with command.guarded(as_json):
+    files = (*SIMULATION_FILES, *REPORT_FILES)
+    with command.guarded(as_json), output_folder(out, "rbdyn simulate", files, force=force) as folder:
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
-        folder = command.output_folder(out, "rbdyn simulate", scene) if out else None
+        folder.claim(scene)
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with command.progress_bar("simulating", quiet or as_json, workers) as progress:
@@ -93,11 +109,10 @@ def simulate(
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
         blocks = partial(simulation_output.blocks, result)
-        write = partial(simulation_output.write, loaded, result)
-        files = write_with_report(folder, identity, blocks, partial(write, folder)) if folder else []
+        written = write_with_report(folder, identity, blocks, partial(simulation_output.write, loaded, result))
         detail = Detail.of(quiet, verbose)
         command.hand_over(
-            result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), folder, files
+            result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), out, written
         )
     if result.status != "ok":
         raise typer.Exit(command.FAILED)
@@ -117,22 +132,23 @@ def accuracy(
     ] = None,
     assignments: command.Set = None,
     out: Annotated[Path | None, command.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
+    force: command.Force = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: Annotated[bool, command.verbose_flag("Also versions.")] = False,
 ) -> None:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
-    with command.guarded(as_json):
+    with command.guarded(as_json), output_folder(out, "rbdyn accuracy", ACCURACY_FILES, force=force) as folder:
         from rbdyn import accuracy as studies
         from rbdyn.scene import Scene
 
         loaded = Scene.load(scene, assignments or [])
         name = studies.study_name(study, loaded)
-        folder = command.output_folder(out, "rbdyn accuracy", scene) if out else None
+        folder.claim(scene)
         with command.progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress)
-        files = studies.write(report, folder) if folder else []
-        command.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
+        files = folder.write(partial(studies.write, report)) if out else []
+        command.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), out, files)
     if report.failed:
         raise typer.Exit(command.FAILED)
 
@@ -148,7 +164,7 @@ def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
     return [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks() if duty else [])]
 
 
-def _write_map(mapped: "SlipMap", folder: Path, duty: "MapDuty | None" = None) -> list[str]:
+def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png, with a duty also duty.csv; returns the file names."""
     from rbdyn.plots.roller import draw_slip_map
     from rbdyn.result import write_json
@@ -183,33 +199,34 @@ def slip_map(
     out: Annotated[
         Path | None, command.folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
     ] = None,
+    force: command.Force = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
-    with command.guarded(as_json):
+    files = (*MAP_FILES, *REPORT_FILES)
+    with command.guarded(as_json), output_folder(out, "rbdyn map", files, (MAP_POINTS,), force) as folder:
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
-        folder = command.output_folder(out, "rbdyn map", scene) if out else None
         from rbdyn.base.faults import axis_values
-        from rbdyn.dynamics import slip_map as study
+        from rbdyn.dynamics.slip_map import slip_map as run_map
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         marked = _map_duty(loaded, duty, *axes)
-        points = folder / study.POINTS if folder else None
+        folder.claim(scene)
+        points = out / MAP_POINTS if out else None
         with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
-            mapped = study.slip_map(loaded, *axes, workers, progress, points, command.notice(quiet))
+            mapped = run_map(loaded, *axes, workers, progress, points, command.notice(quiet))
         swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
         inputs = [scene] if duty is None else [scene, duty]
         identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept)
         blocks = partial(map_blocks, mapped, marked)
-        write = partial(_write_map, mapped, duty=marked)
-        files = write_with_report(folder, identity, blocks, lambda: write(folder)) if folder else []
+        written = write_with_report(folder, identity, blocks, partial(_write_map, mapped, marked))
         command.hand_over(
             partial(_map_record, mapped, marked),
             as_json,
             lambda: show_blocks([identity_line(identity), *blocks()]),
-            folder,
-            files,
+            out,
+            written,
         )
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
@@ -253,6 +270,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
     out: Annotated[Path | None, command.folder_option("Write here.", "'show' next to the result")] = None,
+    force: command.Force = False,
     turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, command.flag("--animate", says="Also a moving picture and a player.")] = False,
@@ -262,17 +280,21 @@ def show(
     verbose: Annotated[bool, command.verbose_flag("Also peaks of the spectra.")] = False,
 ) -> None:
     """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
-    with command.guarded(as_json):
+    target = out or (result if result.is_dir() else result.parent) / "show"
+    with command.guarded(as_json), output_folder(target, "rbdyn show", SHOW_FILES, force=force) as folder:
         from rbdyn.cli import show as motion_output
 
         request = motion_output.request_of(result, turns, replicate)
-        folder = command.output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
+        folder.claim(request.path)
         with command.progress_bar("showing", quiet or as_json) as progress:
-            record = motion_output.write(request, folder, animate, lyapunov, progress, command.notice(quiet or as_json))
+            notice = command.notice(quiet or as_json)
+            record = folder.write(
+                lambda stage: motion_output.write(request, stage, animate, lyapunov, progress, notice)
+            )
         command.hand_over(
             lambda: record,
             as_json,
             lambda: show_blocks(motion_output.blocks(record), Detail.of(quiet, verbose)),
-            folder,
+            target,
             record["files"],
         )

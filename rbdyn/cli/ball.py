@@ -10,6 +10,7 @@ import typer
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import (
     FAILED,
+    Force,
     Json,
     Quiet,
     SceneFile,
@@ -17,17 +18,27 @@ from rbdyn.base.command import (
     folder_option,
     guarded,
     hand_over,
-    output_folder,
     valued,
     verbose_flag,
 )
 from rbdyn.base.faults import InputError
+from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_line, identity_of
-from rbdyn.base.page import write_with_report
+from rbdyn.base.page import REPORT_FILES, write_with_report
 from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
     from rbdyn.scene import BallScene
+
+# Names of the files of an equilibrium, of a sweep, of the other studies and of all pictures; and what a sweep keeps.
+EQUILIBRIUM_FILES, SWEEP_FILES = ("result.json", "balls.csv", "runout.csv"), ("sweep.json", "sweep.csv")
+STUDY_FILES = tuple(
+    f"{name}.{kind}" for name in ("preload", "clearance", "wear", "race_limits") for kind in ("json", "csv")
+)
+PICTURES = (
+    "loads.png", "angles.png", "section.png", "pressure_and_life.png", "stiffness.png", "azimuth.png", "map.png",
+)  # fmt: skip
+FILES, KEPT = (*EQUILIBRIUM_FILES, *SWEEP_FILES, *STUDY_FILES, *PICTURES, *REPORT_FILES), ("sweep.part",)
 
 VALUES, UNASKED = "start:stop:count or a,b,c", "the equilibrium alone"
 
@@ -58,12 +69,13 @@ def ball(
         valued("N", "Seed of form errors, or of the lot of --race-limits.", "errors.seed; of the lot 1", min=0),
     ] = None,
     out: Annotated[Path | None, folder_option("Write the result as JSON here, with its tables and pictures.")] = None,
+    force: Force = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, verbose_flag("Also the stiffness matrix and cost.")] = False,
 ) -> None:
     """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
-    with guarded(as_json):
+    with guarded(as_json), output_folder(out, "rbdyn ball", FILES, KEPT if sweeps else (), force) as folder:
         from rbdyn.scene import Scene, balls_only
 
         loaded = balls_only(Scene.load(scene, assignments or []))
@@ -74,26 +86,26 @@ def ball(
         if sweeps:
             from rbdyn.cli.ball_studies import run_sweep
 
-            raise typer.Exit(run_sweep(loaded, sweeps, out, scene, as_json, quiet))
+            raise typer.Exit(run_sweep(loaded, sweeps, folder, scene, as_json, quiet))
         for name, value in requested.items():
             from rbdyn.cli.ball_studies import run as run_study
 
             share = 0.95 if target_yield is None else target_yield
             draw = 1 if seed is None else seed
-            raise typer.Exit(run_study(loaded, name, value, share, draw, out, scene, as_json, quiet))
-        folder = output_folder(out, "rbdyn ball", scene) if out else None
+            raise typer.Exit(run_study(loaded, name, value, share, draw, folder, scene, as_json, quiet))
+        folder.claim(scene)
         from rbdyn.cli.ball_output import blocks, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium
 
         result, path = with_runout(loaded, equilibrium(loaded))
         identity = identity_of("rbdyn ball", result.scene, [scene])
-        answer, save = partial(blocks, result), partial(write, result)
-        files = write_with_report(folder, identity, answer, partial(save, folder, path)) if folder else []
+        answer = partial(blocks, result)
+        files = write_with_report(folder, identity, answer, partial(write, result, path))
         hand_over(
             result.as_dict,
             as_json,
             lambda: show([identity_line(identity), *answer()], Detail.of(quiet, verbose)),
-            folder,
+            out,
             files,
         )
     if not result.is_equilibrium:

@@ -62,7 +62,7 @@ def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.D
     return replace(result, runout=record), followed.table()
 
 
-def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) -> list[str]:
+def write(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list[str]:
     """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
     if not result.is_equilibrium:

@@ -10,8 +10,9 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
-from rbdyn.base.command import FAILED, checkpoint_message, hand_over, output_folder, progress_bar
+from rbdyn.base.command import FAILED, checkpoint_message, hand_over, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
+from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
 from rbdyn.base.records import save_table
@@ -46,24 +47,23 @@ HEADER = {
 
 
 def run_sweep(
-    scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool
+    scene: "BallScene", texts: Sequence[str], folder: OutputFolder, source: Path, as_json: bool, quiet: bool
 ) -> int:
     """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
     from rbdyn.quasistatic.sweep import keys_of_texts
 
     keys = keys_of_texts(texts)
-    folder = output_folder(out, "rbdyn ball", source) if out else None
+    folder.claim(source)
     from rbdyn.quasistatic.sweep import sweep
 
-    kept_in = folder / "sweep.part" if folder else None
+    kept_in = folder.path / "sweep.part" if folder.path else None
     with checkpoint_message(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
     identity = identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys)
-    answer, save = partial(sweep_blocks, result), partial(write_sweep, result)
-    files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
-    hand_over(
-        result.as_dict, as_json, lambda: show([identity_line(identity), *answer()], Detail.of(quiet)), folder, files
-    )
+    answer = partial(sweep_blocks, result)
+    files = write_with_report(folder, identity, answer, partial(write_sweep, result))
+    screen = partial(show, [identity_line(identity), *answer()], Detail.of(quiet))
+    hand_over(result.as_dict, as_json, screen, folder.path, files)
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
     return FAILED if result.failures else 0
@@ -232,13 +232,13 @@ def run(
     value: str,
     target_yield: float,
     seed: int,
-    out: Path | None,
+    folder: OutputFolder,
     source: Path,
     as_json: bool,
     quiet: bool,
 ) -> int:
     """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
-    folder = output_folder(out, "rbdyn ball", source) if out else None
+    folder.claim(source)
     table: SweepResult | None = None
     if name == "race_limits":
         record = race_limits(scene, value, target_yield, seed)
@@ -247,11 +247,10 @@ def run(
     command = f"rbdyn ball --{name.replace('_', '-')}"
     swept = table.keys if table else {}
     identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
-    answer, save = partial(blocks, record, table), partial(write_study, name, record, table)
-    files = write_with_report(folder, identity, answer, partial(save, folder)) if folder else []
-    hand_over(
-        lambda: record, as_json, lambda: show([identity_line(identity), *answer()], Detail.of(quiet)), folder, files
-    )
+    answer = partial(blocks, record, table)
+    files = write_with_report(folder, identity, answer, partial(write_study, name, record, table))
+    screen = partial(show, [identity_line(identity), *answer()], Detail.of(quiet))
+    hand_over(lambda: record, as_json, screen, folder.path, files)
     return 0
 
 

@@ -97,7 +97,7 @@ class Typed:
         if text is None:
             return None
         try:
-            value = plain_number(text)
+            value = plain_number(text, LIMITS[option][2], lambda value: _range_fault(value, *LIMITS[option]))
         except MethodError as error:
             self.fault(option, str(error))
             return None
@@ -130,15 +130,19 @@ def _range_fault(value: float, least: float, largest: float, unit: str) -> str |
 
 
 def _whole_number(text: str, least: int, largest: int) -> int:
-    value = plain_number(text)
-    if not value.is_integer() or not least <= value <= largest:
-        raise MethodError(f"must be a whole number from {least} to {largest}; fix it")
+    def fault(value: float) -> str | None:
+        whole = value.is_integer() and least <= value <= largest
+        return None if whole else f"must be a whole number from {least} to {largest}; fix it"
+
+    value = plain_number(text, fault=fault)
+    if sentence := fault(value):
+        raise MethodError(sentence)
     return int(value)
 
 
 def roller_size(text: str) -> tuple[float, float]:
     """Diameter and length of a roller [mm] from "7x7" and like spellings. Raises MethodError."""
-    if comma := comma_fault(text):
+    if comma := comma_fault(text, roller_size):
         raise MethodError(comma)
     match = ROLLER.fullmatch(text)
     try:
@@ -160,27 +164,32 @@ def clearance_of(text: str) -> str | float:
     name = text.strip().upper()
     if name in CLEARANCE_CLASSES:
         return name
-    if comma := comma_fault(text):
-        raise MethodError(comma)
+
+    def fault(value: float) -> str | None:
+        sentence = _range_fault(value, *CLEARANCES, "mm")
+        um = f"if {value:g} um are meant, write {1e-3 * value:g}"
+        return sentence.replace("fix it", um) if sentence and 2.0 < value <= 2000.0 else sentence
+
     try:
-        value = float(text)
-    except ValueError:
+        value = plain_number(text, "mm", fault)
+    except MethodError as error:
+        if not str(error).startswith("is no number"):
+            raise
         classes = ", ".join(CLEARANCE_CLASSES)
         raise MethodError(f"is no clearance class; choose one of {classes}, or write millimetres, as 0.02") from None
-    if fault := _range_fault(value, *CLEARANCES, "mm"):
-        um = f"if {value:g} um are meant, write {1e-3 * value:g}"
-        raise MethodError(fault.replace("fix it", um) if 2.0 < value <= 2000.0 else fault)
+    if sentence := fault(value):
+        raise MethodError(sentence)
     return value
 
 
 def conformity_of(text: str) -> tuple[float, float]:
     """Radii of the inner and the outer groove over the ball's diameter, from one number or two with a slash. Raises MethodError."""
-    factors = [plain_number(part) for part in text.split("/")]
     least, largest = CONFORMITIES
+    words = f"must be groove radius over ball diameter, from {least} to {largest}; write 0.52, or 0.515/0.525 for inner and outer"
+    parts = text.split("/")
+    factors = [plain_number(part, fault=lambda value: None if least <= value <= largest else words) for part in parts]
     if len(factors) > 2 or not all(least <= factor <= largest for factor in factors):
-        raise MethodError(
-            f"must be groove radius over ball diameter, from {least} to {largest}; write 0.52, or 0.515/0.525 for inner and outer"
-        )
+        raise MethodError(words)
     return factors[0], factors[-1]
 
 

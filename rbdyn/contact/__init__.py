@@ -5,7 +5,8 @@
 - ``cage_bar``: stiffness of a cross-bar of a window cage, in series with the contact on it
 - ``profile``: roller profiles as drops over the length
 - ``damping``: normal damping of a closing or opening contact; restitution
-- ``traction``: friction coefficient against sliding speed and load, as compiled; tangential elasticity of the bodies
+- ``traction``: friction coefficient against sliding speed and load, as compiled
+- ``tangential``: the elasticity of the bodies, through which traction follows that coefficient
 - ``film_thickness``: of the oil film of a line contact, its lambda ratio, the load share of asperities
 - ``rheology``: traction of that film by the oil's behaviour under pressure and shear
 - ``rolling_resistance``: of the lubricated line contact, flooded or starved, and of the films of open contacts

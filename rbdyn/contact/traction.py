@@ -1,18 +1,4 @@
-"""Traction coefficient against slip and load: steady laws, tables of them, and the tangential elasticity of the contact.
-
-A steady law responds to a change of slip at once, as if the bodies were rigid. Elastic bodies act as a spring in series with the
-steady contact: the traction T grows by k (s - s_c(T)), where s_c is the slip of the steady law at T. The tangential stiffness k
-is, for plane contact of equal materials, the normal one, dQ/dx (Johnson 1985, Contact Mechanics, 7 and 8; Kalker 1990). With
-s_c = s T/T_steady(s), which is exact on the linear part of the law, the traction coefficient is
-
-    (tau + beta) d mu/dt = mu_steady - mu,    tau = T_steady(s)/(s k) + 1/omega.
-
-On the linear part tau is the creep slope over k, the rolling time over about the contact's width. A fast slip, as in an impact,
-acts on the spring alone and reaches the limit of traction in the time T/(k s). ``omega``, the frequency of a roller between its
-races, bounds the rate where the curve is flat. With material damping c parallel to the spring, the share beta/(tau + beta) of the
-steady traction acts at once, beta = c/k. The acting coefficient stays within those of the steady law, and traction vanishes with
-the load. The work on the slip counts as loss, including the elastic energy of the contact (some microjoules).
-"""
+"""Steady traction coefficient of a contact against slip and load: laws, and tables of them."""
 
 import math
 from collections.abc import Callable
@@ -162,7 +148,7 @@ def _(model, slip, load):
 @traction.body(TractionSurface)
 def _(model, slip, load):
     along, across = table_place(model.axes, slip, load)
-    return traction_by_table(model.axes, slip, load, table_value(model, along, across))
+    return traction_by_table(model.axes, slip, load, table_value(model, along, across)[0])
 
 
 @traction.body(MixedTraction)
@@ -170,11 +156,62 @@ def _(model, slip, load):
     return mixed(model, slip, load, traction(model.fluid, slip, load))
 
 
+@law
+def tangent(model, slip, load):
+    """Slope of the traction coefficient over the slip [s/m], arguments as of ``traction``; negative past a peak."""
+
+
+@tangent.body(NoTraction)
+def _(model, slip, load):
+    return 0.0
+
+
+@tangent.body(FourConstantTraction)
+def _(model, slip, load):
+    speed = abs(slip)
+    return (model.b - model.c * (model.a + model.b * speed)) * fast_exp(-model.c * speed)
+
+
+@tangent.body(BlendedFourConstantTraction)
+def _(model, slip, load):
+    speed, square = abs(slip), slip * slip + model.blend_speed * model.blend_speed
+    drop = fast_exp(-model.c * speed)
+    coefficient = (model.a + model.b * speed) * drop + model.d
+    slope = (model.b - model.c * (model.a + model.b * speed)) * drop
+    return (slope * speed + coefficient * model.blend_speed * model.blend_speed / square) / math.sqrt(square)
+
+
+@tangent.body(CoulombTraction)
+def _(model, slip, load):
+    saturation = fast_tanh(slip / model.blend_speed)
+    return model.coefficient * (1.0 - saturation * saturation) / model.blend_speed
+
+
+@tangent.body(TractionSurface)
+def _(model, slip, load):
+    along, across = table_place(model.axes, slip, load)
+    return tangent_by_table(model.axes, slip, load, *table_value(model, along, across))
+
+
+@tangent.body(MixedTraction)
+def _(model, slip, load):
+    return mixed_tangent(model, slip, load, tangent(model.fluid, slip, load))
+
+
 @kernel
 def mixed(model, slip, load, film):
     """Traction coefficient of asperities and a film whose own coefficient is ``film``."""
     share = asperity_load_share(model.share_scale, model.share_exponent, load)
     rubbing = model.boundary * fast_tanh(slip / model.blend_speed)
+    return share * rubbing + (1.0 - share) * film
+
+
+@kernel
+def mixed_tangent(model, slip, load, film):
+    """``mixed`` of the slopes over the slip [s/m]."""
+    share = asperity_load_share(model.share_scale, model.share_exponent, load)
+    saturation = fast_tanh(slip / model.blend_speed)
+    rubbing = model.boundary * (1.0 - saturation * saturation) / model.blend_speed
     return share * rubbing + (1.0 - share) * film
 
 
@@ -229,7 +266,7 @@ def slip_ratio(axes, slip):
 
 @law
 def table_value(model, along, across):
-    """Value of the table of a law at a ``table_place``."""
+    """Value of the table of a law at a ``table_place``, and its slope along the slip [1/cells]."""
 
 
 @table_value.body(TractionSurface)
@@ -246,7 +283,7 @@ def _(model, along, across):
 
 @law
 def traction_by_table(model, slip, load, value):
-    """``traction`` of a law without its table, from its ``table_value``."""
+    """``traction`` of a law without its table, from the value of the table."""
 
 
 @traction_by_table.body(SurfaceAxes)
@@ -260,14 +297,32 @@ def _(model, slip, load, value):
     return mixed(model, slip, load, traction_by_table(model.fluid, slip, load, value))
 
 
+@law
+def tangent_by_table(model, slip, load, value, slope):
+    """``tangent`` of a law without its table, from its ``table_value``."""
+
+
+@tangent_by_table.body(SurfaceAxes)
+def _(model, slip, load, value, slope):
+    ratio = slip_ratio(model, slip)
+    rise = 1.0 + ratio
+    return model.speed_density * fast_exp(value) * fma(ratio, slope * model.slip_density, 1.0) / (rise * rise)
+
+
+@tangent_by_table.body(MixedTraction)
+def _(model, slip, load, value, slope):
+    return mixed_tangent(model, slip, load, tangent_by_table(model.fluid, slip, load, value, slope))
+
+
 @kernel
 def bicubic(c, x, y):
-    """Sum of c[4 m + n] x^m y^n."""
+    """Sum of c[4 m + n] x^m y^n, and its derivative in x."""
     first = fma(fma(fma(c[3], y, c[2]), y, c[1]), y, c[0])
     second = fma(fma(fma(c[7], y, c[6]), y, c[5]), y, c[4])
     third = fma(fma(fma(c[11], y, c[10]), y, c[9]), y, c[8])
     fourth = fma(fma(fma(c[15], y, c[14]), y, c[13]), y, c[12])
-    return fma(fma(fma(fourth, x, third), x, second), x, first)
+    value = fma(fma(fma(fourth, x, third), x, second), x, first)
+    return value, fma(fma(3.0 * fourth, x, 2.0 * third), x, second)
 
 
 @kernel
@@ -406,119 +461,3 @@ def _polynomials(nodes: Array) -> Array:
         edges[..., row, column], edges[..., 2 + row, column] = value[corner], along[corner]
         edges[..., row, 2 + column], edges[..., 2 + row, 2 + column] = across[corner], twist[corner]
     return np.ascontiguousarray((cubic @ edges @ cubic.T).reshape(-1, 16))
-
-
-SMALLEST_SLIP = 1e-12  # [m/s], keeps the slope of the law finite
-
-
-class RigidContact(NamedTuple):
-    """Traction follows the steady law at once."""
-
-
-class ElasticContact(NamedTuple):
-    """The traction coefficient of each roller at a race is a state."""
-
-    start: int  # where those of this race begin
-    shortest_time: float  # 1/omega [s]
-    damping_time: float  # beta [s]
-
-
-@law
-def coefficient_of(tangential, y, j):
-    """Traction coefficient of roller ``j`` in the state ``y``; 0 where it is no state."""
-
-
-@coefficient_of.body(RigidContact)
-def _(tangential, y, j):
-    return 0.0
-
-
-@coefficient_of.body(ElasticContact)
-def _(tangential, y, j):
-    return y[tangential.start + j]
-
-
-@kernel
-def relaxation_time(tangential, steady, load, slip, stiffness):
-    """tau [s] of a steady coefficient at a load [N] and a slip [m/s], with the contact's stiffness [N/m]; shortest without load."""
-    creep = abs(steady) * load / (max(abs(slip), SMALLEST_SLIP) * stiffness) if load > 0.0 else 0.0
-    return creep + tangential.shortest_time
-
-
-@law
-def acting_coefficient(tangential, steady, coefficient, load, slip, stiffness):
-    """Traction coefficient that acts, of the steady law's and the state's; the rest as in ``relaxation_time``."""
-
-
-@acting_coefficient.body(RigidContact)
-def _(tangential, steady, coefficient, load, slip, stiffness):
-    return steady
-
-
-@acting_coefficient.body(ElasticContact)
-def _(tangential, steady, coefficient, load, slip, stiffness):
-    damped = tangential.damping_time / relaxation_time(tangential, steady, load, slip, stiffness)
-    return coefficient + (steady - coefficient) * damped / (1.0 + damped)
-
-
-@law
-def coefficient_rate(tangential, steady, coefficient, load, slip, stiffness):
-    """Rate at which the state follows the steady coefficient [1/s]; arguments as above. Without load it dies away."""
-
-
-@coefficient_rate.body(RigidContact)
-def _(tangential, steady, coefficient, load, slip, stiffness):
-    return 0.0
-
-
-@coefficient_rate.body(ElasticContact)
-def _(tangential, steady, coefficient, load, slip, stiffness):
-    target = steady if load > 0.0 else 0.0
-    whole = relaxation_time(tangential, steady, load, slip, stiffness) + tangential.damping_time
-    return (target - coefficient) / whole
-
-
-@law
-def keep_coefficient_rate(tangential, rate, lanes, place):
-    """Write the rate of a contact to a work space."""
-
-
-@keep_coefficient_rate.body(RigidContact)
-def _(tangential, rate, lanes, place):
-    pass
-
-
-@keep_coefficient_rate.body(ElasticContact)
-def _(tangential, rate, lanes, place):
-    lanes[place] = rate
-
-
-@law
-def add_coefficient_rate(tangential, rate, j, row, dy):
-    """Put the rate of roller ``j`` into row ``row`` of ``dy``."""
-
-
-@add_coefficient_rate.body(RigidContact)
-def _(tangential, rate, j, row, dy):
-    pass
-
-
-@add_coefficient_rate.body(ElasticContact)
-def _(tangential, rate, j, row, dy):
-    dy[row, tangential.start + j] = rate
-
-
-@law
-def relax_coefficients(tangential, rollers, y, row, dy):
-    """Let the coefficients of all rollers die away, as where they do not touch, in row ``row`` of ``dy``."""
-
-
-@relax_coefficients.body(RigidContact)
-def _(tangential, rollers, y, row, dy):
-    pass
-
-
-@relax_coefficients.body(ElasticContact)
-def _(tangential, rollers, y, row, dy):
-    for j in range(rollers):
-        dy[row, tangential.start + j] = coefficient_rate(tangential, 0.0, y[tangential.start + j], 0.0, 0.0, 1.0)

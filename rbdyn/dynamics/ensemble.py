@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from numbers import Integral
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
@@ -68,10 +69,10 @@ def threads_of(workers: int | None) -> int:
     """Number of threads: as given, else all processors. Raises InputError unless it is a whole number from 1."""
     if workers is None:
         return os.cpu_count() or 1
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
         value = one_line(repr(workers), LONGEST_NAME)
         raise InputError([f"workers = {value}: must be a whole number from 1; leave it out for all processors"])
-    return workers
+    return int(workers)
 
 
 def run_all(

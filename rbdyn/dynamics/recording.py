@@ -1,10 +1,4 @@
-"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes; and how slow motions decay.
-
-Contacts ring in microseconds. The spin of the cage, the velocity of its centre and the spins of the rollers lose a
-disturbance more slowly: in the time inertia over slope of the moments that brake and drive them. Most moments act in passing
-contacts, so the slope is the mean over states of the running bearing, from linearised equations of motion. A run over a few
-such times only shows the start of the bearing, not its steady figures, and no test of drift reveals that.
-"""
+"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes."""
 
 import math
 import time
@@ -12,7 +6,6 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +13,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
-from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.advance import (
     ACCEPTED,
     DERIVATIVES,
@@ -31,11 +24,8 @@ from rbdyn.dynamics.integrators.advance import (
     SAMPLES,
     SPEEDS,
     SQUARES,
-    advance,
-    carry_from,
-    empty_tally,
 )
-from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales
+from rbdyn.dynamics.parameters.state import group_of, scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.pulses import low_passed, pulse_sums, pulses_of
@@ -46,8 +36,6 @@ from rbdyn.scene.laws import MOST_OF_A_RUN
 SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)
 # Long enough that the step cut at the end of a batch costs nothing, short compared with any memory that matters.
 BATCH_TURNS = 1.0
-# Batches after which the decay of slow motions is read: the rollers have gone round twice.
-READ_AFTER = (5, 10, 15, 20)
 
 
 @dataclass(frozen=True)
@@ -91,12 +79,9 @@ def batches_of(scene: Scene) -> Batches:
 
 
 class Recording:
-    """A run under way and its record, batch by batch; it can always go on.
+    """A run under way and its record, batch by batch; it can always go on."""
 
-    ``reads_decay``: whether it reads the decay of slow motions on the way.
-    """
-
-    def __init__(self, run: Run, reads_decay: bool = False) -> None:
+    def __init__(self, run: Run) -> None:
         self.run, self.batches = run, batches_of(run.scene)
         self._begin = run.clock_angles()
         # Whirl, work and largest loads of each batch in turn, as plain numbers: an array for each would take twice the memory.
@@ -107,8 +92,6 @@ class Recording:
         # Loads of the pocket walls, roller by roller at each sample.
         self._walls = array("f")
         self._cpu_s = 0.0
-        self._linearised = Linearised(run) if reads_decay else None
-        self._decay_rates = list[Array]()
 
     def to(self, counted: float) -> Replicate:
         """Go on until so many turns after the warm-up [shaft turns]. Raises RunError or CancelledError."""
@@ -125,8 +108,6 @@ class Recording:
                 sums[:] = 0.0
             self._ends.append(float(end))
             self._looks.append(self._look())
-            if self._linearised is not None and self._batches in READ_AFTER:
-                self._decay_rates.append(self._linearised.decay_rates())
         self._cpu_s += time.thread_time() - started
         return self.replicate
 
@@ -163,7 +144,7 @@ class Recording:
             cpu_s=self._cpu_s,
             method=run.method,
             stiffness=run.carry.stiffness.copy(),
-            decay_rates=np.array(self._decay_rates).reshape(-1, len(MOTIONS)),
+            group=group_of(run.scene, run.replicate),
         )
 
     def _go(self, end: float) -> None:
@@ -220,11 +201,8 @@ class Recording:
 def recording_of(
     scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
 ) -> Recording:
-    """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated.
-
-    A replicate that may be lengthened reads decay rates.
-    """
-    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop), scene.extends and companions is None)
+    """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated."""
+    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop))
 
 
 def _run_of(
@@ -293,72 +271,3 @@ def kinematic_cage_angle(scene: Scene, before: Array, after: Array) -> float:
     outer, inner = scene.geometry.raceways
     turned = after - before
     return float((turned[0] * inner + turned[1] * outer) / (inner + outer))
-
-
-MOTIONS = ("the spin of the cage", "the motion of the cage's centre", "the spin of the rollers")
-# Change of a speed for slopes, over the speed that a contact can make.
-INCREMENT = 1e-4
-# Time after which accelerations are read, over that of a contact: before anything changes.
-READING = 1e-6
-
-
-class Linearised:
-    """Linearised equations of motion of a run: reads decay rates in its states."""
-
-    def __init__(self, run: Run) -> None:
-        scene = run.scene
-        state, z, scale = layout_of(scene), scene.bearing.rollers, scales(scene)
-        cage = state.first_body
-        self.run, self.reading_s = run, READING * scale.length / scale.speed
-        self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
-        self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
-        first = state.coefficients
-        self.coefficients = [] if first is None else list(range(first, state.size))
-        self.book = empty_tally()
-
-    def decay_rates(self) -> Array:
-        """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which does not change."""
-        at_rest, following, rates = self._accelerations([]), self.coefficients, []
-        if following:
-            # Each coefficient follows its steady value at a rate of its own.
-            alone = (at_rest - self._accelerations(following))[following] / self.increments[following]
-        for places in self.motions:
-            change = self._accelerations(places) - at_rest
-            if following:
-                change = self._accelerations(places, change[following] / alone) - at_rest
-            rates.append(-float(np.mean(change[places] / self.increments[places])))
-        return np.array(rates)
-
-    def _accelerations(self, places: Sequence[int], coefficients: Array | None = None) -> Array:
-        """Rates of change of the state with the speeds at some places larger by their increments.
-
-        Traction coefficients that are states are larger by ``coefficients``.
-        """
-        run, y = self.run, self.run.carry.y.copy()
-        y[places] += self.increments[places]
-        if coefficients is not None:
-            y[self.coefficients] += coefficients
-        probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
-        advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
-        return probe.k[0]
-
-
-class Relaxation(NamedTuple):
-    """The slowest motion and the time [s] in which it relaxes."""
-
-    motion: str
-    time_s: float
-
-
-def slowest(rates: Array) -> Relaxation | None:
-    """Slowest motion by decay rates (states, motions) [1/s]; None for fewer than two states, or where no motion decays.
-
-    Few states give a rough rate. It counts as one standard error larger, so that noise lengthens no run. A motion that does
-    not decay even so excites itself, and has no relaxation time.
-    """
-    count = len(rates)
-    if count < 2:
-        return None
-    likely = rates.mean(axis=0) + rates.std(axis=0, ddof=1) / math.sqrt(count)
-    times = [Relaxation(name, 1.0 / rate) for name, rate in zip(MOTIONS, likely.tolist(), strict=True) if rate > 0.0]
-    return max(times, key=lambda relaxation: relaxation.time_s, default=None)

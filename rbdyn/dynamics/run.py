@@ -41,7 +41,7 @@ from rbdyn.dynamics.integrators.advance import (
     empty_tally,
 )
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
-from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state
+from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
 
@@ -74,7 +74,7 @@ class Run:
         self.rtol, self.longest_step = rtol, longest_step
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
-        y = start_state(scene, bearing, np.random.default_rng(seeds))
+        y = start_state(scene, bearing, np.random.default_rng(seeds), wall_of(scene, replicate))
         numerics = scene.numerics
         self.method: str = numerics.method
         self.explicit = explicit_method(numerics.method, numerics.rtol)

@@ -1,9 +1,9 @@
-"""Replicates that run until their figures no longer drift.
+"""Replicates that run until their figures have settled.
 
-A run first counts at least three times the time in which its slowest motion relaxes (``recording``). A figure may then
-drift over the counted turns by more than its error and a hundredth of it (``error_bars``). In that case every replicate
-goes on until it is twice as long, and again, up to ``numerics.extend_limit`` times the turns asked for; each time the last
-half counts. Companions run just as far. Nothing depends on the clock or on the number of threads.
+Replicates start in groups from states that are clearly different. A run has settled where the groups agree, and the later half
+of the counted turns with the earlier one, within the error of a figure or a hundredth of it (``error_bars``). Until then every
+replicate goes on until it is twice as long, and again, up to ``numerics.extend_limit`` times the turns asked for; each time the
+last half counts. Companions run just as far. Nothing depends on the clock or on the number of threads.
 """
 
 import math
@@ -12,29 +12,27 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import Outcome, Reporter, Stop, run_all
-from rbdyn.dynamics.recording import Relaxation, batches_of, slowest
-from rbdyn.dynamics.statistics.error_bars import start_of_counting, worth_lengthening
+from rbdyn.dynamics.recording import batches_of
+from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
 from rbdyn.scene import Scene
 
 
 class Stage(NamedTuple):
-    """Length of the replicates: batch from which they count, turns after the warm-up, and how often a drift lengthened them."""
+    """Length of the replicates: batch from which they count, turns after the warm-up, and whether they were lengthened."""
 
     first: int
     turns: float
-    extensions: int = 0
+    lengthened: bool = False
 
 
 @dataclass(frozen=True)
 class Ensemble:
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
-    ``since``: batch from which they would count without a drift; ``fault``: why companions that were asked for are missing;
+    ``since``: batch from which they would count if they had settled at once; ``fault``: why companions that were asked for are missing;
     ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs.
     """
 
@@ -47,10 +45,8 @@ class Ensemble:
     notes: tuple[str, ...]
 
 
-# Factor by which every drift lengthens a run.
+# Factor by which a run that has not settled gets longer.
 GROWTH = 2.0
-# Relaxation times of the slowest motion that count at least: 5 % of a start remain after them.
-RELAXATIONS = 3.0
 
 
 class Growing(Protocol):
@@ -66,26 +62,25 @@ Start = Callable[[int, Companions | None, Stop], Growing]
 
 
 def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
-    """Run the replicates of a scene until nothing drifts, then their companions just as far.
+    """Run the replicates of a scene until they have settled, then their companions just as far.
 
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
     """
     numerics = scene.numerics
     team = Team(start, range(numerics.replicates), None, workers, stop, progress, numerics.companions)
     stage = Stage(-1, whole_windows(scene) if scene.extends else numerics.turns)
-    begin, relaxation = None, None
+    begin = None
     while True:
         runs = team.to(stage.turns)
         if begin is None:
             begin = start_of_counting(scene, runs)
             stage = stage._replace(first=begin.first)
-            relaxation = slowest(np.concatenate([run.decay_rates for run in runs]))
         runs = [run.counted_from(stage.first) for run in runs]
-        longer = next_stage(scene, runs, stage, begin.first, relaxation) if scene.extends else None
+        longer = next_stage(scene, runs, stage, begin.first) if scene.extends else None
         if longer is None:
             break
         stage = longer
-    notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first, relaxation))
+    notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first))
     plan = companions_of(scene, runs)
     if not numerics.companions:
         return Ensemble(runs, [], plan, begin.first, None, begin.turns, notes)
@@ -141,34 +136,26 @@ def whole_windows(scene: Scene) -> float:
     return math.ceil(scene.numerics.turns / window - 1e-9) * window
 
 
-def fewest_turns(scene: Scene, relaxation: Relaxation | None) -> float:
-    """Turns that count at least: those asked for, or enough for the slowest motion to relax."""
-    needed = 0.0 if relaxation is None else RELAXATIONS * relaxation.time_s / scene.turn_s
-    return max(scene.numerics.turns, needed)
+def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> Stage | None:
+    """How to go on from counted ``runs``: None where they have settled, or beyond the scene's limit or memory.
 
-
-def next_stage(
-    scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
-) -> Stage | None:
-    """How to go on from counted ``runs``: None where nothing drifts, or beyond the scene's limit or memory.
-
-    The runs first make up for turns that ``discard_turns = "auto"`` or the slowest motion takes from those counted.
+    The runs first make up for turns that ``discard_turns = "auto"`` takes from those counted.
     """
     numerics, window = scene.numerics, scene.impact_window_turns
-    warm_up, batches, fewest = numerics.warm_up_turns, batches_of(scene), fewest_turns(scene, relaxation)
+    warm_up, batches = numerics.warm_up_turns, batches_of(scene)
     longest = numerics.extend_limit * (warm_up + numerics.turns) * (1.0 + 1e-9)
-    missing = fewest - runs[0].duration / scene.turn_s
-    if missing > 1e-6 * fewest:
+    missing = numerics.turns - runs[0].duration / scene.turn_s
+    if missing > 1e-6 * numerics.turns:
         most = math.floor((longest - warm_up) / window + 1e-9) * window
         longer = stage._replace(turns=min(stage.turns + math.ceil(missing / window - 1e-9) * window, most))
         return longer if longer.turns > stage.turns and fits(scene, longer.turns) else None
-    if not worth_lengthening(runs, since):
+    if settled(runs, since):
         return None
     turns = grown(scene, stage)
     if warm_up + turns > longest or not fits(scene, turns):
         return None
     counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
-    return Stage(batches.count(turns) - counted, turns, stage.extensions + 1)
+    return Stage(batches.count(turns) - counted, turns, lengthened=True)
 
 
 def grown(scene: Scene, stage: Stage) -> float:
@@ -182,37 +169,25 @@ def fits(scene: Scene, turns: float) -> bool:
     return batches_of(scene).count(turns) <= scene.numerics.most_batches
 
 
-def length_notes(
-    scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
-) -> tuple[str, ...]:
+def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> tuple[str, ...]:
     """Notes on the length of the runs and on the turns that count."""
     numerics, turn_s = scene.numerics, scene.turn_s
-    notes = []
-    counted, fewest = runs[0].duration / turn_s, fewest_turns(scene, relaxation)
-    if scene.extends and relaxation is not None and fewest > numerics.turns:
-        motion, turns = relaxation.motion, f"{relaxation.time_s / turn_s:.2g} shaft turns"
-        if counted < fewest * (1.0 - 1e-6):
-            fix = "raise numerics.extend_limit" if fits(scene, grown(scene, stage)) else "take fewer replicates"
-            notes.append(f"transient: {motion} relaxes in {turns}, and only {counted:.4g} turns are counted; {fix}")
-        elif not stage.extensions:
-            notes.append(
-                f"length: {motion} relaxes in {turns}, so {counted:.4g} turns are counted instead of {numerics.turns:.4g}"
-            )
-    if stage.extensions:
+    notes, counted = [], runs[0].duration / turn_s
+    if stage.lengthened:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
         notes.append(
             f"length: figures drifted: {dropped + counted:.4g} shaft turns per replicate instead of "
             f"{numerics.warm_up_turns + numerics.turns:.4g}; the last {counted:.4g} are counted (numerics.extend = false "
             "forbids it)"
         )
-    if scene.operation.schedule is None and worth_lengthening(runs, since):
+    if scene.operation.schedule is None and not settled(runs, since):
         fix = (
             "raise numerics.extend_limit" if scene.extends else "lengthen numerics.turns or set numerics.extend = true"
         )
         if not fits(scene, grown(scene, stage)):
             fix = "take fewer replicates: there is no memory for longer ones"
         notes.append(
-            f"transient: figures still drift over the {counted:.4g} turns counted; their errors include this drift, yet it may "
-            f"go farther; {fix}"
+            f"transient: figures still drift over the {counted:.4g} turns counted, or differ by how replicates start, so no "
+            f"statistical error is known; {fix}"
         )
     return tuple(notes)

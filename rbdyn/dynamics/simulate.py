@@ -13,15 +13,15 @@ from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
-    film_drive_notes,
     friction_check,
     friction_notes,
     heat_notes,
     left_out_notes,
-    light_load_notes,
     race_notes,
     race_report,
+    slip_notes,
 )
+from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
@@ -126,10 +126,9 @@ def _prediction(pace: Pace) -> dict[str, float]:
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
+    figures: dict[str, Any] = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
-    tighter = TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
     races = race_report(scene, inner_load, outer_load)
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
@@ -139,12 +138,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",
-        impact_force_N=figures["impact_force_N"],
-        impact_contact_force_N=figures["impact_contact_force_N"],
-        whirl_deviation_ratio=figures["whirl_deviation_ratio"],
-        power_loss_W=figures["power_loss_W"],
-        cage_speed_rpm=figures["cage_speed_rpm"],
-        cage_slip=figures["cage_slip"],
+        **figures,
         power_balance={"relative_gap": power_gap},
         power_terms_W=terms,
         rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
@@ -174,14 +168,15 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             *scene.catalogue_notes,
             *_balance_notes(scene, power_gap),
             *ensemble.notes,
-            *error_notes(scene, figures, ensemble.fault, tighter),
+            *error_notes(
+                scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
+            ),
             *whirl_notes(scene, orbit),
             *pulse_notes(scene, pulses),
             *heat_notes(scene, figures["power_loss_W"].value),
             *friction_notes(maker),
             *race_notes(scene, races),
-            *film_drive_notes(scene),
-            *light_load_notes(scene),
+            *slip_notes(scene, figures["cage_slip"].value),
             *_model_notes(scene),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *scene.section_notes,
@@ -191,6 +186,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
+        part_figures=part_figures(scene, runs, companions, ensemble.plan.share, ensemble.since, races),
         **pulses,
     )
 

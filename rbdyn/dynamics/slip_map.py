@@ -20,6 +20,7 @@ from rbdyn.base.words import counted
 from rbdyn.dynamics.ensemble import UNLIKE, Outcome, Pace, Reporter, Stop, log, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.map/1"
 FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
-# Name of the finished points in the folder of a map.
-POINTS = "map_points.jsonl"
 
 
 class Point(Record):
@@ -144,7 +143,8 @@ class Series:
         )
         figures = quantities(self.scene, runs, companions, share)
         power_gap = max(run.power_gap for run in runs)
-        return Point(speed, load, "ok", {name: figures[name] for name in FIGURES}, power_gap)
+        parts = part_figures(self.scene, runs, companions, share)
+        return Point(speed, load, "ok", {name: figures[name] for name in FIGURES} | parts, power_gap)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
         return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]

@@ -47,8 +47,8 @@ MOST_RUNS = 3
 # Counted turns of one run at most: minutes.
 MOST_TURNS = 100_000.0
 NORMAL = 1.96
-# A difference that is all scatter and its 95 % half-width together, over that half-width: sqrt(1 + 1 / 1.96^2).
-NOISY_DIFFERENCE = 1.123
+# A difference that is all scatter and its standard error together, over its 95 % half-width: sqrt(2) / 1.96.
+NOISY_DIFFERENCE = 0.722
 # Costs that add up over runs; the others are those of the reported run.
 ADDED = ("wall_s", "compile_s", "cpu_s", "steps", "rejected_steps", "rhs_evaluations", "turns")
 
@@ -274,7 +274,7 @@ def _noise_factor(scene: Scene, rtol: float) -> float:
 
 
 def _companion_noise(scene: Scene, rtol: float) -> float:
-    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.statistics.metrics``)."""
+    """Half-width of the bias from scatter alone, over the statistical error (``rbdyn.dynamics.statistics.metrics``)."""
     return bias_scale(rtol) * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
 
 

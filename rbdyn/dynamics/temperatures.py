@@ -33,6 +33,7 @@ from rbdyn.dynamics.parameters.heat import (
     term_shares,
 )
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.part_figures import at_temperatures_with_errors
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
@@ -299,6 +300,7 @@ def _result(
         result,
         status="ok" if status == "steady" else status,
         temperatures_C=temperatures,
+        part_figures=at_temperatures_with_errors(scene, result.part_figures or {}, temperatures),
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},

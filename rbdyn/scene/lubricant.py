@@ -114,7 +114,8 @@ class Lubricant(Consistent, Sparse):
     inputs have 10, which does not change the film and reduces the rolling resistance by 5 to 19 %. For baths, drop feed, oil-air
     and grease 5 (2 to 10) is assumed. Over 135 points of five catalogue bearings this removes trends over oil and load compared
     with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
-    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well."""
+    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well. The gap there, ahead of the
+    mean loaded inner contact, is the oil layer of films at open contacts (model.open_contact_film)."""
     roller_roughness, race_roughness, oil_flow = SI("um"), SI("um"), OptionalSI("l_min")
 
     def unsaved(self) -> Mapping[str, Any]:
@@ -303,8 +304,8 @@ class Traction(Consistent):
     elasticity: bool = False
     """Tangential elasticity of the race contacts: a spring as stiff as the contact in approach acts before traction follows the
     steady law. Contacts with a steep traction curve then need no implicit method, and most bearings of "rbdyn new" run five to
-    ten times faster. Loss, slip and whirl do not change. Impacts may be lower, because a roller between wall and race gives way:
-    by 5 % for the NU 210 at its defaults (137.8 +- 2.9 N compared with 144.5 +- 2.6 N, 60 replicates)."""
+    ten times faster. Loss, slip and whirl do not change, and impacts do not within their errors: 144.7 +- 4.3 N compared with
+    144.5 +- 2.6 N for the NU 210 at its defaults (24 and 60 replicates)."""
     friction: Literal["film", "mixed"] = "film"
     """film: the oil film carries the whole load; mixed: asperities carry the share exp(-b Lambda^c) of the load in dry friction
     (Zhou and Hoeprich 1991)."""

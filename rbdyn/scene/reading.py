@@ -43,6 +43,16 @@ class Validation(ModelMetaclass):
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
+def _copied(value: T, source: str) -> T:
+    """A copy that shares nothing. Raises InputError for what cannot be copied, such as a generator."""
+    try:
+        return deepcopy(value)
+    except (TypeError, RecursionError) as error:
+        raise InputError(
+            [f"{source}: holds a value that cannot be copied ({error}); give numbers, texts, lists and tables"]
+        ) from None
+
+
 class SceneFile(Consistent, Sparse, metaclass=Validation):
     """A scene from TOML. Equal scenes of equal seed and version give equal bits."""
 
@@ -58,7 +68,7 @@ class SceneFile(Consistent, Sparse, metaclass=Validation):
             name = one_line(repr(data), LONGEST_NAME)
             raise InputError([f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file"])
         assignments = _assignments(overrides)
-        data = deepcopy(data)
+        data = _copied(data, source)
         for assignment in assignments:
             set_key(data, assignment)
         scene = validated(cls._of_kind(data), data, source)
@@ -76,7 +86,7 @@ class SceneFile(Consistent, Sparse, metaclass=Validation):
             )
         data = deepcopy(self._tables)
         for key, value in changes.items():
-            put_key(data, key, plain(value), f"changed {key!r}")
+            put_key(data, key, _copied(plain(value), f"changed {key!r}"), f"changed {key!r}")
         return self.from_dict(data, "changed scene")
 
     def overridden(self, overrides: Iterable[str]) -> Self:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from rbdyn.base.faults import (
     LONGEST_NAME,
@@ -201,12 +201,35 @@ class Uncertain(Strict):
         """Law by key."""
         return self.__pydantic_extra__ or {}
 
-    @field_validator("set")
-    @classmethod
-    def _with_defaults(cls, assignments: list[str]) -> list[str]:
-        """The default assignments of keys that are not in the list, then the list."""
-        paths = [key_path(assignment) for assignment in assignments]
-        return [*(default for default in RUNS if key_path(default) not in paths), *assignments]
+    @property
+    def assignments(self) -> list[str]:
+        """The default assignments of keys that are not in ``set``, then ``set``."""
+        paths = [key_path(assignment) for assignment in self.set]
+        return [*(default for default in RUNS if key_path(default) not in paths), *self.set]
+
+    def over(self, base: Self) -> dict[str, Any]:
+        """A table of these declarations and those of ``base``, key by key.
+
+        What this table states about a key, by a law, in ``estimated`` or in ``set``, replaces what ``base`` states about it.
+        """
+        own, under = ({name: getattr(table, name) for name in table.model_fields_set} for table in (self, base))
+
+        def paths(assignments: list[str]) -> dict[str, str]:
+            return {".".join(key_path(assignment)): assignment for assignment in assignments}
+
+        fixed = paths(own.get("set", []))
+        stated = {*self.laws, *self.estimated, *fixed}
+        laws = {**{key: law for key, law in base.laws.items() if key not in stated}, **self.laws}
+        pairs = {frozenset(pair.keys): pair for pair in (*base.correlation, *self.correlation)}
+        merged = {key: value for key, value in {**under, **own}.items() if key in type(self).model_fields} | laws
+        merged["estimated"] = [key for key in base.estimated if key not in stated] + self.estimated
+        merged["set"] = [text for key, text in paths(under.get("set", [])).items() if key not in stated] + [
+            *fixed.values()
+        ]
+        merged["correlation"] = [
+            pair for keys, pair in pairs.items() if pair in self.correlation or keys <= laws.keys()
+        ]
+        return merged
 
     @model_validator(mode="before")
     @classmethod

@@ -15,7 +15,7 @@ import doe
 from doe.cli import app
 from doe.report.identity import scene_identity
 from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
-from doe.workflow.calibration import find_calibration, question_of, read_question
+from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
 from doe.workflow.rig import read_rig
 from doe.workflow.signals import cage_speed
 from rbdyn.base.terminal import text
@@ -83,6 +83,16 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"header": HEADER + ",cutoff_hz,numerics.whirl_cutoff_hz", "rows": [f"{row},9,9" for row in ROWS]},
          "column numerics.whirl_cutoff_hz: cutoff_hz sets that key; remove one"),
         ({"header": HEADER + ",", "rows": [f"{row},9" for row in ROWS]}, "column 6 has no name; name it or remove it"),
+        ({"header": HEADER.replace("power_loss_W_sd", "whirl_accuracy_percent")}, "no output whirl is measured here"),
+        ({"header": HEADER + ",power_loss_W_accuracy_percent", "rows": [f"{ROWS[0]},3", f"{ROWS[1]},", f"{ROWS[2]},5"]},
+         "power_loss_W_accuracy_percent in row 3 = 5: is 3 in row 1; a sensor has one accuracy in all rows"),
+        ({"header": HEADER + ",power_loss_W_accuracy_percent", "rows": [f"{ROWS[0]},300", *(f"{row}," for row in ROWS[1:])]},
+         "power_loss_W_accuracy_percent in row 1 = 300: is beyond 100; check the unit"),
+        ({"rows": [*ROWS[:2], "24000,80,80,180,3"]}, "impact_force_N_sd in row 3 = 80: is not below the value itself, 80"),
+        ({"header": HEADER + ",cage_speed_rpm,cage_speed_rpm_sd", "rows": [f"{row},13000,1" for row in ROWS]},
+         "cage_speed_rpm in row 1 = 13000: is above 12000 rpm, the speed of the faster ring (1 of 3 rows); check the columns"),
+        ({"rows": ROWS[:1] * 3}, "all rows have one operating condition, so none predicts another; measure at two at least"),
+        ({"rows": [f"{9000 + row},40,1,40,1" for row in range(150)]}, "150 operating conditions take up to 53550 runs, 50000 at most"),
         ({"rows": [f"{row},40,1,40,1" for row in range(1, 1002)]}, "has 1001 rows; give 1000 at most"),
         ({"rows": [f"{row},40,1,40,1" for row in range(1, 202)]}, "has 201 operating conditions; give 200 at most"),
         ({"rows": ROWS[:2]}, "only 2 rows not on hold; at least 3 are needed"),
@@ -105,6 +115,53 @@ def test_bad_input_ends_in_a_sentence_before_anything_runs(
     assert found.exit_code == 2, found.output
     assert sentence in found.output and "Traceback" not in found.output
     assert not (tmp_path / "out" / "study.sqlite").exists()
+
+
+@pytest.mark.parametrize(
+    "shift",
+    [
+        lambda number, cells: [str(number), *cells],
+        lambda number, cells: [str(number), *cells[:-1]],
+        lambda number, cells: ["", *cells[:-1]],
+        lambda number, cells: [*cells[1:], ""],
+        lambda number, cells: [*cells[1:], cells[0]],
+        lambda number, cells: [cells[0], cells[2], cells[1], *cells[3:]],
+    ],
+    ids=["a field too many", "an index", "blank first", "left", "around", "swapped"],
+)
+def test_shifted_columns_get_one_sentence(tmp_path: Path, shift: Any) -> None:
+    """Command line: not a sentence a cell, and no thousand runs of conditions that were never measured."""
+    rows = [",".join(shift(number, row.split(","))) for number, row in enumerate(ROWS, 1)]
+    found = _run(_files(tmp_path, rows=rows))
+    assert found.exit_code == 2
+    (sentence,) = found.output.strip().splitlines()
+    assert "row 1" in sentence and ("more rows are like it" in sentence or "which may be shifted" in sentence)
+
+
+def test_unit_each_output_has_the_accuracy_of_its_sensor(tmp_path: Path) -> None:
+    """Unit: one value states that of all rows, and a default stands for the others."""
+    header = HEADER + ",impact_force_N_accuracy_percent"
+    _files(tmp_path, header=header, rows=[f"{ROWS[0]},", f"{ROWS[1]},25", f"{ROWS[2]},"])
+    assert read_rig(tmp_path / "rig.csv").accuracies == {"impact_force_N": 0.25, "power_loss_W": 0.03}
+
+
+def test_the_same_table_in_any_form_asks_the_same_bounded_question(tmp_path: Path) -> None:
+    """Unit: decimal commas, semicolons, tabs and UTF-16 take the runs of the plain table."""
+    header, rows, stages = HEADER, ["12000,40.5,1.5,40,1", *ROWS[1:]], []
+    for mark, comma, encoding in (
+        (",", ".", "utf-8"),
+        (";", ",", "utf-8"),
+        ("\t", ",", "utf-16"),
+        (";", ".", "utf-16"),
+    ):
+        scene, _, rig, *_ = _files(tmp_path)
+        text = "\n".join([header, *rows]).replace(",", mark)
+        Path(rig).write_text(text.replace(".", comma).replace(f"operation{comma}", "operation."), encoding)
+        question = read_question(Path(scene), Path(rig), (), ())
+        assert question.rig.rows[0].values == {"impact_force_N": 40.5, "power_loss_W": 40.0}
+        stages.append([(stage.name, stage.runs, stage.most) for stage in calibration_stages(question)])
+    assert stages.count(stages[0]) == 4
+    assert sum(most or runs for _, runs, most in stages[0]) == 3 * (1 + 4 * 64 + 2 * 50)
 
 
 def test_unit_keys_of_a_rig_have_the_types_of_the_scene(tmp_path: Path) -> None:
@@ -315,6 +372,16 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert record["held_out"]["rows"] == "held out" and record["held_out"]["values"] == 6
     assert record["held_out"]["width"]["values"] == 10 and record["held_out"]["width"]["chance"] > 0.05
     assert all(each["explained"] and each["allowed"] == 0.03 for each in record["outputs"].values())
+    assert [each["accuracy_percent"] for each in record["outputs"].values()] == [10.0, 3.0]
+    # The reader first hears which offset could hide, and what it does to the input that the output shows.
+    impact = record["outputs"]["impact_force_N"]
+    first = text(blocks(record)).split("\n\n")[0].replace("\n", " ")
+    assert (
+        first.startswith("calibrated: an offset of the impact force below") and "would not be seen and moves" in first
+    )
+    assert max(impact["moves_sd"], key=impact["moves_sd"].get) == "model.pocket_bar_stiffness_N_m"
+    assert impact["moves"]["model.pocket_bar_stiffness_N_m"] > 0.0 and impact["resolution"] > 0.2
+    assert "absorbed" not in text(blocks(record))
     assert set(record["discrepancy"]) == {"impact_force_N", "power_loss_W"}
     shown = text(blocks(record))
     assert shown.startswith("calibrated") and "identified combination lubricant.oil_fraction^1" in shown
@@ -335,7 +402,7 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
         == made
         == json.loads(_run([scene, "--data", rig, "--out", str(tmp_path / "out"), "--json"]).stdout)
     )
-    assert answer.files == tuple(files_of(made)) and repr(answer).startswith("<CalibrationAnswer: calibrated, ")
+    assert answer.files == tuple(files_of(made)) and repr(answer).startswith("<CalibrationAnswer: calibrated: an")
     inputs = answer.table().set_index("input")
     assert (inputs["low"] < inputs["median"]).all() and inputs["contraction"].between(-1.0, 1.0).all()
     assert answer.table("cells").shape == (16, 13) and set(answer.table("outputs")["output"]) == set(record["outputs"])
@@ -385,6 +452,10 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     record = json.loads(first.stdout)
     assert {"verdict", "learned", "combinations", "discrepancy", "outputs", "held_out", "posterior"} <= set(record)
     assert set(record["learned"]) <= {"cage.mass_g"} and record["verdict"] != "calibrated"
+    # Three rows cannot judge predictions: this is stated before the first run, and again at the end.
+    question = read_question(Path(command[0]), Path(command[2]), ("cage.mass_g",), ())
+    (doubt,) = record["reasons"][-1:]
+    assert design_of(question).doubt == doubt and f"note: {doubt}" in " ".join(first.stderr.split())
     cost, predicted = record["cost"], record["cost"]["predicted"]
     assert predicted["runs"][0] <= cost["runs"] <= predicted["runs"][1]
     assert predicted["turns"][0] <= cost["turns"] <= predicted["turns"][1]

@@ -217,7 +217,7 @@ def test_keys_of_calibration_and_signals():
     assert "\ncalibrate.waves: whole number from 1 to 8, default 4\n" in printed(doe_app, "calibrate")
     assert '\nsignal_kind: "cage_pulses" | "cage_speed"' in printed(doe_app, "signal")
     settings = {rig.TURNS, rig.HOLD, rig.FILE, rig.KIND, rig.PULSES, rig.CUTOFF, rig.STILL, rig.MASS, *rig.SETTINGS}
-    outputs = {name + end for name in rig.OUTPUTS for end in ("", rig.SD)}
+    outputs = {name + end for name in rig.OUTPUTS for end in ("", rig.SD, rig.ACCURACY)}
     assert set(RigTable.model_fields) == settings | outputs
     assert set(get_args(Kind)) == set(signals.KINDS)
     names = {unit for columns in signals.KINDS.values() for column in columns for unit in column.split(" or ")}

@@ -8,6 +8,7 @@ import tomllib
 import pytest
 from doe_command import doe
 
+from doe.clearance import responses_of
 from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
 from doe.study_file.sections import StudyChain, chain_table
@@ -58,8 +59,8 @@ def test_command_line_limits(scene):
 def test_command_line_limits_that_are_refused(scene):
     """Command line: a name, a number, a sign or a pair that cannot be is one sentence each, all at once; exit 2."""
     limits = {
-        "loss<=3": "no response has that name; choose one of impact_force_N, whirl_deviation_ratio, power_loss_W, cage_speed_rpm, cage_slip",
-        "impact_force_N<=abc": "abc is no number; write a plain number",
+        "loss<=3": f"no response has that name; choose one of {', '.join(responses_of(heats=True))}",
+        "impact_force_N<=abc": "abc is no number; write a plain number in N",
         "impact_force_N<=0,5": "0,5 has a decimal comma; write 0.5",
         "impact_force_N<=inf": "inf is not a finite number; write a plain number",
         "impact_force_N": 'is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',

@@ -227,7 +227,7 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
     seen = []
 
     def looked(outcome, folder):
-        seen.append(study_status(outcome.study, folder))
+        seen.append(study_status(outcome.study, out))
         (folder / "answer.txt").write_text("none", encoding="utf-8")
         record = {
             "inputs": outcome.inputs,

@@ -98,16 +98,18 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     from doe.library.effort import registered
     from doe.study_file import Study
     from doe.workflow.runs import run_design
-    from rbdyn.base.command import guarded, output_folder, print_json
+    from rbdyn.base.command import guarded, print_json
+    from rbdyn.base.folder import output_folder
 
     ran = instantly(setattr, seconds)
     if whole:
         unillustrated(setattr)
-        doe_study(study, out, workers, as_json=True)
+        doe_study(study, out, workers=workers, as_json=True)
         print(ran, file=sys.stderr)
         return
-    with guarded(as_json=True), keeping_runs(out), registered(study, out):
-        runs = run_design(Study.load(study), output_folder(out, "doe", study), workers, lambda done, total: None)
+    with guarded(as_json=True), keeping_runs(out), output_folder(out, "doe", ()) as folder, registered(study, out):
+        folder.claim(study)
+        runs = run_design(Study.load(study), out, workers, lambda done, total: None)
         print_json({"values": runs.values.tolist(), "ran": ran})
 
 

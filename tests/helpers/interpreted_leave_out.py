@@ -18,7 +18,13 @@ from rbdyn.accuracy.variants import OPTIONS
 from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
-from rbdyn.contact.rolling_resistance import NoRollingResistance, OpenFilm, RollingResistance, StarvedRollingResistance
+from rbdyn.contact.rolling_resistance import (
+    LayerFilm,
+    NoRollingResistance,
+    OpenFilm,
+    RollingResistance,
+    StarvedRollingResistance,
+)
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
@@ -170,6 +176,7 @@ NEUTRAL = {
         lambda b: b._replace(drag=CylinderDrag(0.0)),
     ),
     # Further laws, which no line of the table of options stands for.
+    "film of a layer thinner than every gap": (itself, lambda b: b._replace(open_film=LayerFilm(1.0, 1.0, 1e-6, 1e6))),
     "schedule in steps": (itself, clocked(Steps)),
     "schedule in smooth ramps": (itself, clocked(SmoothRamps)),
     "traction at rest": (

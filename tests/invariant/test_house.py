@@ -13,7 +13,18 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
-TOP = {".ci", ".gitignore", "LICENSE", "README.md", "doe", "examples", "pyproject.toml", "rbdyn", "tests"}
+TOP = {
+    ".ci",
+    ".gitignore",
+    "CHANGELOG.md",
+    "LICENSE",
+    "README.md",
+    "doe",
+    "examples",
+    "pyproject.toml",
+    "rbdyn",
+    "tests",
+}
 NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
 KERNEL = re.compile(r"kernel|routine|settled_kernel|entry|.*\.body\(|compiled_as\(")
 # Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.

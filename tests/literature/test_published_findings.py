@@ -161,7 +161,7 @@ def test_unit_other_checks_name_their_kinds():
 
 def test_unit_table_4_levels_and_signs():
     """Unit: a level is another model's figure and agrees within its error; a sign is a trend."""
-    from published.table4 import FACTORS, findings
+    from published.chen_2022 import FACTORS, findings
 
     row = {"law": "law", "response": "power_loss_W", "level_ratio": 0.57, "level_ratio_error": 0.02}
     for name, sign in zip(FACTORS, ("same", "opposite", "unclear"), strict=True):

@@ -13,7 +13,8 @@ from numba import njit
 from rbdyn.contact.damping import NoDamping
 from rbdyn.contact.hertz_line import dowson_higginson, palmgren
 from rbdyn.contact.rolling_resistance import NoRollingResistance
-from rbdyn.contact.traction import CoulombTraction, NoTraction, RigidContact
+from rbdyn.contact.tangential import RigidContact
+from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.forces.races import Race, RoundRace, form_at, largest_rise, race_contact, wavy_race
 
 RADIUS, ROLLER, Z = {1.0: 26.25e-3, -1.0: 17.25e-3}, 4.5e-3, 10

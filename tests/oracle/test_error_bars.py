@@ -11,7 +11,7 @@ import pytest
 from rbdyn.accuracy import coverage
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate
+from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate, student_factor
 from rbdyn.dynamics.statistics.error_bars import error_notes, find_transient
 from rbdyn.dynamics.statistics.metrics import bias_scale, companion_error, companion_tolerance
 from rbdyn.dynamics.target import Model, choose, learned, predicted_error, target_of, total_error, valid_target
@@ -91,9 +91,9 @@ def test_unit_companions_looser_where_they_can():
     """Unit: ten times looser up to the loosest a scene may have, else ten times tighter."""
     assert companion_tolerance(1e-2) == pytest.approx(0.1)
     assert companion_tolerance(0.05) == pytest.approx(0.005)
-    ours = Estimate(10.0, 0.3, 40.0)
-    # The difference of 3 and its half-width of 0.6, with three times fewer turns: over nine of a looser one, ten ninths of
-    # a tighter one.
+    ours = Estimate(10.0, 0.3 * student_factor(7), 40.0, 7)
+    # The difference of 3 and its standard error of 0.6, with three times fewer turns: over nine of a looser one, ten ninths
+    # of a tighter one.
     both = math.hypot(3.0, 0.6)
     assert companion_error(ours, 13.0, 3.0, bias_scale(1e-2)) == pytest.approx(both / 9.0)
     assert companion_error(ours, 7.0, 3.0, bias_scale(0.05)) == pytest.approx(both * 10.0 / 9.0)
@@ -149,11 +149,13 @@ def test_literature_transient_of_the_bearing(outer):
 
     short, auto = run(0.0), run("auto")
     assert 5.0 <= short.transient_turns <= 30.0
-    assert any("still drift" in note for note in short.notes)
     assert 5.0 <= auto.transient_turns <= 40.0
     assert not any("numerics.discard_turns" in note for note in auto.notes)
-    # The start has no impacts and little loss.
-    assert auto.power_loss_W.value > short.power_loss_W.value
+    # With the start halves and groups differ: a wide interval holds the settled figure, or none is stated.
+    for name in ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm"):
+        ours, exact = getattr(short, name), getattr(auto, name)
+        error = ours.statistical_error
+        assert error is None or (abs(ours.value - exact.value) < error and error > 3.0 * exact.statistical_error)
 
 
 def test_unit_notes_name_the_figure_and_the_mend(outer):

@@ -1,24 +1,21 @@
 """Inputs found from measurements: closed forms, another sampler, and rigs whose truth is known."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import emcee
 import numpy as np
 import pytest
-from scipy import special, stats
+from scipy import integrate, special, stats
 
 from doe.unknown.calibration import (
     MOST,
     Batch,
-    Explanation,
     Judgement,
     Matched,
     Particles,
-    Scores,
-    Trial,
     Unknowns,
-    Width,
     bayes_factor,
     by_others,
     held_out,
@@ -26,23 +23,25 @@ from doe.unknown.calibration import (
     matched,
     objections,
     reweighed,
-    scores_of,
-    width,
 )
+from doe.unknown.offsets import STRONG, unseen_offsets
 from doe.unknown.posterior import (
     BEYOND,
     BY_ROW,
     SHARE,
     WIDER,
+    Errors,
     Joint,
     Measured,
     contraction,
     contraction_words,
     densest_intervals,
     fit_cells,
+    joint,
     learnt,
     sampled,
 )
+from doe.unknown.width import Scores, power_of, scores_of, width
 from rbdyn.base.arrays import Array
 
 ROWS, OUTPUTS, INPUTS = 8, 2, 3
@@ -71,16 +70,24 @@ def _simulate(truth: Callable[[Array], Array], seed: int) -> Callable[[Array, in
     return simulate
 
 
-def _measured(values: Array, scale: float, held: tuple[int, ...] = ()) -> Measured:
+def _measured(values: Array, scale: float, held: tuple[int, ...] = (), accuracy: float = 0.0) -> Measured:
     row = np.tile(np.arange(ROWS), OUTPUTS)
     output = np.repeat(np.arange(OUTPUTS), ROWS)
-    return Measured(values, RIG**2, output, row, np.full(OUTPUTS, scale), np.isin(row, held))
+    return Measured(
+        values, RIG**2, output, row, np.full(OUTPUTS, scale), np.isin(row, held), np.full(OUTPUTS, accuracy)
+    )
 
 
 def _found(
-    values: Array, scale: float, seed: int, truth: Callable[[Array], Array] = _truth, held: tuple[int, ...] = ()
+    values: Array,
+    scale: float,
+    seed: int,
+    truth: Callable[[Array], Array] = _truth,
+    held: tuple[int, ...] = (),
+    accuracy: float = 0.0,
 ) -> Matched:
-    return matched(_simulate(truth, seed), _measured(values, scale, held), Unknowns(INPUTS), seed, particles=1000)
+    measured = _measured(values, scale, held, accuracy)
+    return matched(_simulate(truth, seed), measured, Unknowns(INPUTS), seed, particles=1000)
 
 
 def _covered(found: Matched, truth: Array) -> Array:
@@ -143,6 +150,84 @@ def test_cells_are_jointly_normal_as_by_the_whole_covariance() -> None:
         _, apart, common = cells.conditional(values, known[:0], asked)
         whole_asked = whole[np.ix_(asked, asked)]
         assert np.diag(apart[place]) + common[place] @ common[place].T == pytest.approx(whole_asked, rel=1e-12)
+
+
+def test_the_offset_of_a_sensor_is_integrated_out_as_by_quadrature() -> None:
+    """The covariance with a rank-one term an output gives the mean of the likelihood over both offsets, by Gauss-Hermite."""
+    values, accuracy = _truth(np.array([[0.6, 0.4, 0.5]]))[0] + np.repeat([0.12, -0.2], ROWS), 0.1
+    random = np.random.default_rng(4)
+    cells = fit_cells(*_simulate(_truth, 4)(random.random((96, INPUTS)), 0), allowance=RIG**2)
+    quantiles, level = random.random((5, INPUTS)), np.full((5, OUTPUTS), 0.03)
+    errors = Errors(level, level, np.zeros(level.shape, bool))
+    places = np.arange(values.size)
+    closed = joint(cells, _measured(values, 0.03, accuracy=accuracy), quantiles, errors).log_density(values, places)
+    bare = joint(cells, _measured(values, 0.03), quantiles, errors)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(120)
+    logs = [
+        bare.log_density(values - accuracy * np.repeat([one, two], ROWS), places)
+        + np.log(share * other / (2.0 * np.pi))
+        for one, share in zip(nodes, weights, strict=True)
+        for two, other in zip(nodes, weights, strict=True)
+        if share * other > 1e-30
+    ]
+    assert closed == pytest.approx(special.logsumexp(logs, axis=0), abs=1e-6)
+
+
+def test_an_unseen_offset_is_that_of_the_dense_algebra() -> None:
+    """The estimate's variance and the move of the inputs, by the inverse of the whole covariance."""
+    random = np.random.default_rng(5)
+    cells = fit_cells(*_simulate(_truth, 5)(random.random((96, INPUTS)), 0), allowance=RIG**2)
+    measured = replace(_measured(np.zeros(16), 0.02, accuracy=0.05), spread=np.full(OUTPUTS, 0.3))
+    centre = np.array([0.3, -0.2, 0.0])
+    first = unseen_offsets(cells, measured, special.ndtr, centre)[0]
+    assert first is not None
+    steps = np.vstack([centre + 0.5 * np.eye(INPUTS), centre - 0.5 * np.eye(INPUTS)])
+    means, doubt = cells.mean(special.ndtr(steps)), cells.predict(special.ndtr(centre[None]))[1][0]
+    slopes, ones = (means[:INPUTS] - means[INPUTS:]).T, np.repeat([1.0, 0.0], ROWS)
+    other = np.outer(1.0 - ones, 1.0 - ones) * (0.02**2 + 0.05**2)
+    whole = np.diag(RIG**2 + cells.rest + (BY_ROW * 0.02) ** 2) + doubt @ doubt.T + slopes @ slopes.T + other
+    variance = 1.0 / (ones @ np.linalg.solve(whole, ones))
+    moved = slopes.T @ np.linalg.solve(whole + np.outer(ones, ones) * (0.02**2 + 0.05**2), ones) * first.offset
+    assert first.moves == pytest.approx(moved, rel=1e-8)
+
+    def density(scale: float) -> float:
+        def at(tau: float) -> float:
+            sd = np.sqrt(variance + 0.05**2 + tau**2)
+            return float(stats.norm.pdf(first.offset, 0.0, sd) * stats.halfnorm(scale=scale).pdf(tau))
+
+        return float(integrate.quad(at, 0.0, 8.0 * scale)[0])
+
+    assert 0.5 * density(0.3) / density(0.02) == pytest.approx(STRONG, rel=5e-3)
+
+
+def test_an_offset_below_the_unseen_one_moves_inputs_and_one_above_is_found() -> None:
+    """The linear estimate against the whole calibration of rigs whose first sensor is off."""
+    values = _truth(np.array([[0.6, 0.4, 0.5]]))[0]
+    sound = _found(values, np.nan, 6, accuracy=0.03)
+    unseen = _against(sound)[1].outputs[0].unseen
+    assert unseen is not None and sound.sampled is not None
+    for factor, hidden in ((0.4, True), (2.0, False)):
+        off = _found(values + np.repeat([factor * unseen.offset, 0.0], ROWS), np.nan, 6, accuracy=0.03)
+        assert off.sampled is not None
+        assert _against(off)[1].outputs[0].explained is hidden
+        if hidden:
+            moved = (off.sampled.points.mean(axis=0) - sound.sampled.points.mean(axis=0))[0]
+            assert moved == pytest.approx(factor * unseen.moves[0], rel=0.5) and moved > 0.0
+
+
+@pytest.mark.slow
+def test_intervals_of_rigs_with_sensors_of_stated_accuracy_cover_as_often_as_they_say() -> None:
+    """Sensors that are 10 % off, as a standard deviation, in both outputs: intervals hold the inputs if this is stated."""
+    random = np.random.default_rng(11)
+    covered: dict[float, list[Any]] = {0.1: [], 0.0: []}
+    for seed in range(30):
+        truth = random.random(INPUTS)
+        offsets = np.repeat(0.1 * random.standard_normal(OUTPUTS), ROWS)
+        values = _truth(truth[None])[0] + offsets + RIG * random.standard_normal(RIG.size)
+        for accuracy, insides in covered.items():
+            insides.append(_covered(_found(values, 0.02, seed, accuracy=accuracy), truth)[:2])
+    assert 0.83 <= np.mean(covered[0.1]) <= 0.97
+    assert np.mean(covered[0.0]) < np.mean(covered[0.1]) - 0.05
 
 
 def test_components_foretell_all_cells_within_their_doubt() -> None:
@@ -228,12 +313,33 @@ def test_width_names_the_output_and_knows_what_it_cannot_tell() -> None:
     truths, draws = random.standard_normal((16, 3)) * [1.0, 0.3, 1.0], random.standard_normal((16, 800, 3))
     parts = [scores_of(one, truth, np.arange(3)) for one, truth in zip(draws, truths, strict=True)]
     found = width(parts)
-    assert found.rejected and found.enough and found.output == 1 and found.worst == pytest.approx(0.3, abs=0.1)
-    # Squares of six standard normals, halved or doubled, against their limits.
-    few = width([Scores(np.zeros(6), random.standard_normal((20_000, 6)), np.zeros(6, int))])
+    assert found.rejected and found.output == 1 and found.worst == pytest.approx(0.3, abs=0.1)
+    assert width([Scores(np.zeros(6), random.standard_normal((20_000, 6)), np.zeros(6, int))]).chance < 0.001
+
+
+def _power(rows: int, outputs: int, held: int = 0, seed: int = 1) -> tuple[int, float, float, bool]:
+    row = np.repeat(np.arange(rows), outputs)
+    power = power_of(np.tile(np.arange(outputs), rows), row, row < held, seed)
+    return power.cells, power.wide, power.narrow, power.enough
+
+
+def test_a_design_says_before_any_run_what_it_can_judge() -> None:
+    """The power is that of chi-square limits, follows from the design alone, and decides as many tables of it do."""
+    # Of 12 rows of one output six are predicted: squares of six standard normals, halved or doubled, against their limits.
+    cells, wide, narrow, enough = _power(12, 1)
     low, high = stats.chi2(6).ppf([0.025, 0.975])
-    assert few.power == pytest.approx((stats.chi2(6).cdf(4.0 * low), stats.chi2(6).sf(high / 4.0)), abs=0.02)
-    assert not few.enough and few.chance < 0.001
+    assert cells == 6 and not enough
+    assert [wide, narrow] == pytest.approx([stats.chi2(6).cdf(4.0 * low), stats.chi2(6).sf(high / 4.0)], abs=0.015)
+    # Which rows are predicted changes nothing where all have the same outputs; rows that are held out are predicted too.
+    assert len({_power(8, 3, seed=seed) for seed in range(20)}) == 1
+    assert _power(8, 2)[0] == 8 and _power(8, 2, held=3)[0] == 2 * (2 + 3)
+    assert [_power(rows, 3)[3] for rows in (4, 6, 8, 16)] == [False, False, True, True]
+    for factor, power in ((0.5, wide), (2.0, narrow)):
+        random, rejected = np.random.default_rng(3), 0
+        for _ in range(300):
+            scores = Scores(random.standard_normal(6) * factor, random.standard_normal((800, 6)), np.zeros(6, int))
+            rejected += width([scores]).rejected
+        assert rejected / 300 == pytest.approx(power, abs=0.1)
 
 
 def test_a_factor_of_evidence_is_a_ratio_of_odds() -> None:
@@ -339,25 +445,19 @@ def test_a_biased_sensor_is_named_with_its_bias() -> None:
     against, judgement = _against(found)
     impact, loss = judgement.outputs
     assert impact.explained and not loss.explained and loss.evidence is not None and loss.evidence > 100.0
-    assert loss.bias[1] < np.log(1.2) < loss.bias[2] and loss.resolution is not None and loss.resolution < np.log(1.2)
+    assert loss.bias[1] < np.log(1.2) < loss.bias[2] and loss.unseen is not None and loss.unseen.offset < np.log(1.2)
     assert any(each.startswith("loss is not explained") and "sensor" in each for each in against)
     # Stated as allowed, it is none against.
     assert all(each.explained for each in _against(_found(values, 0.2, 8))[1].outputs)
+    assert all(each.explained for each in _against(_found(values, np.nan, 8, accuracy=0.2))[1].outputs)
 
 
-def test_predictions_too_wide_are_a_reason_as_are_too_few_of_them() -> None:
+def test_predictions_too_wide_are_a_reason() -> None:
     """A table whose sensors are ten times as good as they state."""
     random = np.random.default_rng(9)
     values = _truth(np.array([[0.6, 0.4, 0.5]]))[0] + 0.1 * RIG * random.standard_normal(RIG.size)
     against, _ = _against(_found(values, np.nan, 9))
     assert any("too wide" in each for each in against)
-    explained = Explanation("loss", (0.0, 0.0, 0.0), 0.1, 0.5, None)
-    few = Trial(True, 6, 6, 0.1, 0.2, Width(6, 1.0, 0.5, None, 1.0, (0.4, 0.7)))
-    (told,) = objections(
-        Judgement(few, [explained], 0.5, np.zeros(6), Particles([], [], _measured(values, 0.1))),
-        anything=True, emulated=True,
-    )  # fmt: skip
-    assert "6 predicted values are too few" in told and "show in 40 %" in told
 
 
 def test_what_no_input_set_gives_is_refuted_by_the_cells_that_do_it() -> None:

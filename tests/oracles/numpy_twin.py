@@ -102,7 +102,7 @@ def race(scene, mass, ring, roller, radius, encloses, coefficient):
     if scene.model.open_contact_film and not encloses and middle < 0.0:
         film = open_contact(scene, ring, roller, radius, -middle)
     if elastic == 0.0:
-        return 0.0, *film, 0.0, elastic_traction(scene, 0.0, 0.0, coefficient, 0.0, 0.0)[1]
+        return 0.0, *film, 0.0, elastic_traction(scene, 0.0, abs, coefficient, 0.0, 0.0)[1]
     if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
         # Virtual work: the load times how the overlap changes with the centre and with the angle of the ring, each by
         # a step of 1e-30 along the imaginary axis, which loses no digits.
@@ -127,8 +127,11 @@ def race(scene, mass, ring, roller, radius, encloses, coefficient):
     lever = float((point - ring.centre) @ outward)
     roller_surface = (roller.spin - line_spin) * float((point - roller.centre) @ outward)
     mean_speed = 0.5 * (roller_surface + (ring.spin - line_spin) * lever)
-    steady = race_traction(scene, encloses, slip, load)
-    acting, following = elastic_traction(scene, load, steady, coefficient, slip, stiffness)
+
+    def curve(speed):
+        return race_traction(scene, encloses, speed, load)
+
+    acting, following = elastic_traction(scene, load, curve, coefficient, slip, stiffness)
     traction = acting * load
     roller.push(traction * tangent, point)
     ring.push(-traction * tangent, point)

@@ -277,28 +277,54 @@ def roller_mass(scene):
     return scene.material("roller").density * volume
 
 
-def elastic_traction(scene, load, steady, coefficient, slip, stiffness):
-    """Traction coefficient that acts and the rate of the state: the steady law in series with a spring of the contact's normal
-    stiffness and a damper beside it; no relaxation is shorter than a radian of the most loaded roller's vibration."""
+def elastic_traction(scene, load, curve, coefficient, slip, stiffness):
+    """Traction coefficient that acts and the rate of the state: the steady ``curve`` over the slip, a power law near it, in series
+    with a spring of the contact's normal stiffness and a damper beside it. Times below a radian of the most loaded roller's
+    vibration are as long as that, and what acts at once keeps the integral of the lag."""
     if not scene.traction.elasticity:
-        return steady, 0.0
+        return curve(slip) if load > 0.0 else 0.0, 0.0
     most = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
     length, mass = scene.bearing.effective_length_mm * 1e-3, roller_mass(scene)
     approach = (most / palmgren_stiffness(scene, "roller", "rings", length)) ** 0.9
     spring = 10.0 / 9.0 * most / approach
-    creep = abs(steady * load / slip) / stiffness if load > 0.0 else 0.0
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
-    relaxation, damping = creep + (mass / (2.0 * spring)) ** 0.5, 2.0 * ratio * (mass / 3.0 / spring) ** 0.5
-    acting = (relaxation * coefficient + damping * steady) / (relaxation + damping)
-    return acting, ((steady if load > 0.0 else 0.0) - coefficient) / (relaxation + damping)
+    shortest, damping = 0.75 * (mass / (2.0 * spring)) ** 0.5, 2.0 * ratio * (mass / 3.0 / spring) ** 0.5
+    dying = coefficient / (shortest + damping)
+    if load == 0.0:
+        return coefficient, -dying
+    steady, step = curve(slip), 1e-5
+    steepness = math.log(curve(slip * math.exp(step)) / curve(slip * math.exp(-step))) / (2.0 * step)
+    rise = steady * load / slip / stiffness
+    last = rise * float(np.clip(steepness, 1.0 / 12.0, 1.0))
+    longer, later = max(rise, shortest), max(last, shortest)
+    exponent = (longer + damping) / (later + damping)
+    along = coefficient / steady
+    size = abs(along) ** exponent if abs(along) < 1.0 else 1.0 + exponent * (abs(along) - 1.0)
+    rate = steady * (1.0 - math.copysign(size, along)) / (longer + damping)
+    acting = coefficient + rate * (damping + longer - longer * (rise + last) / (longer + later))
+    # The state fades in over the first hundredth of the load of the most loaded roller.
+    share = float(np.clip(100.0 * load / most, 0.0, 1.0))
+    share = 3.0 * share**2 - 2.0 * share**3
+    return acting, share * rate - (1.0 - share) * dying
 
 
 def open_film(scene, gap):
     """Rolling force per surface over the entrainment speed, and sliding force over the slip, of the film in an open inner
-    contact [N s/m]: Reynolds's equation by quadrature."""
+    contact [N s/m]: Reynolds's equation by quadrature, from the meniscus where the gap has the layer's thickness."""
     oil, length, radius = oil_of(scene), scene.bearing.effective_length_mm * 1e-3, reduced_radius(scene, False)
     lubricant, speed = scene.lubricant, nominal_entrainment(scene)
-    meniscus = lubricant.inlet_distance or 1e12
+    heating = oil.viscosity_slope * speed**2 / oil.conductivity
+    thermal = scene.model.rolling_resistance_factor / (1.0 + 0.29 * heating**0.78)
+    stiffness = palmgren_stiffness(scene, "roller", "rings", length)
+    bearing = 4.895 * oil.viscosity * speed * radius * length
+    oil_gap = brentq(lambda h: stiffness * h ** (10.0 / 9.0) - bearing / h, 1e-12, 1e-3, **EXACT)
+    touching = max(oil_gap, math.hypot(lubricant.roller_roughness_um, lubricant.race_roughness_um) * 1e-6)
+    size = math.hypot(gap, touching)
+    scale = math.sqrt(2.0 * radius) * oil.viscosity * length * gap / size**1.5
+    layer = math.inf if lubricant.inlet_distance is None else scene.once("twin_layer", lambda: oil_layer(scene))
+    if size >= layer:
+        return 0.0, 0.0
+    meniscus = min(math.sqrt(layer / size - 1.0), 1e12)
     end = film_end(meniscus)
     passing = 1.0 + end * end
     # With h = 1 + x^2 and the flow of the film's end: pressure gradient (h - passing)/h^3; streamers fill passing/h.
@@ -306,15 +332,37 @@ def open_film(scene, gap):
                    math.asinh(-meniscus), math.asinh(end), epsabs=1e-14, limit=400)[0]  # fmt: skip
     film = quad(lambda s: 1.0 / math.cosh(s), math.asinh(-meniscus), math.asinh(end), epsabs=1e-14, limit=400)[0]
     streamers = quad(lambda x: passing / (1.0 + x * x) ** 2, end, math.inf, epsabs=1e-14)[0]
-    heating = oil.viscosity_slope * speed**2 / oil.conductivity
-    thermal = scene.model.rolling_resistance_factor / (1.0 + 0.29 * heating**0.78)
-    stiffness = palmgren_stiffness(scene, "roller", "rings", length)
-    bearing = 4.895 * oil.viscosity * speed * radius * length
-    oil_gap = brentq(lambda h: stiffness * h ** (10.0 / 9.0) - bearing / h, 1e-12, 1e-3, **EXACT)
-    touching = max(oil_gap, math.hypot(lubricant.roller_roughness_um, lubricant.race_roughness_um) * 1e-6)
-    root = gap / (gap**2 + touching**2) ** 0.75
-    scale = math.sqrt(2.0 * radius) * oil.viscosity * length * root
-    return 6.0 * scale * thermal * rolling, scale * (film + streamers)
+    fading = min(50.0 * (1.0 - size / layer), 1.0)
+    return 6.0 * scale * thermal * rolling, scale * (film + streamers) * fading
+
+
+def oil_layer(scene):
+    """Gap [m] at the meniscus of the inner contact with the mean load of static equilibrium, at eight places of the cage."""
+    drawing, load = scene.bearing, scene.operation.radial_load_N
+    stiffness = palmgren_stiffness(scene, "roller", "rings", drawing.effective_length_mm * 1e-3)
+    outer, inner = raceways(scene)
+    place = 0.5 * (outer + inner)
+    turning = (scene.operation.inner_speed_rpm * inner + scene.operation.outer_speed_rpm * outer) / (outer + inner)
+    thrown = roller_mass(scene) * place * (turning * math.pi / 30.0) ** 2
+
+    def pressed(closing):
+        """Inner load of a roller between races that approach by ``closing``, which throws itself outwards."""
+        if closing <= (thrown / stiffness) ** 0.9:
+            return 0.0
+        ends = (thrown / stiffness) ** 0.9, closing
+        outside = brentq(lambda x: stiffness * (x ** (10 / 9) - (closing - x) ** (10 / 9)) - thrown, *ends, **EXACT)
+        return stiffness * (closing - outside) ** (10.0 / 9.0)
+
+    loads, loose = [], 0.5e-3 * scene.mounted_clearance_mm
+    for position in range(8):
+        cosines = np.cos(2.0 * np.pi * (np.arange(drawing.rollers) + (position + 0.5) / 8.0) / drawing.rollers)
+        found = brentq(lambda d, c=cosines: sum(pressed(d * x - loose) * x for x in c) - load, 0.0, 1e-3, xtol=1e-16)
+        loads += [pressed(found * x - loose) for x in cosines]
+    mean = float(np.mean([each for each in loads if each > 0.0]))
+    contact, oil, m = rolling_contact(scene, False), oil_of(scene), 1.0 + scene.lubricant.inlet_distance
+    film = film_thickness.film_in_service(contact, oil, mean, scene.lubricant.inlet_distance)
+    ahead = m * math.sqrt(m * m - 1.0) - math.acosh(m)
+    return float(film) + ahead * 4.0 * mean / (math.pi * contact.equivalent_modulus * contact.length)
 
 
 @functools.cache

@@ -293,7 +293,7 @@ def test_command_refuses_a_file_for_a_folder(tmp_path, command):
     (tmp_path / "taken").write_text("")
     ran = command("manual", "--out", tmp_path / "taken")
     assert ran.returncode == 2
-    assert len(ran.stderr.splitlines()) == 1 and "check the path" in ran.stderr
+    assert len(ran.stderr.splitlines()) == 1 and "cannot be written to (Not a directory)" in ran.stderr
 
 
 def test_readme_is_short_and_leads_somewhere():

@@ -20,6 +20,7 @@ from doe.workflow.input_sets import read_sample
 from doe.workflow.rig import OUTPUTS, PULSE_OUTPUTS, Rig, read_rig
 from doe.workflow.runs import read_runs
 from doe.workflow.signals import Mean, cage_speed, whirl
+from rbdyn.base.faults import InputError
 from rbdyn.scene.uncertain import Law
 
 PULSE_COLUMNS = {"threshold_N": "numerics.pulse_threshold_N", "bandwidth_hz": "numerics.pulse_bandwidth_hz"}
@@ -103,11 +104,12 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
     outputs = draw.sample(OUTPUTS, draw.randrange(1, 4))
     signal = ["signal_file", "signal_kind"] if "cage_speed_rpm" not in outputs and draw.random() < 0.4 else []
     pulses = ["threshold_N", "bandwidth_hz"] if not set(outputs).isdisjoint(PULSE_OUTPUTS) else []
-    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal, *pulses]
+    accuracy = [f"{name}_accuracy_percent" for name in outputs if draw.random() < 0.3]
+    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal, *pulses, *accuracy]
     rows = [header]
     for _ in range(draw.randrange(3, 9)):
         measured = [f"{draw.lognormvariate(3.0, 2.0):.{draw.randrange(1, 17)}g}" for _ in outputs]
-        sds = [draw.choice(["", "0.1", "2", "1e-3"]) for _ in outputs]
+        sds = [draw.choice(["", repr(0.05 * float(value)), "1e-3"]) for value in measured]
         turns = draw.choice(["40", "1e3"]) if "" in sds else ""
         raw = draw.choice([["", ""], ["signal.csv", "cage_speed"]]) if signal else []
         rows.append(
@@ -119,6 +121,7 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
                 draw.choice(["", "0", "no"]),
                 *raw,
                 *("20", "5e3")[: len(pulses)],
+                *(draw.choice(("", "4")) for _ in accuracy),
             ]
         )
     return rows
@@ -136,6 +139,9 @@ def check_rig(data: bytes, rig: Rig) -> None:
                 check_value(name, text, row.keys[name])
             elif name in OUTPUTS:
                 assert (name in row.values and row.values[name] == number(text)) or blank
+            elif name.removesuffix("_accuracy_percent") in OUTPUTS:
+                stated = rig.accuracies[name.removesuffix("_accuracy_percent")]
+                assert blank or stated == pytest.approx(0.01 * number(text), rel=1e-12)
             elif name.removesuffix("_sd") in OUTPUTS:
                 assert (row.sds.get(name.removesuffix("_sd")) == number(text)) or blank
             elif name == "turns":
@@ -207,6 +213,77 @@ def test_rig_tables_are_read_as_written_or_refused(tmp_path, fuzz_cases):
     """Fuzz: each row's conditions, measurements, deviations, turns, hold and signal are those of its cells."""
     (tmp_path / "signal.csv").write_bytes(written([*speeds(random.Random(1)), ["1e4", "9400"]]))
     run_cases(tmp_path / "rig.csv", fuzz_cases, 1, rig_rows, read_rig, check_rig)
+
+
+def careless_rig(draw: random.Random) -> list[list[str]]:
+    """A sound rig with whole columns: speed and load, then two or three outputs, each with its deviation, and hold."""
+    outputs = draw.sample(
+        ("impact_force_N", "power_loss_W", "cage_speed_rpm", "whirl_deviation_ratio"), draw.randrange(2, 4)
+    )
+    sizes = {"impact_force_N": 60.0, "power_loss_W": 150.5, "cage_speed_rpm": 5000.0, "whirl_deviation_ratio": 0.5}
+    columns = [column for name in outputs for column in (name, f"{name}_sd")]
+    rows = [["operation.inner_speed_rpm", "operation.radial_load_N", *columns, "hold"]]
+    for _ in range(draw.randrange(4, 12)):
+        values = [sizes[name] * draw.uniform(0.5, 1.5) for name in outputs]
+        cells = [f"{each:.5g}" for value in values for each in (value, value * draw.uniform(0.003, 0.05))]
+        rows.append(
+            [
+                str(draw.randrange(9000, 25000)),
+                f"{draw.uniform(300.0, 3000.0):.1f}",
+                *cells,
+                draw.choice(("", "0", "1", "no")),
+            ]
+        )
+    return rows
+
+
+def shifted(draw: random.Random, rows: list[list[str]]) -> list[list[str]]:
+    """The cells one or more columns beside their names: an index or a blank in front, a column lost, or two exchanged."""
+    kind, width = draw.randrange(5), len(rows[0])
+    first, second = draw.choice([(0, 2), (1, 3), (2, 3), (4, 5), (3, 4)])
+    order = list(range(width))
+    order[first], order[second] = order[second], order[first]
+    moved = [
+        [str(number), *row] if kind == 0 else [str(number), *row[:-1]] if kind == 1 else ["", *row[:-1]] if kind == 2
+        else [*row[1:], ""] if kind == 3 else [row[place] for place in order]
+        for number, row in enumerate(rows[1:], 1)
+    ]  # fmt: skip
+    return [rows[0], *moved]
+
+
+@pytest.mark.slow
+def test_careless_rigs_ask_the_same_question_or_get_one_sentence(tmp_path, fuzz_cases):
+    """Fuzz: marks, separators and encodings change nothing; shifted columns are refused in one sentence, or are as plausible."""
+    draw, path, ends = (
+        random.Random(7),
+        tmp_path / "rig.csv",
+        {"same": 0, "one sentence": 0, "several": 0, "plausible": 0, "too few rows": 0},
+    )
+    for _ in range(fuzz_cases):
+        rows = careless_rig(draw)
+        path.write_bytes(written(rows))
+        if sum(row[-1] != "1" for row in rows[1:]) < 3:
+            assert outcome(read_rig, path) == "refused"
+            ends["too few rows"] += 1
+            continue
+        plain = read_rig(path)
+        if draw.random() < 0.5:
+            mark, comma = draw.choice(((";", ","), (";", "."), ("\t", ","), ("\t", "."), (",", ".")))
+            body = [[cell.replace(".", comma) for cell in row] for row in rows[1:]]
+            text = "\r\n".join(mark.join(row) for row in (rows[0], *body)) + "\r\n"
+            path.write_bytes(text.encode(draw.choice(("utf-8", "utf-8-sig", "utf-16"))))
+            again = read_rig(path)
+            assert (again.rows, again.outputs, again.accuracies) == (plain.rows, plain.outputs, plain.accuracies)
+            ends["same"] += 1
+            continue
+        path.write_bytes(written(shifted(draw, rows)))
+        try:
+            read_rig(path)
+            ends["plausible"] += 1
+        except InputError as error:
+            ends["one sentence" if len(error.faults) == 1 else "several"] += 1
+    print(ends)
+    assert ends["same"] > fuzz_cases // 4 and ends["one sentence"] > 5 * (ends["plausible"] + ends["several"])
 
 
 @pytest.mark.slow

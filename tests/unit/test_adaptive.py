@@ -113,7 +113,7 @@ def test_what_gains_next_to_nothing_for_much_is_no_front():
 
 
 def state(gained):
-    return Batch(20, 1.0, 0.04, gained, 0.1, "improvement")
+    return Batch(20, 1.0, 0.04, gained, 0.1, 0.05, "improvement")
 
 
 def test_three_batches_in_a_row_must_gain_nothing():

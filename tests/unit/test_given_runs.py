@@ -11,7 +11,7 @@ from short_studies import SHORT, short_study, silent
 
 from doe.report.files import write
 from doe.study_file import Study
-from doe.workflow.runs import actual_of, check_augment, design_of, evaluation, ordered_runs, run_design
+from doe.workflow.runs import actual_of, design_of, evaluation, ordered_runs, run_design
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
@@ -96,13 +96,6 @@ def test_impossible_tables_are_named(tmp_path, old, new, words):
         design_of(augmented(tmp_path, table))
     (fault,) = refused.value.faults
     assert fault.startswith(f"{tmp_path / 'study.toml'}: design.augment = 'made.csv': ") and words in fault
-
-
-def test_a_study_does_not_read_what_it_writes(tmp_path):
-    study = augmented(tmp_path, lines=PLACED.replace("made.csv", "out/design_runs.csv"))
-    check_augment(study, tmp_path / "elsewhere")
-    with pytest.raises(InputError, match=r"the study writes its own runs to this file; copy it next to the study"):
-        check_augment(study, tmp_path / "out")
 
 
 def test_a_row_that_is_no_whole_number_is_named(tmp_path):

@@ -137,7 +137,11 @@ def test_unit_set_makes_a_documented_input_known() -> None:
     case = _case_with({"set": ["cage.imbalance_um=7.0", "traction.model=eyring"]})
     keys = [each.key for each in case.every]
     assert "cage.imbalance_um" not in keys and "traction.mu_m" not in keys and "traction.eyring_stress_MPa" in keys
-    assert case.notes == ("known by uncertain.set, so without their documented range: cage.imbalance_um",)
+    (note,) = case.notes
+    assert note.startswith(
+        f"{len(keys)} of {len(keys) + 4} inputs vary, the others count as exact (known by uncertain.set: cage.imb"
+    )
+    assert "uncertain.defaults: bearing.effective_length_mm, cage.mass_g, lubricant.temperature_C)" in note
     (scene,) = case.scenes(case.every[:1], [{case.every[0].key: 1.0}], 0)
     assert isinstance(scene, Scene) and scene.cage.imbalance_um == 7.0 and scene.traction.model == "eyring"
 
@@ -149,7 +153,7 @@ def test_unit_estimated_keys_vary_whatever_the_defaults() -> None:
     ]
     case = _case_with({"defaults": "none", "estimated": ["traction.model", "lubricant.roller_roughness_um"]})
     assert [each.key for each in case.every] == ["traction.model"]
-    assert case.notes == (
+    assert case.notes[0].startswith("1 of 27 inputs vary") and case.notes[1:] == (
         "estimated, but without effect in this scene, so they do not vary: lubricant.roller_roughness_um",
     )
 

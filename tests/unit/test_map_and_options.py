@@ -17,8 +17,9 @@ from conftest import lacking
 from rbdyn import accuracy
 from rbdyn.accuracy.variants import OPTIONS, option_costs, study_options, with_options
 from rbdyn.base.faults import InputError, axis_values
+from rbdyn.cli.app import MAP_POINTS
 from rbdyn.cli.app import _write_map as write
-from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
+from rbdyn.dynamics.slip_map import FIGURES, slip_map
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
@@ -64,7 +65,7 @@ def test_physics_light_load_slips_more(found):
 
 def test_unit_map_saves_table_picture_and_json(found, tmp_path, drawn):
     """Unit: files are whole; the table has a row a point and a column an error."""
-    files = write(found, tmp_path)
+    files = write(found, None, tmp_path)
     saved = json.loads((tmp_path / "map.json").read_text())
     assert files == ["map.json", "map.csv", "map.png"]
     assert not lacking(drawn["map.png"], [100.0 * found.grid("cage_slip"), found.grid("power_loss_W")])
@@ -107,7 +108,7 @@ def interrupt(done: int, total: int) -> None:
 
 def test_unit_interrupted_map_goes_on_with_the_same_bits(outer, found, tmp_path, monkeypatch):
     """Unit: what was finished is not run again; figures equal those of an uninterrupted map to the last bit."""
-    path = tmp_path / POINTS
+    path = tmp_path / MAP_POINTS
     ran = counted(monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         slip_map(outer, SPEEDS, LOADS, 1, interrupt, path)
@@ -127,7 +128,7 @@ def test_unit_interrupted_map_goes_on_with_the_same_bits(outer, found, tmp_path,
 def test_unit_map_of_another_scene_or_code_runs_again(make_scene, tmp_path, monkeypatch):
     """Unit: a kept point is of its scene and of the code that ran it; a failed one is kept with its cause."""
     budget = ("numerics.step_budget_per_turn=100", "numerics.method=rk45")
-    place = ((24000.0,), (1300.0,), 1, None, tmp_path / POINTS)
+    place = ((24000.0,), (1300.0,), 1, None, tmp_path / MAP_POINTS)
     ran = counted(monkeypatch)
     first = slip_map(make_scene(*budget), *place)
     assert slip_map(make_scene(*budget), *place).points == first.points and len(ran) == 2
@@ -153,16 +154,19 @@ def test_command_line_killed_map_resumes(command, tmp_path):
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )  # fmt: skip
         deadline = time.monotonic() + 120.0
-        while time.monotonic() < deadline and not ((out / POINTS).exists() and lines(out / POINTS) >= count):
+        while time.monotonic() < deadline and not ((out / MAP_POINTS).exists() and lines(out / MAP_POINTS) >= count):
             time.sleep(0.01)
         process.send_signal(number)
         _, said = process.communicate()
         assert process.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130), said
-    assert said.strip() == f"interrupted; finished parts are saved in {out / POINTS}; start the command again to resume"
-    assert 3 <= lines(out / POINTS) < 6
+    assert (
+        said.strip()
+        == f"interrupted; finished parts are saved in {out / MAP_POINTS}; start the command again to resume"
+    )
+    assert 3 <= lines(out / MAP_POINTS) < 6
     assert command(*arguments, "--out", out).returncode == 0
     one, two = (json.loads((folder / "map.json").read_text()) for folder in (tmp_path / "whole", out))
-    assert one["points"] == two["points"] and lines(out / POINTS) == 6
+    assert one["points"] == two["points"] and lines(out / MAP_POINTS) == 6
     # Long enough to be under way when the signal comes, however fast the machine.
     long = [{"60": "20000"}.get(each, each) for each in arguments]
     stopped = subprocess.Popen(

@@ -68,12 +68,12 @@ def test_unit_points_have_their_lives_and_notes(outer, path):
 def test_unit_map_files_with_a_duty(outer, path, mapped, tmp_path, drawn):
     """Unit: map.json and duty.csv have the points, the picture a diamond at each; without a duty nothing changes."""
     duty = map_duty(outer, path, SPEEDS, LOADS)
-    assert write(mapped, tmp_path, duty) == ["map.json", "map.csv", "duty.csv", "map.png"]
+    assert write(mapped, duty, tmp_path) == ["map.json", "map.csv", "duty.csv", "map.png"]
     with_duty = json.loads((tmp_path / "map.json").read_text())
     # Columns 0, 1.5 and 2 of the cells, the last at the edge; rows 0, 0.5 and 1.
     assert {0.0, 1.5, 2.0, 0.5, 1.0} <= set(np.round(drawn["map.png"], 9).tolist())
     assert (tmp_path / "duty.csv").read_text().splitlines()[0] == ",".join(duty.rows[0])
-    assert write(mapped, tmp_path) == ["map.json", "map.csv", "map.png"]
+    assert write(mapped, None, tmp_path) == ["map.json", "map.csv", "map.png"]
     without = json.loads((tmp_path / "map.json").read_text())
     assert with_duty.pop("duty") == json.loads(json.dumps(duty.as_record())) and with_duty == without
 

@@ -24,13 +24,14 @@ def wavy(seed, size, reach):
     return lambda x: size * np.cos(x @ waves.T + phases) @ shares + 10.0 + x.sum(axis=1) + (x**2).sum(axis=1)
 
 
-def coverage(points, size, repeats=40, **keywords):
+def coverage(points, size, repeats=40, noise=NOISE, model="quadratic", **keywords):
     """Shares of fresh points whose true mean the 95 % interval holds, without and with the model error, and of fits that
     have one."""
     found = []
     for seed in range(repeats):
         random, truth = np.random.default_rng(1000 + seed), wavy(seed, size, 0.7)
-        surface = fit(points, truth(points) + NOISE * random.normal(size=len(points)), **KEYWORDS, **keywords)
+        values = truth(points) + noise * random.normal(size=len(points))
+        surface = fit(points, values, **KEYWORDS | {"model": model}, **keywords)
         new = random.uniform(-1.0, 1.0, (200, 3))
         shares = []
         for each in (replace(surface, model_error=None), surface):
@@ -52,19 +53,50 @@ def test_known_variances_tell_it_where_no_run_is_repeated():
     assert told > 0.95 and before < 0.9 and after > 0.93
 
 
-def test_interval_of_a_true_model_is_that_of_the_textbook():
+def test_interval_of_a_true_model_covers_it_and_is_that_of_the_textbook_without_an_excess():
     before, after, told = coverage(POINTS, 0.0)
-    # One fit in twenty is doubted by chance, and its interval only grows.
-    assert told < 0.15 and 0.9 < before <= after < 0.99
-    surface = fit(POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(1).normal(size=20), **KEYWORDS)
+    assert 0.3 < told < 0.7 and 0.9 < before <= after < 0.995
+    surface = fit(POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(4).normal(size=20), **KEYWORDS)
+    lack, pure = surface.lack_of_fit, surface.pure_error
+    assert lack["ss"] / lack["df"] < pure["ms"]
     assert surface.model_error is None and surface.interval_dof == surface.residual_dof == 10
     low, high = interval(surface, [0.5, 0.5, 0.5])
     half = special.stdtrit(10, 0.975) * surface.prediction_standard_error([0.5, 0.5, 0.5])
     assert (high - low) / 2 == pytest.approx(half, rel=1e-12)
 
 
+def test_without_noise_the_whole_residual_is_model_error():
+    """Repeated runs that agree exactly, and single runs: nothing of the residual is scatter."""
+    truth = wavy(3, 1.0, 0.7)
+    exact = fit(POINTS, truth(POINTS), **KEYWORDS)
+    assert exact.lack_of_fit["p"] == 0.0 and exact.lack_of_fit["f"] is None
+    assert exact.model_error.source == "repeats" and exact.model_error.dof == 5
+    assert sum("lack of fit is certain" in line for line in describe(exact)) == 1
+    single = fit(POINTS[:15], truth(POINTS[:15]), **KEYWORDS)
+    assert single.model_error.source == "residual" and single.interval_dof == single.residual_dof == 5
+    assert any("no scatter of a run is known" in line for line in describe(single))
+    for points, textbook in ((POINTS, 0.75), (POINTS[:15], 0.95)):
+        before, after, told = coverage(points, 1.0, noise=0.0)
+        assert before < textbook and after > 0.95 and told == 1.0
+    quadratic = fit(POINTS, 1.0 + POINTS.sum(axis=1) + (POINTS**2).sum(axis=1), **KEYWORDS)
+    assert quadratic.model_error is None and any("lack of fit is none" in line for line in describe(quadratic))
+
+
+def test_weights_from_few_replicates_are_no_model_error():
+    """Squared residuals over variances of eight replicates are 7/5 on average; of three, they have no mean."""
+    random, told = np.random.default_rng(4), {8: 0, 3: 0}
+    points = np.random.default_rng(5).uniform(-1.2, 1.2, (24, 3))
+    for _ in range(60):
+        for size in told:
+            runs = 5.0 + points.sum(axis=1) + random.normal(size=(size, 24))
+            errors = {"standard_errors": runs.std(axis=0, ddof=1) / np.sqrt(size), "replicates": np.full(24, size)}
+            surface = fit(points, runs.mean(axis=0), weighting="replicates", **errors, **KEYWORDS)
+            told[size] += surface.model_error is not None and surface.model_error.source == "known variance"
+    assert 10 <= told[8] <= 40 and told[3] == 0
+
+
 def test_variance_is_that_of_the_field_on_average():
-    """Independent errors of one point each: the estimate is unbiased, here where hardly any fit is found without."""
+    """Independent errors of one point each: the estimate is unbiased, here where hardly any fit is without."""
     random, found = np.random.default_rng(7), []
     alone = np.abs(POINTS).max(axis=1) > 0
     for _ in range(300):

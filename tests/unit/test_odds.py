@@ -8,7 +8,7 @@ from scipy import special
 
 from doe.unknown.decision import odds, wilson
 
-COUNT, SPREAD = 2000, 3.0
+COUNT, SPREAD = 256, 3.0
 
 
 def simulated(noise, count=COUNT, seed=1):
@@ -25,11 +25,11 @@ def test_closed_form_of_normal_values(noise):
     _, values, variances = simulated(noise)
     at = 10.0 + 1.5 * SPREAD
     found, truth = odds(values, variances, -np.inf, at, 1), special.ndtr(1.5)
-    assert found.value == pytest.approx(truth, abs=0.015) and found.low < truth < found.high
+    assert found.value == pytest.approx(truth, abs=0.05) and found.low < truth < found.high
     if noise == 3.0:
         assert (values <= at).mean() < truth - 0.05
     both = odds(values, variances, 10.0 - SPREAD, 10.0 + SPREAD, 1)
-    assert both.value == pytest.approx(special.ndtr(1.0) - special.ndtr(-1.0), abs=0.04)
+    assert both.value == pytest.approx(special.ndtr(1.0) - special.ndtr(-1.0), abs=0.1)
 
 
 def test_limit_case_without_noise_counts_the_rows():
@@ -42,6 +42,7 @@ def test_limit_case_without_noise_counts_the_rows():
     assert none[:2] == (0.0, 0.0) and 0.0 < none.high < 0.05 and every.value == every.high == 1.0 and every.low > 0.95
 
 
+@pytest.mark.slow
 def test_invariant_intervals_hold_the_probability():
     """Invariant: in 90 to 99 of 100 repeats of 128 input sets."""
     truth = special.ndtr(0.8)

@@ -164,7 +164,7 @@ def test_published_picture_of_the_data_behind_the_paper(behind_the_paper):
     terms, lack, *_ = describe(fitted(behind_the_paper, 1, "quadratic"))
     assert "significant at 0.05: B (p < 0.0001)" in terms
     assert "not significant: A, AB, AC" in terms
-    assert "lack of fit is not significant (p = 0.0650)" in lack
+    assert "lack of fit is not significant (p = 0.0650 against pure error)" in lack
 
 
 def test_json_has_the_contract_keys_and_no_nan(printed):

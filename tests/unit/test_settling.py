@@ -13,24 +13,34 @@ from rbdyn.accuracy import coverage
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
-from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.state import CAGE_SHARES, absolute_tolerance, start_state
+from rbdyn.dynamics.parameters.state import (
+    CAGE_SHARES,
+    START_PLAY,
+    START_SLIP,
+    absolute_tolerance,
+    group_of,
+    start_state,
+    wall_of,
+)
 from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run, explicit_method, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.error_bars import (
     FALSE_ALARMS,
     TESTED,
-    drift_of,
+    differences_of,
+    disagreements,
     drifting,
-    significant_drifts,
+    quantities,
+    settled,
     slow_change,
     unseen_regime,
-    worth_lengthening,
 )
-from rbdyn.dynamics.statistics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
+from rbdyn.dynamics.statistics.metrics import POWER_LOSS, Replicate
 from rbdyn.result import Quantity
 
 
@@ -56,11 +66,11 @@ def test_oracle_drift_of_noise_and_of_a_slope(replicates):
     of 1.5 sd (of most, where one or two replicates must tell it from their own memory).
     """
     draw = np.random.default_rng(2)
-    false = sum(drift_of(POWER_LOSS, noisy(draw, replicates, 60)).chance < 0.05 for _ in range(400))
+    false = sum(differences_of(POWER_LOSS, noisy(draw, replicates, 60))[0].chance < 0.05 for _ in range(400))
     # Four standard errors of 400 trials about 0.05.
     assert false / 400 <= 0.05 + 4.0 * math.sqrt(0.05 * 0.95 / 400)
     slope = lambda turns: 1.5 * turns / 30.0  # noqa: E731
-    found = [drift_of(POWER_LOSS, noisy(draw, replicates, 60, slope)) for _ in range(50)]
+    found = [differences_of(POWER_LOSS, noisy(draw, replicates, 60, slope))[0] for _ in range(50)]
     assert np.mean([drift.chance < 0.05 for drift in found]) >= (0.9 if replicates > 2 else 0.6)
     assert np.mean([drift.size for drift in found]) == pytest.approx(1.5, abs=0.3)
 
@@ -79,30 +89,94 @@ def independent_figures(draw, slope=0.0):
 def test_oracle_false_alarms_of_all_figures_together():
     """Oracle: of settled runs at most the stated share has any figure that drifts, by Holm's rule; a figure that does is named."""
     draw = np.random.default_rng(3)
-    alarms = [bool(significant_drifts(independent_figures(draw), FALSE_ALARMS)) for _ in range(400)]
+    alarms = [bool(disagreements(independent_figures(draw), FALSE_ALARMS)) for _ in range(400)]
     assert np.mean(alarms) <= FALSE_ALARMS + 3.0 * math.sqrt(0.05 * 0.95 / 400)
-    single = [drift.chance < FALSE_ALARMS for _ in range(60) for runs in [independent_figures(draw)] for drift in
-              (drift_of(figure, runs) for figure in TESTED.values())]  # fmt: skip
+    single = [each.chance < FALSE_ALARMS for _ in range(60) for runs in [independent_figures(draw)]
+              for figure in TESTED.values() for each in differences_of(figure, runs)]  # fmt: skip
     assert 0.02 < np.mean(single) < 0.09
-    named = [significant_drifts(independent_figures(draw, 0.1), FALSE_ALARMS) for _ in range(40)]
-    assert np.mean([TESTED["power_loss_W"] in each for each in named]) > 0.95
+    named = [disagreements(independent_figures(draw, 0.1), FALSE_ALARMS) for _ in range(40)]
+    assert np.mean([any(figure is POWER_LOSS for figure, _ in each) for each in named]) > 0.95
 
 
 def test_unit_a_drift_is_worth_turns_from_a_hundredth_on():
     """Unit: a drift without scatter lengthens a run only beyond a hundredth of the figure; a run of one batch has none."""
     for step, expected in ((0.5, False), (2.0, True)):
         runs = [made_of(np.repeat([100.0, 100.0 + step], 10)) for _ in range(4)]
-        assert drift_of(POWER_LOSS, runs).chance == 0.0 and drifting(runs)
+        assert differences_of(POWER_LOSS, runs)[0].chance == 0.0 and drifting(runs)
         # The step itself is all the regimes that there are: a fifth of half of it, for four replicates.
-        assert worth_lengthening(runs, since=0) is expected
-    assert drift_of(POWER_LOSS, [made_of([100.0])] * 4) is None
+        assert settled(runs, since=0) is not expected
+    assert differences_of(POWER_LOSS, [made_of([100.0])] * 4) == []
+
+
+@pytest.mark.parametrize("replicates", [2, 4, 5, 8])
+def test_oracle_groups_that_disagree(replicates):
+    """Oracle: nested R-hat of two groups by its t: false in 5 of 100 settled runs or fewer, and found where the groups are four
+    standard deviations of a replicate apart; the mean of both is off by half of it, which the errors cover.
+    """
+    draw = np.random.default_rng(4)
+
+    def grouped(apart):
+        runs = [
+            made_of(100.0 + draw.normal() + apart * (place % 2) + draw.normal(size=60)) for place in range(replicates)
+        ]
+        return [replace(run, group=place % 2) for place, run in enumerate(runs)]
+
+    def noise():
+        runs = noisy(draw, replicates, 60)
+        return [replace(run, group=place % 2) for place, run in enumerate(runs)]
+
+    false = np.mean([differences_of(POWER_LOSS, noise())[1].chance < 0.05 for _ in range(400)])
+    assert false <= 0.05 + 4.0 * math.sqrt(0.05 * 0.95 / 400)
+    far = [differences_of(POWER_LOSS, grouped(20.0))[1] for _ in range(50)]
+    assert np.mean([each.chance < 0.05 for each in far]) >= 0.9
+    assert np.mean([each.size for each in far]) == pytest.approx(20.0, abs=1.0)
+    runs = grouped(20.0)
+    middle = differences_of(POWER_LOSS, runs)[1]
+    assert middle.bias(moving=True) == pytest.approx(0.5 * math.hypot(middle.size, middle.error))
+    assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, moving=True) >= middle.bias(moving=True)
+    alike = [replace(run, group=0) for run in runs]
+    assert len(differences_of(POWER_LOSS, alike)) == 1
+
+
+def test_unit_groups_are_compared_by_the_variance_within(outer):
+    """Unit: by hand, groups of 1, 3 and 11, 13 differ by 10 with a standard error of sqrt(2); R-hat^2 - 1 is t^2/2 there."""
+    runs = [
+        replace(made_of(np.full(10, loss)), group=group) for loss, group in ((1.0, 0), (11.0, 1), (3.0, 0), (13.0, 1))
+    ]
+    change, apart = differences_of(POWER_LOSS, runs)
+    assert (change.size, change.error) == (0.0, 0.0)
+    assert (apart.size, apart.freedom, apart.figure) == (10.0, 2, 7.0)
+    assert apart.error == pytest.approx(math.sqrt(2.0))
+    between, within = np.var([2.0, 12.0], ddof=1), 2.0
+    assert between / within == pytest.approx(0.5 * (apart.size / apart.error) ** 2)
+
+
+def test_unit_a_run_that_has_not_settled_states_no_interval(example):
+    """Unit: groups that stay apart lengthen the run to its limit; its note says so and no figure has a statistical error."""
+    warm_up = int(example.numerics.warm_up_turns)
+
+    class Apart(Written):
+        def to(self, turns):
+            return replace(super().to(turns), group=self.group)
+
+    def start(replicate, companions, stop):
+        run = Apart(example, replicate, lambda turns: 10.0 * (replicate % 2) + 0.0 * turns, warm_up)
+        run.group = replicate % 2
+        return run
+
+    found = run_until_settled(example, start, 1, None, Stop())
+    assert len(found.runs[0].durations) == 480 and "no statistical error is known" in found.notes[1]
+    for figure in quantities(example, found.runs, [], 1.0, found.since).values():
+        assert figure.statistical_error is None and figure.degrees_of_freedom is None
+    alike = [replace(run, group=0) for run in found.runs]
+    assert quantities(example, alike, [], 1.0, found.since)["power_loss_W"].statistical_error > 5.0
 
 
 def test_unit_a_drift_within_the_error_costs_no_turn():
     """Unit: of replicates that differ for good a drift common to all is within their error, which then holds it whole."""
     levels = 100.0 + np.array([-20.0, -10.0, 10.0, 20.0])
     runs = [made_of(np.repeat([level, level + 3.0], 10)) for level in levels]
-    assert drifting(runs) and not worth_lengthening(runs, since=0)
+    assert drifting(runs) and settled(runs, since=0)
     assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, moving=True) >= 1.5 * 3.0
 
 
@@ -111,7 +185,7 @@ def test_oracle_bias_of_a_transient_that_halves():
     for quotient in (0.5, 0.2):
         tail = 100.0 + 8.0 * quotient ** (np.arange(40) / 20.0)
         runs = [made_of(tail) for _ in range(4)]
-        bias = drift_of(POWER_LOSS, runs).bias(moving=True)
+        bias = differences_of(POWER_LOSS, runs)[0].bias(moving=True)
         off = float(tail.mean()) - 100.0
         assert bias == pytest.approx(off, rel=1e-9) if quotient == 0.5 else bias > off
 
@@ -125,7 +199,7 @@ def test_unit_unseen_regime():
     assert unseen_regime(POWER_LOSS, runs, since=20) == 0.0
     assert unseen_regime(POWER_LOSS, runs, since=0) == pytest.approx(10.0 / 5.0)
     assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, moving=False) == pytest.approx(2.0)
-    assert slow_change(CAGE_SPEED, CAGE_SPEED, runs, 0, moving=True) == 0.0
+    assert slow_change(metrics.CAGE_SPEED, metrics.CAGE_SPEED, runs, 0, moving=True) == 0.0
 
 
 class Written:
@@ -170,35 +244,6 @@ def test_unit_a_run_that_drifts_goes_on(example):
     endless = settled_run(example, lambda turns: 0.1 * turns)
     assert {(len(run.durations), run.first) for run in endless.runs} == {(480, 240)}
     assert "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
-
-
-def relaxing(scene, rate, settles=lambda turns: 0.0 * turns):
-    """A settled run whose slowest motion decays at so many times a shaft turn."""
-    warm_up = int(scene.numerics.warm_up_turns)
-
-    class Slow(Written):
-        def to(self, turns):
-            rates = np.array([[rate, 10.0, 100.0]] * 2) / scene.turn_s
-            return replace(super().to(turns), decay_rates=rates)
-
-    start = lambda replicate, companions, stop: Slow(scene, replicate, settles, warm_up)  # noqa: E731
-    return run_until_settled(scene, start, 1, None, Stop())
-
-
-def test_unit_three_relaxation_times_are_counted(example):
-    """Unit: a run counts three relaxation times of its slowest motion at least, up to its limit, and says so."""
-    quick = relaxing(example, 0.1)
-    assert len(quick.runs[0].durations) == 60 and not quick.notes
-    slow = relaxing(example, 1.0 / 30.0)
-    assert len(slow.runs[0].durations) == 20 + 90 and slow.runs[0].first == 20
-    assert slow.notes == (
-        "length: the spin of the cage relaxes in 30 shaft turns, so 90 turns are counted instead of 40",
-    )
-    endless = relaxing(example, 1e-4)
-    assert len(endless.runs[0].durations) == 480
-    assert "relaxes in 1e+04 shaft turns, and only 460 turns are counted" in endless.notes[0]
-    # What excites itself has no relaxation time.
-    assert len(relaxing(example, -1.0).runs[0].durations) == 60
 
 
 def test_unit_lengthening_is_bounded_and_can_be_forbidden(example, monkeypatch):
@@ -330,6 +375,32 @@ def test_command_line_coverage(command, monkeypatch):
     assert found["format"] == "rbdyn.coverage/1" and found["repeats"] == 2
     assert {row["figure"] for row in found["rows"]} >= {"impact_force_N", "power_loss_W"}
     assert found["mean_turns"] == pytest.approx(2.0 * (2 + 1))
+
+
+def test_unit_replicates_start_in_two_groups(outer, make_scene):
+    """Unit: every second replicate slips, its cage is near its guide and circles, its rollers are at one wall, in turn the
+    front and the back; a schedule prescribes one start; rollers stand inside their pockets.
+    """
+    assert [group_of(outer, replicate) for replicate in range(4)] == [0, 1, 0, 1]
+    assert [wall_of(outer, replicate) for replicate in range(6)] == [0, 1, 0, -1, 0, 1]
+    bearing, z = roller_bearing(outer), outer.bearing.rollers
+    for wall in (1, -1):
+        near, far = (start_state(outer, bearing, np.random.default_rng(8), each) for each in (0, wall))
+        cage = far[5 * z :]
+        play = 0.5 * min(outer.guide_play_m, outer.pocket_clearance_m)
+        place, velocity = cage[[CAGE_X, CAGE_Y]], cage[[CAGE_VX, CAGE_VY]]
+        assert np.hypot(*place) == pytest.approx(START_PLAY * play)
+        assert cage[CAGE_SPEED] == pytest.approx((1.0 - START_SLIP) * near[5 * z + CAGE_SPEED])
+        assert np.hypot(*velocity) == pytest.approx(cage[CAGE_SPEED] * np.hypot(*place)) and place @ velocity == 0.0
+        assert far[4 * z : 5 * z] == pytest.approx((1.0 - START_SLIP) * near[4 * z : 5 * z])
+        pockets = cage[CAGE_ANGLE] + 2.0 * np.pi * np.arange(z) / z
+        away = (
+            np.angle(np.exp(1j * (np.arctan2(far[z : 2 * z], far[:z]) - pockets))) * 0.5 * outer.bearing.pitch_diameter
+        )
+        moved = -place[0] * np.sin(pockets) + place[1] * np.cos(pockets)
+        within = wall * (away - moved) / outer.pocket_clearance_m
+        assert within.min() >= 0.1 - 1e-9 and within.max() <= 0.5 + 1e-9
+    assert record(Run(with_numerics(outer, turns=1.0, discard_turns=0.0), bearing, 1, 0.01, Stop())).group == 1
 
 
 @pytest.mark.slow

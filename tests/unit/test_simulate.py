@@ -388,7 +388,7 @@ def test_unit_quantity(outer):
     assert found.value == 4.0
     student = 4.302652729911275 / math.sqrt(3.0)  # t(2, 0.975)
     assert found.statistical_error == pytest.approx(2.0 * student)
-    assert found.numerical_error == pytest.approx(2.0 * math.hypot(10.0, math.sqrt(2.0) * student) / 9.0)
+    assert found.numerical_error == pytest.approx(2.0 * math.hypot(10.0, math.sqrt(2.0 / 3.0)) / 9.0)
     slow = quantity(IMPACT_FORCE, runs, [], 1.0, 3.0)
     assert slow.statistical_error == pytest.approx(math.hypot(student, 3.0)) and slow.numerical_error is None
     assert quantity(POWER_LOSS, runs, [], 1.0, 0.0).numerical_error == 0.0

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from doe.running.store import Failure, Point, Store, grouped, is_locked
+from doe.running.store import Failure, Point, Store, grouped
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.lock import is_locked
 from rbdyn.base.storage import digest_of
 
 POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
@@ -268,7 +269,7 @@ def working(path: Path) -> subprocess.Popen:
 
 def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, monkeypatch):
     """Who it is and what to do; a reader sees what it does; once it is killed nothing of it is left."""
-    monkeypatch.setattr("doe.running.store.LOCK_PATIENCE_S", 0.1)
+    monkeypatch.setattr("rbdyn.base.lock.PATIENCE_S", 0.1)
     process = working(path)
     with pytest.raises(InputError) as refused:
         Store(path)
@@ -286,17 +287,57 @@ def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, m
         assert store.outcomes(POINTS) == {}
 
 
+INTERRUPTED = """
+import os, random, signal, sys, threading, time
+from pathlib import Path
+from doe.running.store import Point, Store
+signals, draw, done = int(sys.argv[2]), random.Random(1), threading.Event()
+with Store(Path(sys.argv[1])) as store, Store(Path(sys.argv[1])) as other:
+    def work():
+        while not done.is_set():
+            store.begin(Point("worker", "worker"))
+    def interrupt():
+        for _ in range(signals):
+            time.sleep(draw.uniform(0.0, 0.004))
+            os.kill(os.getpid(), signal.SIGINT)
+        done.set()
+    caught, threads = 0, [threading.Thread(target=each) for each in (work, interrupt)]
+    for each in threads:
+        each.start()
+    while not done.is_set():
+        try:
+            while not done.is_set():
+                store.note("agenda ", "text")
+                other.release()
+        except KeyboardInterrupt:
+            caught += 1
+    for _ in range(20):
+        try:
+            time.sleep(0.01)
+        except KeyboardInterrupt:
+            caught += 1
+    store.put("last", {"x": 1})
+    print(caught > 0, store._connection.in_transaction or other._connection.in_transaction)
+"""
+
+
+def test_ctrl_c_at_any_moment_leaves_no_transaction_and_no_lock(path):
+    line = [sys.executable, "-c", INTERRUPTED, str(path), "200"]
+    shown = subprocess.run(line, capture_output=True, text=True, timeout=120)
+    assert (shown.returncode, shown.stdout) == (0, "True False\n"), shown.stderr
+
+
 def test_stores_of_one_process_share_its_lock_until_the_last_is_closed(path):
     one, two = Store(path), Store(path)
     one.close()
-    assert is_locked(path)
+    assert is_locked(path.parent)
     two.put("key 1", result(1))
     two.close()
-    assert not is_locked(path) and not is_locked(path.with_name("none"))
+    assert not is_locked(path.parent) and not is_locked(path.parent / "none")
     process = working(path)
-    assert is_locked(path)
+    assert is_locked(path.parent)
     process.communicate()
-    assert not is_locked(path)
+    assert not is_locked(path.parent)
 
 
 def test_notes_tell_whether_their_process_lives(path):

@@ -81,7 +81,7 @@ def test_unit_a_temperature_needs_a_heat_balance(tmp_path):
     assert len(caught.value.faults) == 1
     assert str(caught.value.faults[0]).endswith(
         "response.name = 'inner_temperature_C': hot_roller.toml has no [thermal], which computes temperatures; add that table "
-        f"there, or choose one of {', '.join(clearance.RESPONSES)}"
+        f"there, or choose one of {', '.join(clearance.responses_of(heats=False))}"
     )
     path.write_text(plain.replace('set = ["', 'set = ["thermal.ambient_C=20.0", "'), encoding="utf-8")
     clearance.check_responses(Study.load(path))

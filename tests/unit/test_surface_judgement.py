@@ -135,8 +135,30 @@ def test_a_surface_that_misses_more_than_the_known_variance_says_so():
     bent = 10 + 3 * np.sin(2 * POINTS[:, 0]) + noise(9, deviation=0.05)
     surface = surface_of(bent, standard_errors=np.full(20, 0.05), weighting="replicates")
     assert surface.known_variance.p < 1e-6
-    assert "exceeds the known variance" in sentence(surface, "chi-square")
+    assert "against pure error, p < 0.0001 against the known variance): the error" in sentence(surface, "lack of fit")
     assert "agree" in sentence(surface, "repeated runs")
+
+
+def test_one_sentence_judges_lack_of_fit_where_two_tests_disagree():
+    """Pure error that is small by chance shows lack of fit; the known variance of all runs does not."""
+    values = 10 + POINTS @ [1.0, 2.0, -1.0] + noise(8)
+    values[-6:] = 10 + 0.5 * (values[-6:] - 10)
+    surface = surface_of(values, standard_errors=np.full(20, 1.0), model="linear")
+    assert surface.lack_of_fit["p"] < 0.05 < surface.known_variance.p and not surface.known_variance.refuted
+    assert "is in doubt, for the tests disagree" in sentence(surface, "lack of fit")
+    assert not any("explains the residual" in line for line in describe(surface))
+
+
+def test_columns_that_repeat_each_other_are_named():
+    """The smallest table: two columns equal within 1e-4, and the response follows one of them."""
+    random = np.random.default_rng(9)
+    points = random.uniform(-1.0, 1.0, (30, 3))
+    points[:, 2] = points[:, 0] + 1e-4 * random.normal(size=30)
+    surface = surface_of(3.0 * points[:, 0] + 0.5 * random.normal(size=30), points, model="linear")
+    assert "but the model as a whole is (F = " in sentence(surface, "no term alone is significant")
+    assert "hardly separate A, C from" in sentence(surface, "variance inflation factor")
+    apart = surface_of(10 + POINTS @ [1.0, 2.0, -1.0] + noise(3))
+    assert not any("variance inflation" in line for line in describe(apart))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from rbdyn.contact.traction import (
     NoTraction,
     asperity_load_share,
     four_constants,
+    tangent,
     traction,
     traction_surface,
 )
@@ -91,6 +92,33 @@ def test_invariant_traction_is_odd_and_never_drives(name, slip, load):
     assert mu * math.copysign(1.0, slip) >= -1e-17
     assert mu == pytest.approx(traction(model, slip, load), rel=1e-12, abs=1e-15)
     assert compiled_traction(model, 0.0, load) == 0.0
+
+
+@njit
+def compiled_tangent(model, slip, load):
+    return tangent(model, slip, load)
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [
+        *MODELS.items(),
+        ("four constants", FOUR),
+        ("blended", BlendedFourConstantTraction(0.01, 0.2, 3.0, 0.03, 0.02)),
+        ("coulomb", CoulombTraction(0.1, 0.02)),
+        ("none", NoTraction()),
+    ],
+)
+def test_unit_tangent_is_the_slope_of_traction(name, model):
+    """Unit: the slope is the difference quotient of the coefficient, even in the slip, compiled and interpreted alike."""
+    draw = np.random.default_rng(2)
+    for slip, load in zip(10.0 ** draw.uniform(-5.0, 1.5, 60), draw.uniform(1.0, 6000.0, 60), strict=True):
+        step = 1e-5 * slip
+        quotient = (traction(model, slip + step, load) - traction(model, slip - step, load)) / (2.0 * step)
+        slope = compiled_tangent(model, slip, load)
+        assert slope == pytest.approx(quotient, rel=1e-5, abs=1e-7 * traction(model, slip, load) / slip)
+        assert slope == compiled_tangent(model, -slip, load)
+        assert slope == pytest.approx(tangent(model, slip, load), rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize("name", [*SURFACES, "mixed surface"])

@@ -1,14 +1,17 @@
 """Declaration of unknown inputs: every assumption has a range, every range gives scenes, bad declarations are one sentence."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
+from typer.testing import CliRunner
 
 from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.base.faults import InputError, read_toml, validated
+from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
@@ -60,6 +63,25 @@ def test_documented_ranges_give_scenes(name: str) -> None:
     assert len(inputs) > 15
     for values in table_of(laws, nested(len(laws), 64, 3)):
         Scene.from_dict(with_values(data, name, laws, values))
+
+
+@pytest.mark.parametrize(
+    ("oil", "model"),
+    [("ISO VG 68", "limiting_shear"), ("ISO VG 320 PAO", "limiting_shear"), ("23699", "four_constant"), ("Jet Oil II", "thermal_newtonian")],
+)  # fmt: skip
+def test_unit_new_scenes_draw_the_traction_law(oil: str, model: str) -> None:
+    """Unit: what ``rbdyn new`` writes draws the law its oil has by default and two others, each of which makes a scene."""
+    written = CliRunner().invoke(app, ["new", "NU210", "--oil", oil])
+    data = tomllib.loads(written.stdout)
+    scene = Scene.from_dict(data)
+    laws = {each.key: each.law for each in inputs_of(scene, data, scene.uncertain)}
+    values = laws["traction.model"].values
+    assert scene.traction.model == model and model in values and {"four_constant", "eyring"} < set(values)
+    rows = {row["traction.model"]: row for row in table_of(laws, nested(len(laws), 32, 1))}
+    assert rows.keys() == set(values)
+    for drawn_model, row in rows.items():
+        drawn = Scene.from_dict(with_values(data, "scene", laws, row))
+        assert drawn.traction.model == drawn_model and drawn.traction.elasticity
 
 
 PARTS = [(part, name) for part in Materials.model_fields for name in MATERIALS]
@@ -164,14 +186,51 @@ def test_what_is_given_is_known_unless_estimated() -> None:
 def test_set_replaces_single_keys_of_its_default() -> None:
     """What a list leaves alone stays as it is by default; the order is the default's rest, then the list."""
     asked = ["numerics.turns=60", "model.drag=off"]
-    found = _uncertain(set=asked).set
+    found = _uncertain(set=asked).assignments
     assert found == [*(each for each in RUNS if not each.startswith("numerics.turns=")), *asked]
     assert "numerics.extend=false" in found and "numerics.turns=20" not in found
-    assert _uncertain(set=[]).set == _uncertain().set == list(RUNS)
-    assert _uncertain(set=found).set[: len(RUNS) - 1] == found[: len(RUNS) - 1]
-    assert _uncertain(set=['"numerics".turns = 60']).set == [*found[:-2], '"numerics".turns = 60']
+    assert _uncertain(set=[]).assignments == _uncertain().assignments == list(RUNS)
+    assert _uncertain(set=found).assignments[: len(RUNS) - 1] == found[: len(RUNS) - 1]
+    assert _uncertain(set=['"numerics".turns = 60']).assignments == [*found[:-2], '"numerics".turns = 60']
     with pytest.raises(InputError, match="replaces an earlier assignment of this list"):
         _uncertain(set=["numerics.turns=60", "numerics.turns=70"])
+
+
+def test_declarations_over_others_replace_them_key_by_key() -> None:
+    """A key keeps what is stated under it unless the upper table states it, by a law, as an estimate or in set."""
+    narrow, wide = ({"law": "uniform", "low": low, "high": 50.0} for low in (45.0, 40.0))
+    under = {
+        "estimated": ["cage.land_width_mm", "cage.imbalance_um"],
+        "points": 64,
+        "set": ["numerics.turns=60", "numerics.replicates=3", "model.drag_coefficient=0.5"],
+        "cage.mass_g": wide,
+        "cage.bar_width_mm": wide,
+        "correlation": [{"keys": ["cage.mass_g", "cage.bar_width_mm"], "rank": 0.5}],
+    }
+    plain = Uncertain.model_validate(under)
+
+    def over(**upper: Any) -> Uncertain:
+        return Uncertain.model_validate(Uncertain.model_validate(upper).over(plain))
+
+    assert over() == plain and over(seed=3) == plain.model_copy(update={"seed": 3})
+    turns = over(set=["numerics.turns=20"])
+    # A stated default is stated.
+    assert {"numerics.turns=20", "numerics.replicates=3"} <= set(turns.assignments)
+    assert (
+        "numerics.turns=60" not in turns.assignments and turns.estimated == plain.estimated and turns.laws == plain.laws
+    )
+    assert over(**{"cage.mass_g": narrow}).laws["cage.mass_g"].low == 45.0
+    fixed = over(set=["cage.mass_g=45", "cage.imbalance_um=2"])
+    assert (
+        set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"] and not fixed.correlation
+    )
+    law = over(**{"model.drag_coefficient": {"law": "uniform", "low": 0.3, "high": 1.0}})
+    assert "model.drag_coefficient=0.5" not in law.assignments and len(law.laws) == 3
+    pair = {"keys": ["cage.bar_width_mm", "cage.mass_g"], "rank": -0.2}
+    assert [
+        entry.rank
+        for entry in over(**{"cage.mass_g": narrow, "cage.bar_width_mm": wide, "correlation": [pair]}).correlation
+    ] == [-0.2]
 
 
 def test_relative_values_multiply_what_the_scene_has() -> None:

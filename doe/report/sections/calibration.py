@@ -11,14 +11,16 @@ import numpy as np
 
 from doe.study_file.table import text_of
 from doe.unknown import inputs
+from doe.unknown.calibration import allowance_words
+from doe.unknown.offsets import Unseen
 from doe.unknown.posterior import contraction_words
-from doe.workflow.calibration import Calibration
+from doe.workflow.calibration import CALIBRATED, Calibration
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.forecast import Forecast, duration, span
 from rbdyn.base.identity import Identity
-from rbdyn.base.page import REPORT, write_with_report
+from rbdyn.base.page import REPORT, with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.words import counted, quantity, shown
@@ -29,9 +31,11 @@ from rbdyn.scene.unknown import Input
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
+FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
 ENDS = (0.05, 0.5, 0.95)
 TAUS = (0.5, 0.05, 0.95)
-OFFSET = "A constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs."
+# Least move of an input by an unseen offset that is named next to the largest, in standard deviations; most of them.
+MOVED, MOST_MOVED = 0.5, 3
 # Most inputs of a corner plot, those that contract most; share of their ranges that it omits at either end.
 SHOWN, END = 8, 1e-3
 
@@ -75,8 +79,8 @@ def record_of(calibration: Calibration, made_of: str) -> dict[str, Any]:
                 "values": trial.width.cells,
                 "ratio": trial.width.ratio,
                 "chance": trial.width.chance,
-                "power_too_wide": trial.width.power[0],
-                "power_too_narrow": trial.width.power[1],
+                "power_too_wide": calibration.design.power.wide,
+                "power_too_narrow": calibration.design.power.narrow,
             },
         },
         "posterior": None if posterior is None else SAMPLE,
@@ -119,7 +123,7 @@ def _cost_words(cost: dict[str, Any]) -> str:
 
 
 def _outputs(calibration: Calibration) -> dict[str, Any]:
-    """Whether the model explains each output: discrepancy of its level, allowed scale, evidence, and visible offset."""
+    """Whether the model explains each output: discrepancy of its level, allowed scales, evidence, and what could hide."""
     refuted = {calibration.cells[place][1] for place in calibration.match.refuted}
     outputs = calibration.judgement.outputs if calibration.judgement else [None] * len(calibration.rig.outputs)
     return {
@@ -127,13 +131,30 @@ def _outputs(calibration: Calibration) -> dict[str, Any]:
             "explained": name not in refuted and explanation is not None and explanation.explained,
             "discrepancy": None if explanation is None else np.expm1(explanation.bias).tolist(),
             "allowed": None if explanation is None else explanation.allowed,
+            "accuracy_percent": 100.0 * calibration.rig.accuracies[name],
             "evidence": None if explanation is None else explanation.evidence,
-            "resolution": None
-            if explanation is None or explanation.resolution is None
-            else float(np.expm1(explanation.resolution)),
+            **_unseen(calibration, None if explanation is None else explanation.unseen),
         }
         for name, explanation in zip(calibration.rig.outputs, outputs, strict=True)
     }
+
+
+def _unseen(calibration: Calibration, unseen: Unseen | None) -> dict[str, Any]:
+    """The largest offset that would not be seen, and by how much it moves each number among the inputs.
+
+    ``moves``: in the units of the scene; ``moves_sd``: in standard deviations of the posterior."""
+    match, posterior = calibration.match, calibration.match.sampled
+    if unseen is None or posterior is None:
+        return {"resolution": None, "moves": {}, "moves_sd": {}}
+    scores = posterior.points[:, : len(calibration.inputs)]
+    centre, sds = scores.mean(axis=0), scores.std(axis=0)
+    quantiles = match.quantiles(np.array([centre, centre + unseen.moves]))
+    moves, shares = dict[str, float](), dict[str, float]()
+    for place, entry in enumerate(calibration.inputs):
+        if entry.law.law != "choices":
+            low, high = _between(calibration, place, quantiles[:, place])
+            moves[entry.key], shares[entry.key] = high - low, float(unseen.moves[place] / sds[place])
+    return {"resolution": float(np.expm1(unseen.offset)), "moves": moves, "moves_sd": shares}
 
 
 def _inputs(calibration: Calibration) -> dict[str, Any]:
@@ -182,7 +203,7 @@ def _ends(logarithms: Array) -> list[float]:
 
 def blocks(record: dict[str, Any]) -> list[Block]:
     """The verdict with its reasons, inputs, identified combinations, outputs, the quality of predictions, and notes."""
-    reasons = "; ".join(record["reasons"])
+    calibrated = record["verdict"] == CALIBRATED
     inputs = [
         (key, *_interval(row), f"{record['learned'][key]:.2f}", row["seen"])
         for key, row in sorted(record["inputs"].items(), key=lambda pair: -record["learned"][pair[0]])
@@ -195,15 +216,21 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         if explanation["evidence"] is not None
     ]
     return [
-        Paragraph(f"{record['verdict']}{': ' if reasons else ''}{reasons}", "warning" if reasons else "statement"),
+        Paragraph(verdict_words(record), "statement" if calibrated else "warning"),
+        Bullets([] if calibrated else _hidden(record)),
         Table(caption, header, inputs, text_columns=(1, 2, 5)),
         Bullets([*map(_combination, record["combinations"]), *outputs]),
-        Paragraph(OFFSET if inputs else ""),
         Bullets([*_prediction_quality(record["held_out"]), *_outliers(record)]),
         Paragraph(_screened(record["screened"])),
         Paragraph(_cost_words(record["cost"]) if "cost" in record else "", "small"),
         *(Note(note, Detail.LEAST) for note in record["notes"]),
     ]
+
+
+def verdict_words(record: Mapping[str, Any]) -> str:
+    """The verdict with its reasons, or with what could hide from a calibration that nothing contradicts."""
+    sentences = "; ".join(_hidden(record) if record["verdict"] == CALIBRATED else record["reasons"])
+    return f"{record['verdict']}{': ' if sentences else ''}{sentences}"
 
 
 def _combination(combination: dict[str, Any]) -> str:
@@ -248,16 +275,28 @@ def _screened(screened: dict[str, float] | None) -> str:
 
 
 def _output_words(name: str, explanation: dict[str, Any]) -> str:
-    """The discrepancy of an output, the allowed one, and the least visible offset."""
+    """The discrepancy of an output, and what is allowed."""
     median, low, high = (100.0 * value for value in explanation["discrepancy"])
     words = "explained" if explanation["explained"] else "not explained"
-    off = f"{name}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {100.0 * explanation['allowed']:.2g} % allowed"
-    least = (
-        ""
-        if explanation["resolution"] is None
-        else f"; an offset below {100.0 * explanation['resolution']:.2g} % would not be seen"
-    )
-    return f"{off}, Bayes factor {explanation['evidence']:.3g}{least}"
+    allowed = allowance_words(explanation["allowed"], 0.01 * explanation["accuracy_percent"])
+    off = f"{name}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {allowed}"
+    return f"{off}, Bayes factor {explanation['evidence']:.3g}"
+
+
+def _hidden(record: Mapping[str, Any]) -> list[str]:
+    """What could hide in each output."""
+    return [
+        _hidden_words(quantity(name)[0], output) for name, output in record["outputs"].items() if output["resolution"]
+    ]
+
+
+def _hidden_words(name: str, output: Mapping[str, Any]) -> str:
+    """The offset of an output's sensor that would not be seen, and the inputs that it moves most."""
+    shares = sorted(output["moves_sd"].items(), key=lambda pair: -abs(pair[1]))
+    named = [key for place, (key, share) in enumerate(shares[:MOST_MOVED]) if place == 0 or abs(share) >= MOVED]
+    moves = " and ".join(f"{key} by {shown(output['moves'][key], 2)}" for key in named)
+    words = f"an offset of the {name} below {shown(100.0 * output['resolution'], 2)} % would not be seen"
+    return f"{words} and moves {moves}" if moves else words
 
 
 def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
@@ -270,7 +309,7 @@ def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
 
 def write(calibration: Calibration, record: dict[str, Any], folder: Path, identity: Identity) -> None:
     """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
-    write_with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record, folder))
+    with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record))
     # Last, as it marks the folder as complete.
     sign(record)
     write_json(folder / RECORD, record)

@@ -57,11 +57,11 @@ def in_few_runs(summary: Record) -> list[Block]:
         if stills:
             blocks.append(Figures([still.svg for still in stills], caption))
     rows = [
-        (shown(state["runs"]), f"{volume:.3f}", with_error(state["left"], state["deviation"]), state["why"])
+        (shown(state["runs"]), f"{volume:.3f}", with_error(state["left"], state["left_error"]), state["why"])
         for state, volume in zip(history, reached, strict=False)
-        if {"runs", "left", "deviation", "why"} <= set(state)
+        if {"runs", "left", "left_error", "why"} <= set(state)
     ]
-    header = ("runs", "hypervolume", "still to gain", "next runs for")
+    header = ("runs", "hypervolume", "expected further gain", "next runs for")
     return [*blocks, Table("Adaptive search, batch by batch", header, rows, text_columns=(3,))]
 
 
@@ -199,14 +199,16 @@ def _answer(outcome: StudyResult) -> str:
 def spent_sentence(study: Study, adaptive: Adaptive) -> str:
     """The runs and the time of the search, why it ended, and how far its region grew."""
     search, last = adaptive.search, adaptive.search.history[-1]
-    open_share = 100.0 * last.remaining / last.hypervolume if last.hypervolume > 0.0 else math.nan
+    scale = 100.0 / last.hypervolume if last.hypervolume > 0.0 else math.nan
+    further = with_error(scale * last.remaining, scale * last.remaining_error)
     moved = dict.fromkeys((face.factor, int(face.side > 0)) for face, _ in search.moves)
     grown = [_place(study.factors[place[0]], float(adaptive.edges[place]), " to") for place in moved]
     runs = f"{counted(len(search.spent), 'run')} of design and search and {search.fresh} fresh runs at its points and the baseline"
     growth = f" Its region grew: {_listed(grown)}." if grown else ""
     return (
         f"The search ended because {search.stopped}. It took {runs}, in {adaptive.seconds:.0f} s after the end of the design. "
-        f"At most {open_share:.1f} % of the hypervolume of its front is still to gain.{growth}"
+        f"A search without end is expected to gain {further} % more hypervolume (one standard deviation over the fronts that the "
+        f"emulators allow).{growth}"
     )
 
 
@@ -322,6 +324,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
                 "deviation": state.deviation,
                 "gained": finite(state.gained),
                 "left": state.remaining,
+                "left_error": state.remaining_error,
                 "why": state.why,
             }
             for state in search.history

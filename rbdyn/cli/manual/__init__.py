@@ -13,34 +13,34 @@ from typing import Annotated
 import typer
 from pydantic import BaseModel
 
-from rbdyn.base.command import Json, folder_option, guarded, hand_over
+from rbdyn.base.command import Force, Json, folder_option, guarded, hand_over
+from rbdyn.base.folder import output_folder
 from rbdyn.scene.keys import AsSchema, Word, run
 
 # Entry points of such packages: functions that return a ``Part``.
 GROUP = "rbdyn.manual"
+PAGE = "manual.html"
 
 
 def manual(
     context: typer.Context,
     out: Annotated[Path, folder_option("Write manual.html here.")] = Path("manual"),
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the manual as one page that opens from disk: own bearing, keys, commands, equations, what is left out."""
-    with guarded(as_json):
+    with guarded(as_json), output_folder(out, "rbdyn manual", (PAGE,), force=force) as folder:
         from importlib.metadata import entry_points
 
         from rbdyn.cli.manual.drawings import drawings
         from rbdyn.cli.manual.page import page
-        from rbdyn.result import whole_file
         from rbdyn.scene.keys import Part
 
-        out.mkdir(parents=True, exist_ok=True)  # before the page, which takes seconds
+        folder.claim()
         own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings)
         text = page([own, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
-        path = out / "manual.html"
-        with whole_file(path) as new:
-            new.write_text(text, encoding="utf-8")
-        hand_over(lambda: {"status": "ok", "page": str(path)}, as_json, lambda: None, out, [path.name])
+        folder.write(lambda stage: (stage / PAGE).write_text(text, encoding="utf-8"))
+        hand_over(lambda: {"status": "ok", "page": str(out / PAGE)}, as_json, lambda: None, out, [PAGE])
 
 
 def describe_keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact, closed_load, line_load, slice_drop
-from rbdyn.contact.traction import coefficient_of
+from rbdyn.contact.tangential import coefficient_of
 from rbdyn.dynamics.forces.cage import guide_forces
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
 from rbdyn.dynamics.forces.races import race_contact, roller_radius

@@ -21,24 +21,26 @@ from rbdyn.contact.hertz_line import (
     SlicedLineContact,
     TiltedLineContact,
 )
-from rbdyn.contact.rolling_resistance import OpenFilm, film_forces
+from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces
+from rbdyn.contact.tangential import (
+    RigidContact,
+    add_coefficient_rate,
+    coefficient_of,
+    keep_coefficient_rate,
+    relax_coefficients,
+    steady_by_table,
+    steady_traction,
+)
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
     FourConstantTraction,
     MixedTraction,
     NoTraction,
-    RigidContact,
     SurfaceAxes,
     TractionSurface,
-    add_coefficient_rate,
-    coefficient_of,
-    keep_coefficient_rate,
-    relax_coefficients,
     table_place,
     table_value,
-    traction,
-    traction_by_table,
     without_table,
 )
 from rbdyn.dynamics.forces.races import (
@@ -67,7 +69,7 @@ FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, 
     0, OUTPUTS * LANES, LANES
 )
 # Where the rows between the loops of a law with a table begin: the fields of ``RaceApproach``, side and traction
-# coefficient, and the place in the table, later its value.
+# coefficient, and the place in the table, later its value and slope.
 INPUTS = 16
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
@@ -284,9 +286,9 @@ def approach_of_lane(met, i):
 
 @kernel
 def look_up(traction_model, met, first, count):
-    """Replace the places in the table of the lanes from ``first`` to ``count`` by its values."""
+    """Replace the places in the table of the lanes from ``first`` to ``count`` by its values and slopes."""
     for i in range(first, count):
-        met[ALONG + i] = table_value(traction_model, met[ALONG + i], met[ACROSS + i])
+        met[ALONG + i], met[ACROSS + i] = table_value(traction_model, met[ALONG + i], met[ACROSS + i])
 
 
 @kernel
@@ -295,7 +297,9 @@ def wrenches(outer, inner, met, lanes, count):
     for i in range(lanes_to_fill(inner, count)):
         side = met[SIDE + i]
         race, approach = either(side > 0.0, outer, inner), approach_of_lane(met, i)
-        steady = traction_by_table(race.traction, approach.slip, approach.load, met[ALONG + i])
+        steady = steady_by_table(
+            race.tangential, race.traction, approach.slip, approach.load, met[ALONG + i], met[ACROSS + i]
+        )
         keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
 
 
@@ -313,7 +317,7 @@ def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
     for i in range(lanes_to_fill(race, count)):
         j = first + i
         approach = approach_in_lane(race, 1.0, lane_radius(sizes, radii, j), ring, y, j, rollers)
-        steady = traction(race.traction, approach.slip, approach.load)
+        steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
         coefficient = coefficient_of(race.tangential, y, j)
         keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, 1.0, approach, steady, coefficient))
 
@@ -349,7 +353,7 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
         approach = approach_in_lane(race, side, lane_radius(sizes, packed, RADII + i), ring, packed, i, LANES)
-        steady = traction(race.traction, approach.slip, approach.load)
+        steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
         coefficient = packed[COEFFICIENTS + i]
         keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, side, approach, steady, coefficient))
 
@@ -504,7 +508,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     return on_ring
 
 
-@with_open_films.body(OpenFilm)
+@with_open_films.body(OpenFilm, LayerFilm)
 def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     sums = on_ring
     for start in range(0, rollers, LANES):

@@ -15,7 +15,7 @@ from rbdyn.compiled.kernel import VECTOR, kernel, law
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.contact.traction import acting_coefficient, coefficient_rate, traction
+from rbdyn.contact.tangential import response, steady_traction
 
 
 class RoundRace(NamedTuple):
@@ -223,10 +223,11 @@ def race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed,
 
 @kernel
 def race_wrench(race, side, approach, steady, coefficient):
-    """``RaceWrench`` of a ``RaceApproach`` with the traction coefficients of the steady law and of the state."""
-    load, slip, stiffness = approach.load, approach.slip, approach.stiffness
+    """``RaceWrench`` of a ``RaceApproach`` with its ``SteadyTraction`` and the traction coefficient of the state."""
+    load, slip = approach.load, approach.slip
     speed = max(abs(approach.entrainment), SMALLEST_SPEED)
-    traction_force = acting_coefficient(race.tangential, steady, coefficient, load, slip, stiffness) * load
+    tangential = response(race.tangential, steady, coefficient, load, slip, approach.stiffness)
+    traction_force = tangential.coefficient * load
     resistance = rolling_force(race.rolling, load, speed)
     rolling = math.copysign(resistance, approach.entrainment)
     normal = -side * load
@@ -244,7 +245,7 @@ def race_wrench(race, side, approach, steady, coefficient):
         2.0 * rolling * approach.entrainment,
         approach.damping,
         slip,
-        coefficient_rate(race.tangential, steady, coefficient, load, slip, stiffness),
+        tangential.rate,
     )
 
 
@@ -262,5 +263,5 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     bears the moment about the ring's centre.
     """
     approach = race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin)
-    steady = traction(race.traction, approach.slip, approach.load)
+    steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
     return race_wrench(race, side, approach, steady, coefficient)

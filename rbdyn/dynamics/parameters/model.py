@@ -15,15 +15,18 @@ from rbdyn.contact.cage_film import short_journal_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, slice_contact
 from rbdyn.contact.rolling_resistance import (
+    LayerFilm,
     NoRollingResistance,
     OpenFilm,
     aihara_thermal_factor,
     biboulet_houpert,
+    gap_ahead,
     open_film,
     starved,
     touching_gap,
 )
-from rbdyn.contact.traction import CoulombTraction, ElasticContact, NoTraction, RigidContact, dry_friction
+from rbdyn.contact.tangential import ElasticContact, RigidContact
+from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.bodies import (
     BalancedCage,
     Gravity,
@@ -49,7 +52,7 @@ from rbdyn.dynamics.forces.cage import (
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
 from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
-from rbdyn.dynamics.parameters.state import contact_approach, layout_of
+from rbdyn.dynamics.parameters.state import contact_approach, layout_of, load_distribution
 from rbdyn.properties.materials import Oil, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
@@ -211,6 +214,8 @@ def _lambda(scene: Scene, film: Any) -> Any:
     return film_thickness.lambda_ratio(film, lubricant.roller_roughness, lubricant.race_roughness)
 
 
+# Load up to which the traction coefficient of an elastic contact fades in, as a share of the load of the most loaded roller.
+LIGHT_LOAD = 0.01
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
 
@@ -220,7 +225,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
     drawing, geometry = scene.bearing, scene.geometry
     mass, radii = geometry.roller_mass, geometry.roller_radii
     angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
-    return RollerBearing(
+    bearing = RollerBearing(
         rollers=drawing.rollers,
         sizes=EqualRollers(geometry.roller_radius) if radii is None else unequal_rollers(radii),
         roller_mass=mass,
@@ -239,6 +244,38 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         drive=_drive(scene),
         gravity=_gravity(scene),
     )
+    if not isinstance(bearing.open_film, LayerFilm):
+        return bearing
+    # The loads that lay the oil do not depend on its film.
+    return bearing._replace(open_film=_open_film(scene, scene.oil("inner"), oil_layer(scene, bearing)))
+
+
+def oil_layer(scene: Scene, bearing: RollerBearing | None = None) -> float:
+    """Largest gap [m] that oil fills at the inner race: h_s = h_c + gap_ahead(m) b^2/(2 R) of the mean loaded inner contact.
+
+    m is lubricant.inlet_distance, b the half-width at that contact's load and h_c its film. The oil of a loaded contact begins
+    there, and the same oil feeds the open contacts. Without a loaded contact, or an inlet distance,
+    it is 0. ``bearing``: parameters of the
+    scene with any film, for a caller that has them.
+
+    The layer is a constant of a scene, by its static loads over a turn, the temperature of its films and its operating
+    clearance, so a heat balance finds it anew at each of its temperatures. The load is the root mean square over a turn of the
+    steady and the rotating load. Speed changes h_c alone, which is that of the nominal speed like every film. A schedule leaves
+    the layer at the nominal load and speed: what runs far from them is a scene of its own.
+    """
+    return scene.once("oil_layer", lambda: _oil_layer(scene, bearing or roller_bearing(scene)))
+
+
+def _oil_layer(scene: Scene, bearing: RollerBearing) -> float:
+    operation, distance = scene.operation, scene.lubricant.inlet_distance
+    turning = operation.rotating_load_N + operation.unbalance * operation.speeds[0] ** 2
+    inner = load_distribution(scene, bearing, math.hypot(operation.radial_load_N, turning)).inner
+    if distance is None or not np.any(inner > 0.0):
+        return 0.0
+    load, contact, film = float(inner[inner > 0.0].mean()), rolling_contacts(scene)["inner"], 0.0
+    if contact.entrainment_speed > ROLLING:
+        film = float(film_thickness.film_in_service(contact, scene.oil("inner"), load, distance))
+    return film + gap_ahead(distance) * float(film_thickness.half_width(contact, load)) ** 2 / (2.0 * contact.radius)
 
 
 def _modulus(scene: Scene, first: str, second: str) -> float:
@@ -276,8 +313,8 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
     mass = scene.geometry.roller_mass
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
     # Translation acts with the mass of the roller on two springs, traction with the third of it that turns with the slip.
-    shortest, damping = math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
-    return ElasticContact(start + place * scene.bearing.rollers, shortest, damping)
+    shortest, damping = 0.75 * math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
+    return ElasticContact(start + place * scene.bearing.rollers, shortest, damping, 1.0 / (LIGHT_LOAD * load))
 
 
 def _form(harmonics: list[Harmonic]) -> Any:
@@ -357,8 +394,8 @@ def _rolling_reduction(scene: Scene, oil: Oil) -> float:
     return heating * scene.model.rolling_resistance_factor
 
 
-def _open_film(scene: Scene, oil: Oil) -> NoOpenFilm | OpenFilm:
-    """Film of the inner race and a roller that does not touch it."""
+def _open_film(scene: Scene, oil: Oil, layer: float = 0.0) -> NoOpenFilm | OpenFilm | LayerFilm:
+    """Film of the inner race and a roller that does not touch it, fed by an oil ``layer`` [m] unless the races are flooded."""
     if not scene.model.open_contact_film:
         return NoOpenFilm()
     lubricant, length, radius = scene.lubricant, scene.bearing.effective_length, scene.geometry.reduced_radii[1]
@@ -367,7 +404,8 @@ def _open_film(scene: Scene, oil: Oil) -> NoOpenFilm | OpenFilm:
     speed = abs(scene.geometry.motion.entrainment)
     touching = touching_gap(oil.viscosity, radius, length, speed, stiffness, roughness)
     reduction = _rolling_reduction(scene, oil)
-    return open_film(oil.viscosity, radius, length, lubricant.inlet_distance, reduction, touching)
+    fed = None if lubricant.inlet_distance is None else layer
+    return open_film(oil.viscosity, radius, length, reduction, touching, fed)
 
 
 def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:

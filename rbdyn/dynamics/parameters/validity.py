@@ -12,12 +12,14 @@ import numpy as np
 from rbdyn.base.faults import RPM
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, dent_sentence, palmgren
+from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
-from rbdyn.dynamics.parameters.model import film_report, race_contact_law, rolling_contacts
+from rbdyn.dynamics.parameters.model import film_report, oil_layer, race_contact_law, rolling_contacts
 from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
+from rbdyn.scene.unknown import documented_of
 
 # Film over roughness below which asperities bear part of the load.
 FULL_FILM = 1.0
@@ -127,8 +129,10 @@ NOTED_SHARE = 0.03
 JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
 
 
-# Share of C below which films decide the slip: an NU 210 at 6000 rpm slips by 1 % under 0.03 C, by 0.35 under 0.003 C.
+# Share of C below which films decide the slip: an NU 210 at 6000 rpm slips by 0.7 % under 0.03 C, by 28 % under 0.003 C.
 FILM_DRIVEN = 0.01
+# Cage slip from which the form of the traction law matters.
+NOTED_SLIP, LAW = 0.01, "traction.model"
 
 
 class LeftOut(NamedTuple):
@@ -200,7 +204,8 @@ def open_inner_films(scene: Scene) -> float:
     """Power of the oil films between inner race and the rollers that it does not load [W]; 0 where the scene has them.
 
     Each film takes 2 u times 4.601 eta u l sqrt(R/h), averaged over the circle, with the gap h = c - (c + d) cos psi. The ring
-    is displaced by the radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z).
+    is displaced by the radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z). With an inlet distance
+    a film has the share of it that the oil layer feeds.
     """
     clearance = 0.5 * scene.geometry.clearance
     if clearance <= 0.0 or scene.model.open_contact_film:
@@ -212,7 +217,13 @@ def open_inner_films(scene: Scene) -> float:
     angle = (np.arange(2000) + 0.5) * math.pi / 2000
     gap = clearance - (clearance + approach) * np.cos(angle)
     speed, oil = scene.geometry.motion.entrainment, scene.oil("inner")
-    powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
+    gap = gap[gap > 0.0]
+    powers = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap)
+    if scene.lubricant.inlet_distance is not None:
+        filled = np.linspace(0.0, 1.0, 41)[1:-1] ** 2
+        shares = [inlet(math.sqrt(1.0 / part - 1.0)).rolling / inlet(math.inf).rolling for part in filled]
+        part = gap / max(oil_layer(scene), THINNEST_LAYER)
+        powers *= np.interp(np.sqrt(part), np.sqrt([0.0, *filled, 1.0]), [1.0, *shares, 0.0])
     return count * float(powers.sum()) / angle.size
 
 
@@ -306,14 +317,40 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
         return ()
     limit = f"{100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN"
     if scene.model.open_contact_film:
+        films = "are flooded, for lubricant.inlet_distance is left out"
+        if scene.lubricant.inlet_distance is not None:
+            layer = oil_layer(scene)
+            films = f"fill gaps up to {1e6 * layer:.2g} um, as lubricant.inlet_distance and the load set it"
+            films = (
+                films
+                if layer > 0.0
+                else "are missing, for no loaded inner contact feeds them by lubricant.inlet_distance"
+            )
         return (
-            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films and on "
-            "lubricant.inlet_distance; compare it over the range of that key",
+            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, which at open contacts {films}; "
+            "compare it over the range of that key",
         )
     return (
         f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, of which those at open inner "
         "contacts are left out; set model.open_contact_film = true",
     )
+
+
+def traction_law_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+    """A note where the cage slips so much that the form of the traction law decides how slip changes with a clearance or the oil."""
+    laws = {law for entry in documented_of(scene) if entry.key == LAW for law in entry.values or ()}
+    others = sorted(laws - {scene.traction.model})
+    if slip < NOTED_SLIP or scene.traction.model == "off" or not others:
+        return ()
+    return (
+        f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}', and so does its change with temperature "
+        f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key",
+    )
+
+
+def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+    """Notes on what a cage ``slip`` rests on: the traction law, oil films, and a load below what makers ask for."""
+    return (*traction_law_notes(scene, slip), *film_drive_notes(scene), *light_load_notes(scene))
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Figures of a scene with their error bars: end of the transient, drift, slow change, and notes on large errors.
+"""Figures of a scene with their error bars: end of the transient, settling, slow change, and notes on large errors.
 
 MSER-5 on the mean of the replicates finds the transient. The marginal standard error rule (White 1997, *Simulation* 69, 323;
 MSER-5: White, Cobb and Spratt 2000) works on means of five batches. It drops the head of the series, at most half of the
@@ -7,18 +7,20 @@ transient and lowers the noise. On stationary noise the rule would still drop a 
 if its mean differs from that of the rest beyond their scatter.
 
 Cages have slow regimes. Loose ones change the way they whirl over 20 to 400 shaft turns, at random moments, so no curve
-fitted to a start shows its limit. A test can show whether the counted turns drift. Each replicate gives the figure of its
-later half less that of its earlier half. Replicates are independent, so Student's t of these differences needs no memory of
-the series. Heidelberger and Welch (1983, *Operations Research* 31, 1109) test a single series against its spectrum. The test
-covers each figure and the mean speed of the cage's centre, which shows a change of regime first. Its level is that of
-all figures together (Holm 1979, *Scandinavian Journal of Statistics* 6, 65): one settled run in twenty is lengthened in
-vain. A drift within the error of its figure, or below a hundredth of it, lengthens no run.
+fitted to a start shows its limit, and replicates that begin alike agree with each other all the while. So they begin in
+groups, from states that are clearly different (``parameters.state``). One test says whether a run has settled: nested R-hat
+(Margossian, Hoffman, Sountsov, Riou-Durand, Vehtari and Gelman 2024, *Bayesian Analysis*), which compares the variance
+between the means of groups, and between those of earlier and later halves, with the variance within. Two groups and two halves
+leave one difference each, and R-hat^2 - 1 is proportional to the square of its Student's t. So the threshold is one of t,
+which knows how few replicates there are. Differences are of independent replicates and need no memory of the series. The test
+covers each figure and the mean speed of the cage's centre, which shows a change of regime first. Its level is that of all
+differences together (Holm 1979, *Scandinavian Journal of Statistics* 6, 65): one settled run in twenty is lengthened in
+vain. A difference within the error of its figure, or below a hundredth of it, lengthens no run.
 
-A drift d with standard error s that lengthens nothing still hides a bias. If a transient at least halves from one half to
-the next, the mean over both is off by at most 3 d/2. Where any figure is likelier than not to drift, the transient is not
-over, and sqrt(d^2 + s^2) of every figure counts so. Elsewhere the part of d above its noise counts, max(|d| - s, 0). On seven
-scenes the interval then holds the truth in 0.89 to 0.99 of 200 repeats of each figure. With max(|d| - s, 0) alone it does so
-in 0.33 of repeats where replicates scatter little.
+A difference d with standard error s that lengthens nothing still hides a bias. If a transient at least halves from one half to
+the next, the mean over both is off by at most 3 d/2. The groups come from either side of what they settle to, so their mean is
+off by at most d/2. Where any figure is likelier than not to differ, the transient is not over, and sqrt(d^2 + s^2) of every
+figure counts so. Elsewhere the part of d above its noise counts, max(|d| - s, 0).
 
 Some regimes last for good. Of the replicates of the bearing of Chen et al. 2022 one in 25 ends in another one, at loose
 clearances one in 8. A regime without any of n replicates has a share of about 1/(n + 1) (Laplace's rule of succession). Its
@@ -27,12 +29,15 @@ The product of both counts too.
 """
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.dynamics.parameters.state import GROUPS
 from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_chance, student_factor
 from rbdyn.dynamics.statistics.metrics import Figure, Replicate, Runs, mean, quantity
@@ -46,15 +51,16 @@ FEWEST_GROUPS = 8
 SIGNIFICANT = 4.0
 # From so many replicates on their differences are tested; fewer are tested by batch means.
 FEWEST_REPLICATES = 3
-# Share of settled runs in which a figure seems to drift: of those that are lengthened, and of those whose errors count the
-# whole drift, which costs no turn.
-FALSE_ALARMS, DOUBT = 0.05, 0.3
-# Drift of a figure, over the figure, for which no run is lengthened.
+# Share of settled runs in which a figure seems to differ: of those that are lengthened, and of those whose errors count the
+# whole difference, which costs no turn.
+FALSE_ALARMS, DOUBT = 0.05, 0.5
+# Difference of a figure, over the figure, for which no run is lengthened.
 NEGLIGIBLE = 1e-2
 # Impact windows in a stretch.
 STRETCH = 2
-# Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2.
-BIAS_OF_DRIFT = 1.5
+# Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2. Mean of
+# two groups, over their difference, where the truth is anywhere between them.
+BIAS_OF_HALVES, BIAS_OF_GROUPS = 1.5, 0.5
 
 
 def find_transient(series: Array) -> int | None:
@@ -140,80 +146,104 @@ TESTED = {
 }
 
 
-class Drift(NamedTuple):
-    """Later half of the counted part less the earlier one: mean over replicates, standard error, degrees of freedom of that.
+class Difference(NamedTuple):
+    """A figure in one half or group less that in the other: mean, standard error, degrees of freedom of that.
 
-    ``figure``: size of the figure.
+    ``figure``: size of the figure; ``share``: bias of the mean of both, over the difference.
     """
 
     size: float
     error: float
     freedom: int
     figure: float
+    share: float
 
     @property
     def chance(self) -> float:
-        """Chance that the halves of a settled run differ by as much."""
+        """Chance that a settled run shows as large a difference."""
         if self.size == 0.0:
             return 1.0
         return student_chance(self.size / self.error, self.freedom) if self.error > 0.0 else 0.0
 
     def bias(self, moving: bool) -> float:
-        """Bias of the mean of both halves: by the whole drift where figures are ``moving``, elsewhere by its part above noise."""
-        drift = math.hypot(self.size, self.error) if moving else max(abs(self.size) - self.error, 0.0)
-        return BIAS_OF_DRIFT * drift
+        """Bias of the mean: by the whole difference where figures are ``moving``, elsewhere by its part above noise."""
+        size = math.hypot(self.size, self.error) if moving else max(abs(self.size) - self.error, 0.0)
+        return self.share * size
 
 
-def drift_of(figure: Figure, runs: Runs) -> Drift | None:
-    """Drift of a figure over the counted turns; None where they are too few to decide."""
+def differences_of(figure: Figure, runs: Runs) -> list[Difference]:
+    """Later half of the counted turns less the earlier one, and the second group of starts less the first.
+
+    None where the turns are too few to decide; none of groups where all replicates but two start alike.
+    """
     moments = [figure.moments(run) for run in runs]
     rows = min(len(part) for part in moments)
     half = rows // 2
     if half == 0:
-        return None
+        return []
     size = abs(float(figure.of_sums(np.sum([part.sum(axis=0) for part in moments], axis=0))))
     early, late = ([part[rows - 2 * half : rows - half] for part in moments], [part[-half:] for part in moments])
-    if len(runs) >= FEWEST_REPLICATES:
-        change = np.array(
-            [figure.of_sums(b.sum(axis=0)) - figure.of_sums(a.sum(axis=0)) for a, b in zip(early, late, strict=True)]
-        )
-        error = float(change.std(ddof=1)) / math.sqrt(len(runs))
-        return Drift(float(change.mean()), error, len(runs) - 1, size)
-    before, after = (estimate(part, figure.of_sums) for part in (early, late))
-    if before.half_width is None or after.half_width is None:
+    groups = [[part for part, run in zip(moments, runs, strict=True) if run.group == group] for group in range(GROUPS)]
+    if len(runs) < FEWEST_REPLICATES:
+        halves = _by_batches(figure, early, late, BIAS_OF_HALVES, size)
+        apart = _by_batches(figure, groups[0], groups[1], BIAS_OF_GROUPS, size) if all(groups) else None
+        return [each for each in (halves, apart) if each is not None]
+    change = _values(figure, late) - _values(figure, early)
+    error = float(change.std(ddof=1)) / math.sqrt(len(runs))
+    found = [Difference(float(change.mean()), error, len(runs) - 1, size, BIAS_OF_HALVES)]
+    if all(groups):
+        first, second = (_values(figure, group) for group in groups)
+        freedom = len(runs) - GROUPS
+        within = sum(float(group.var()) * len(group) for group in (first, second)) / freedom
+        error = math.sqrt(within * (1.0 / len(first) + 1.0 / len(second)))
+        found.append(Difference(float(second.mean() - first.mean()), error, freedom, size, BIAS_OF_GROUPS))
+    return found
+
+
+def _values(figure: Figure, moments: Sequence[Array]) -> Array:
+    """The figure of each replicate."""
+    return np.array([float(figure.of_sums(part.sum(axis=0))) for part in moments])
+
+
+def _by_batches(
+    figure: Figure, before: Sequence[Array], after: Sequence[Array], share: float, size: float
+) -> Difference | None:
+    """Difference of two sets of moments whose errors come from batch means; None where these are too few."""
+    parts = [estimate(part, figure.of_sums) for part in (before, after)]
+    halves = [part.half_width for part in parts if part.half_width is not None]
+    if len(halves) < len(parts):
         return None
-    freedom = max(len(runs) * half - 1, 1)
-    error = math.hypot(before.half_width, after.half_width) / student_factor(freedom)
-    return Drift(after.value - before.value, error, freedom, size)
+    freedom = max(sum(len(part) for part in after) - 1, 1)
+    error = math.hypot(*halves) / student_factor(freedom)
+    return Difference(parts[1].value - parts[0].value, error, freedom, size, share)
 
 
-def significant_drifts(runs: Runs, false_alarms: float) -> dict[Figure, Drift]:
-    """The tested figures that drift beyond their scatter; the share ``false_alarms`` of settled runs has any."""
-    drifts = {figure: drift for figure in TESTED.values() if (drift := drift_of(figure, runs)) is not None}
-    ranked = sorted(drifts, key=lambda figure: drifts[figure].chance)
-    settled = (drifts[figure].chance > false_alarms / (len(ranked) - place) for place, figure in enumerate(ranked))
-    first = next((place for place, is_settled in enumerate(settled) if is_settled), len(ranked))
-    return {figure: drifts[figure] for figure in ranked[:first]}
+def disagreements(runs: Runs, false_alarms: float) -> list[tuple[Figure, Difference]]:
+    """The tested differences that are beyond scatter; the share ``false_alarms`` of settled runs has any."""
+    found = [(figure, each) for figure in TESTED.values() for each in differences_of(figure, runs)]
+    ranked = sorted(found, key=lambda each: each[1].chance)
+    settled = (each.chance > false_alarms / (len(ranked) - place) for place, (_, each) in enumerate(ranked))
+    return ranked[: next((place for place, is_settled in enumerate(settled) if is_settled), len(ranked))]
 
 
 def drifting(runs: Runs) -> bool:
-    """Whether any figure may still drift, so that the errors of all must cover it."""
-    return bool(significant_drifts(runs, DOUBT))
+    """Whether any figure may still change, so that the errors of all must cover it."""
+    return bool(disagreements(runs, DOUBT))
 
 
-def worth_lengthening(runs: Runs, since: int) -> bool:
-    """Whether a figure drifts by more than a hundredth of it and than its error without the drift.
+def settled(runs: Runs, since: int) -> bool:
+    """Whether halves and groups of the runs agree: within scatter, a hundredth of the figure, or its error.
 
     ``since``: batch from which the runs show their regimes.
     """
-    return any(
-        abs(drift.size) > max(NEGLIGIBLE * drift.figure, _settled_error(figure, runs, since))
-        for figure, drift in significant_drifts(runs, FALSE_ALARMS).items()
+    return all(
+        abs(each.size) <= max(NEGLIGIBLE * each.figure, _settled_error(figure, runs, since))
+        for figure, each in disagreements(runs, FALSE_ALARMS)
     )
 
 
 def _settled_error(figure: Figure, runs: Runs, since: int) -> float:
-    """Half-width of a figure whose runs do not drift."""
+    """Half-width of a figure whose runs agree."""
     scatter = estimate([figure.moments(run) for run in runs], figure.of_sums).half_width
     return math.hypot(scatter or 0.0, unseen_regime(figure, runs, since))
 
@@ -232,12 +262,12 @@ def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
 
 
 def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, moving: bool) -> float:
-    """Half-width that slow change adds to a figure of steady runs: drift and unseen regimes, as root sum of squares.
+    """Half-width that slow change adds to a figure of steady runs: differences and unseen regimes, as root sum of squares.
 
     ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
     """
-    drifts = (drift_of(one, runs) for one in {figure, tested})
-    bias = max((drift.bias(moving) for drift in drifts if drift is not None), default=0.0)
+    differences = (each for one in {figure, tested} for each in differences_of(one, runs))
+    bias = max((each.bias(moving) for each in differences), default=0.0)
     return math.hypot(bias, unseen_regime(figure, runs, since))
 
 
@@ -274,7 +304,7 @@ def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Re
 def quantities(
     scene: Scene, runs: Runs, companions: Runs, share: float, since: int | None = None
 ) -> dict[str, Quantity]:
-    """Every figure with its errors, by its name in a record.
+    """Every figure with its errors, by its name in a record; without a statistical one where the runs have not settled.
 
     ``share`` of the difference from the companions is the bias of the runs. ``since``: batch from which the replicates show
     their regimes; unless given, that from which they count.
@@ -282,9 +312,11 @@ def quantities(
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
     figures, moving = {}, steady and drifting(runs)
+    unknown = moving and not settled(runs, since)
     for name, (figure, unit) in FIGURES.items():
         slow = slow_change(figure, TESTED.get(name, figure), runs, since, moving=moving) if steady else 0.0
-        figures[name] = quantity(figure, runs, companions, share, slow, unit)
+        one = quantity(figure, runs, companions, share, slow, unit)
+        figures[name] = replace(one, statistical_error=None, degrees_of_freedom=None) if unknown else one
     return figures
 
 
@@ -311,10 +343,10 @@ def _enough(figure: Quantity) -> bool:
 
 
 def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> str | None:
-    error, size = figure.numerical_error, abs(figure.value)
-    if error is None or size == 0.0:
+    error, statistical, size = figure.numerical_error, figure.statistical_error, abs(figure.value)
+    if error is None or statistical is None or size == 0.0:
         return None
-    biased = error > RULES * (figure.statistical_error or 0.0)
+    biased = error > RULES * statistical
     if error <= (NOTICEABLE if biased else LARGE) * size:
         return None
     rtol, percent = scene.numerics.rtol, f"{100.0 * error / size:.2g} %"

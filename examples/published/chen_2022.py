@@ -1,4 +1,8 @@
-"""Check 1: the 20 design runs of Chen et al. 2022, Table 4, ours beside theirs, with two traction laws."""
+"""Check 1: the 20 design runs of Chen et al. 2022, Table 4, ours beside theirs: with two traction laws, and with their closures.
+
+Their pocket and land are Hertz contacts, without elastic bar, damping or film, and oil flows to the bearing. With all of that
+in the scene the levels follow; what each part does is shown at the centre of the design.
+"""
 
 from __future__ import annotations
 
@@ -39,6 +43,18 @@ FACTORS = {
 }
 SHORT = {"radial_clearance_mm": "A radial", "guide_clearance_mm": "B guide", "pocket_clearance_mm": "C pocket"}
 DRAWS = 1000
+# What Chen et al. 2022 have in place of our defaults, part by part; no tuned value.
+RIGID_BARS = ("model.pocket_bar_stiffness_N_m=rigid",)
+UNDAMPED = ("model.pocket_damping_alpha_s_m=0", "model.land_damping_alpha_s_m=0")
+DRY_LAND = ("model.guide_land=dry", "model.land_friction=0.036")
+FLOW = ("lubricant.oil_flow_l_min=1.0",)
+THEIR_CONTACTS = (*RIGID_BARS, *UNDAMPED, *DRY_LAND, *FLOW)
+CLOSURES = {
+    "our defaults": (), "rigid bars": RIGID_BARS, "and undamped pocket and land": RIGID_BARS + UNDAMPED,
+    "and dry land, coefficient 0.036": RIGID_BARS + UNDAMPED + DRY_LAND, "our defaults, oil by 1 L/min": FLOW,
+    "all together": THEIR_CONTACTS,
+}  # fmt: skip
+THEIRS = "their contacts"
 
 
 @dataclass(frozen=True)
@@ -143,8 +159,9 @@ def table4(effort: Effort, laws: Sequence[str] = LAWS) -> Check:
     x = coded(reference.points)
     records, runs = [], {}
     fits = [("Chen et al. 2022", *reciprocal_terms(reference.points, reference.values["power_loss_W"]))]
-    for law in laws:
-        values, errors = ours(reference.points, effort, (f"traction.model={law}",))
+    variants = {law: (f"traction.model={law}",) for law in laws} | {THEIRS: THEIR_CONTACTS}
+    for law, overrides in variants.items():
+        values, errors = ours(reference.points, effort, overrides)
         runs[law] = values, errors
         fits.append((f"ours, {law}", *reciprocal_terms(reference.points, values["power_loss_W"])))
         for response in RESPONSES:
@@ -179,8 +196,8 @@ def table4(effort: Effort, laws: Sequence[str] = LAWS) -> Check:
 
     return Check(
         "Chen et al. 2022, Table 4: 20 designs of three clearances",
-        (levels_table(frame), effects_table(frame), power_table(fits)),
-        f"{conclusion(frame, fits)} {tally(findings(frame))}.",
+        (levels_table(frame), centre_table(effort, reference), effects_table(frame), power_table(fits)),
+        f"{conclusion(frame[frame['law'] != THEIRS], fits)} {explanation(frame)} {tally(findings(frame))}.",
         frame,
         draw,
         findings(frame),
@@ -223,6 +240,31 @@ def levels_table(frame: pd.DataFrame) -> Table:
             )
             for row in frame.to_dict("records")
         ),
+    )
+
+
+def centre_table(effort: Effort, reference: Theirs) -> Table:
+    """The three responses at the centre of the design as the closures of the paper come in, part by part."""
+    rows = []
+    for name, overrides in CLOSURES.items():
+        result = simulated(CHEN, effort, overrides)
+        figures = (quantity(result, response) for response in RESPONSES)
+        rows.append((name, *(with_error(figure.value, error(figure)) for figure in figures)))
+    centre = reference.values.iloc[int(np.argmax(reference.counts))]
+    rows.append(("Chen et al. 2022", *(f"{centre[response]:.3g}" for response in RESPONSES)))
+    return Table(
+        "centre of the design, part by part", ("contacts", "impact [N]", "whirl ratio", "loss [W]"), tuple(rows)
+    )
+
+
+def explanation(frame: pd.DataFrame) -> str:
+    """What the closures of the paper explain and what not."""
+    own = frame[frame["law"] == THEIRS].set_index("response")
+    levels = ", ".join(f"{PLAIN[name]} {own.level_ratio[name]:.2f}" for name in RESPONSES)
+    ranks = ", ".join(f"{own.spearman[name]:+.2f}" for name in RESPONSES)
+    return (
+        f"With the contacts of the paper and 1 L/min of oil our levels over theirs are {levels}, and the rank correlations "
+        f"{ranks}: the contacts explain the levels, not the trends."
     )
 
 

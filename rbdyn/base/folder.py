@@ -1,0 +1,284 @@
+"""The folder that ``--out`` names: what a command may write there, its lock, and the list of the files that it made.
+
+A folder belongs to one command and one file. Its ``made_by.json`` names both, and lists each file made with its SHA-256. A
+command writes over a file only if it is on that list and unchanged, or with ``force``; it never writes over a file that it
+read. Names that differ only in case count as one, because some disks take them for one. A link counts as a file of
+somebody else.
+
+All files of a command are first written to a folder within the folder and then moved into place, so an interruption leaves
+whole files: old ones, or new ones. One process at a time works in a folder.
+"""
+
+import os
+import shutil
+import socket
+import sqlite3
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rbdyn.base import lock
+from rbdyn.base.faults import InputError, files_read, read_bytes, record_read, recorded_reads, refuse
+from rbdyn.base.storage import digest_of
+from rbdyn.base.streams import Uninterrupted
+from rbdyn.result import naming, read_json, write_json
+
+T = TypeVar("T")
+# File that names the command and the input of a folder of results, and the folder of files that are not yet whole.
+MARK, PARTIAL = "made_by.json", ".made_by.partial"
+OWN = {MARK, PARTIAL, lock.NAME, f"{lock.NAME}-journal"}
+# Most names in a sentence.
+NAMED = 3
+
+
+class OutputFolder:
+    """An output folder of a command; without a ``path`` nothing is written.
+
+    ``files``: patterns of the names that the command may write. ``keeps``: names of files that it changes while it runs.
+    """
+
+    def __init__(
+        self, path: Path | None, command: str, files: Sequence[str], keeps: Sequence[str] = (), force: bool = False
+    ) -> None:
+        self.path, self._command, self._force, self._keeps = path, command, force, keeps
+        self._patterns = [_folded(name) for name in (*files, *keeps, MARK)]
+        self._mark: dict[str, Any] = {}
+        self._locked = self._new = False
+
+    def claim(self, source: Path | None = None, *others: Path) -> None:
+        """Make the folder and lock it for results of the file ``source``; ``others``: files that are read later.
+
+        Raises InputError before anything is written: where a file is in the way, for the folder of another command or file,
+        and where another process works in the folder.
+        """
+        path = self.path
+        if path is None:
+            return
+        own = self._owner(path, source)
+        for other in others:
+            record_read(other)
+        try:
+            self._check(path, own)
+            self._new = not path.exists()
+            path.mkdir(parents=True, exist_ok=True)
+            if lock.seize_lock(path, alone=True) is None:
+                raise InputError(
+                    [f"--out {path}: {self._holder(path)} works in it; wait until it has ended, or name another folder"]
+                )
+            self._locked = True
+            earlier = self._check(path, own)
+            shutil.rmtree(path / PARTIAL, ignore_errors=True)
+            made = _resolved(path, _lists(earlier)) | dict.fromkeys(self._keeps)
+            self._mark = {**own, "process": f"process {os.getpid()} on {socket.gethostname()}", "files": made}
+            write_json(path / MARK, self._mark)
+        except (OSError, sqlite3.Error) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError([f"--out {path}: cannot be written to ({reason}); name another folder"]) from None
+
+    def write(self, make: Callable[[Path], T], last: str = "") -> T:
+        """Let ``make`` write files into a folder, and move them into this one; returns what ``make`` returns.
+
+        ``last``: the file that marks the others as complete. Its old version goes first and its new one comes last. Raises
+        InputError where a file of somebody else has come into the way meanwhile; OSError that names its file.
+        """
+        assert self.path is not None
+        stage = self.path / PARTIAL
+        try:
+            stage.mkdir(exist_ok=True)
+            with naming(lambda: self.path / _newest(stage)):  # type: ignore[operator]
+                made = make(stage)
+            with Uninterrupted():
+                self._move(self.path, stage, last)
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
+        return made
+
+    def close(self) -> None:
+        """Free the lock; a folder that the command made for nothing goes."""
+        if self.path is None or not self._locked:
+            return
+        with suppress(OSError):
+            names = set(os.listdir(self.path))
+            if self._new and names <= OWN:
+                (self.path / MARK).unlink()
+            else:
+                made = self._mark["files"].items()
+                self._mark["files"] = {name: digest for name, digest in made if digest or name in names}
+                write_json(self.path / MARK, {key: value for key, value in self._mark.items() if key != "process"})
+        self._locked = False
+        lock.free_lock(self.path)
+        if self._new:
+            with suppress(OSError):
+                self.path.rmdir()
+
+    def _owner(self, path: Path, source: Path | None) -> dict[str, str]:
+        """The command, its file relative to the folder, so that both can move together, and the digest of that file.
+
+        A file that can be read only once, such as a pipe, has no place.
+        """
+        if source is None:
+            return {"command": self._command, "file": "", "sha256": ""}
+        digest, real = digest_of(read_bytes(source)), os.path.realpath(source)
+        file = os.path.relpath(real, os.path.realpath(path)) if os.path.isfile(real) else ""
+        return {"command": self._command, "file": file, "sha256": digest}
+
+    def _holder(self, path: Path) -> str:
+        """The process that works in the folder, in words."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            return str(read_json(path / MARK)["process"])
+        return "another process"
+
+    def _check(self, path: Path, own: dict[str, str]) -> dict[str, Any]:
+        """The note of the command that wrote here before; empty without one. Raises InputError."""
+        try:
+            entries = {entry.name: entry for entry in os.scandir(path)}
+        except FileNotFoundError:
+            return {}
+        earlier: dict[str, Any] = {}
+        try:
+            if MARK in entries:
+                earlier = _checked(read_json(path / MARK), entries[MARK])
+        except (OSError, ValueError, KeyError, TypeError):
+            if not self._force:
+                raise InputError(
+                    [f"--out {path}: its {MARK} cannot be read; name another folder, remove this one or add --force"]
+                ) from None
+        if earlier and entries.keys() - OWN and not self._force and not _same_owner(own, earlier):
+            source = os.path.normpath(path / earlier["file"]) if earlier["file"] else "another input"
+            raise InputError(
+                [
+                    f"--out {path}: holds results of {earlier['command']} from {source}; "
+                    "name another folder or remove this one"
+                ]
+            )
+        refuse(self._conflicts(path, entries.values(), _lists(earlier)))
+        return earlier
+
+    def _conflicts(self, path: Path, entries: Iterable[os.DirEntry[str]], made: dict[str, Any]) -> Iterator[str]:
+        """Sentences on the entries of the folder that the command would write over and must not."""
+        inputs, folders, foreign = list[str](), list[str](), list[str]()
+        for entry in sorted(entries, key=lambda entry: entry.name):
+            if not any(fnmatchcase(_folded(entry.name), pattern) for pattern in self._patterns):
+                continue
+            if entry.is_dir():
+                folders.append(entry.name)
+            elif _is_read(entry):
+                inputs.append(entry.name)
+            elif not self._force and not _is_ours(entry, made):
+                foreign.append(entry.name)
+        if inputs:
+            yield f"--out {path}: {_listed(inputs)} would be written over, but this command reads it; name another folder"
+        if folders:
+            yield f"--out {path}: {_listed(folders)} is a folder where a file belongs; move it away or name another folder"
+        if foreign:
+            yield (
+                f"--out {path}: {_listed(foreign)} would be written over, but {self._command} did not make it or it was changed "
+                "since; name another folder, move it away or add --force"
+            )
+
+    def _move(self, path: Path, stage: Path, last: str) -> None:
+        """Move all files of ``stage`` into place. At every moment the note lists what is in the folder."""
+        names = sorted((entry.name for entry in os.scandir(stage)), key=lambda name: (name == last, name))
+        for name in names:
+            assert any(fnmatchcase(_folded(name), pattern) for pattern in self._patterns), f"{name} is not declared"
+        folded = {_folded(name) for name in names}
+        present = [entry for entry in os.scandir(path) if _folded(entry.name) in folded]
+        refuse(self._conflicts(path, present, self._mark))
+        made = self._mark["files"]
+        self._mark["replaced"] = {entry.name: _digest(Path(entry.path)) for entry in present if entry.is_file()}
+        made |= {name: digest_of((stage / name).read_bytes()) for name in names}
+        write_json(path / MARK, self._mark)
+        if last:
+            (path / last).unlink(missing_ok=True)
+        for name in names:
+            os.replace(stage / name, path / name)
+        del self._mark["replaced"]
+        write_json(path / MARK, self._mark)
+
+
+@contextmanager
+def output_folder(
+    path: Path | None, command: str, files: Sequence[str], keeps: Sequence[str] = (), force: bool = False
+) -> Iterator[OutputFolder]:
+    """The folder ``path`` of a command, which notes all files that the command reads from now on; see ``OutputFolder``.
+
+    The command must claim it once it has read its input, and before it runs anything.
+    """
+    folder = OutputFolder(path, command, files, keeps, force)
+    with recorded_reads():
+        try:
+            yield folder
+        finally:
+            folder.close()
+
+
+def _folded(name: str) -> str:
+    """A name as disks compare it that take capitals and small letters for one."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _lists(mark: dict[str, Any]) -> dict[str, Any]:
+    """The lists of a note: files made, and of an interrupted command also those that it was replacing."""
+    return {name: dict(mark[name]) for name in ("files", "replaced") if name in mark} or {"files": {}}
+
+
+def _checked(mark: Any, entry: os.DirEntry[str]) -> dict[str, Any]:
+    """The note as read. Raises ValueError, KeyError or TypeError for anything else."""
+    texts = [mark[key] for key in ("command", "file", "sha256")]
+    lists = [value for pairs in _lists(mark).values() for value in pairs.values()]
+    if entry.is_symlink() or "files" not in mark or not all(isinstance(text, str) for text in texts):
+        raise TypeError(mark)
+    if not all(value is None or isinstance(value, str) for value in lists):
+        raise TypeError(lists)
+    return dict(mark)
+
+
+def _same_owner(own: dict[str, str], other: dict[str, Any]) -> bool:
+    """Whether two notes are of one command on one file: the same place or the same content."""
+    same_place = own["file"] != "" and own["file"] == other["file"]
+    return own["command"] == other["command"] and (same_place or own["sha256"] == other["sha256"])
+
+
+def _is_read(entry: os.DirEntry[str]) -> bool:
+    """Whether an entry is a file that the command read, under any name."""
+    with suppress(OSError):
+        status = os.stat(entry.path)
+        return (status.st_dev, status.st_ino) in files_read()
+    return False
+
+
+def _is_ours(entry: os.DirEntry[str], made: dict[str, Any]) -> bool:
+    """Whether the lists of a note hold the file as it is."""
+    digests = [names[entry.name] for names in _lists(made).values() if entry.name in names]
+    if entry.name == MARK:
+        return not entry.is_symlink()
+    if entry.is_symlink() or not digests:
+        return False
+    return None in digests or _digest(Path(entry.path)) in digests
+
+
+def _resolved(path: Path, lists: dict[str, Any]) -> dict[str, str | None]:
+    """The files of a note with the digest of each that an interrupted command did not come to replace."""
+    old = {name: digest for name, digest in lists.get("replaced", {}).items() if digest == _digest(path / name)}
+    return lists["files"] | old
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
+    with suppress(OSError):
+        return digest_of(path.read_bytes())
+    return ""
+
+
+def _newest(stage: Path) -> str:
+    """Name of the file that was written last."""
+    entries = sorted(os.scandir(stage), key=lambda entry: entry.stat().st_mtime_ns)
+    return entries[-1].name if entries else ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(names[:NAMED])}{more}"

@@ -1,0 +1,122 @@
+"""Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, each with its errors.
+
+Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, here.
+"""
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+
+import numpy as np
+
+from rbdyn.base.faults import InputError
+from rbdyn.dynamics.forces.equations import INNER_LOAD, LOSSES, OUTER_LOAD
+from rbdyn.dynamics.parameters.validity import race_report
+from rbdyn.dynamics.statistics.batch_means import student_factor
+from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
+from rbdyn.dynamics.statistics.metrics import Figure, Runs, mean, quantity
+from rbdyn.result import Quantity
+from rbdyn.scene import Scene
+from rbdyn.scene.thermal import Temperatures, at_temperatures
+
+
+def _mean_power(column: int) -> Figure:
+    return Figure(lambda run: np.column_stack((run.durations, run.work[:, column]))[run.first :], mean)
+
+
+POWERS = {f"{loss}_power_W": _mean_power(column) for column, loss in enumerate(LOSSES)}
+# Operating diametral clearances, and the clearance of the scene that each is.
+CLEARANCES = {f"{name}_operating_clearance_um": name for name in ("radial", "guide", "pocket")}
+# Contacts at the largest load of a race: race and key of its report.
+CONTACTS = {
+    f"{race}_{key}": (race, key)
+    for race in ("inner", "outer")
+    for key in ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
+}
+NAMES = (*POWERS, *CLEARANCES, *CONTACTS)
+
+
+def part_figures(
+    scene: Scene,
+    runs: Runs,
+    companions: Runs,
+    share: float,
+    since: int | None = None,
+    races: Mapping[str, Mapping[str, float]] | None = None,
+) -> dict[str, Quantity]:
+    """Every figure that the scene has, by its name; ``share`` and ``since`` as of `quantities`, ``races`` of `race_report`.
+
+    A clearance is exact for its scene. The error of a contact follows from the scatter of the replicates' largest loads.
+    """
+    steady = scene.operation.schedule is None
+    since = runs[0].first if since is None else since
+    moving = steady and drifting(runs)
+    figures = dict[str, Quantity]()
+    for name, power in POWERS.items():
+        # Most scenes have no work at all of some losses.
+        slow = slow_change(power, power, runs, since, moving=moving) if steady and _works(power, runs) else 0.0
+        figures[name] = quantity(power, runs, companions, share, slow)
+    figures |= {name: Quantity(gap, 0.0, 0.0, float(len(runs))) for name, gap in _clearances(scene).items()}
+    reports = [race_report(scene, *(run.largest_load(race) for race in (INNER_LOAD, OUTER_LOAD))) for run in runs]
+    if races is None:
+        races = race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
+    for name, (race, key) in CONTACTS.items():
+        if key in races.get(race, {}):
+            values = [report[race][key] for report in reports if key in report.get(race, {})]
+            figures[name] = _extreme(races[race][key], values)
+    return figures
+
+
+def at_temperatures_with_errors(
+    scene: Scene, figures: Mapping[str, Quantity], temperatures: Mapping[str, Quantity]
+) -> dict[str, Quantity]:
+    """The figures of a scene with a heat balance, whose clearances have the errors of its ``temperatures`` by node.
+
+    These errors have one cause, the friction, so that their effects add; unknown where a temperature within them is impossible.
+    """
+    nodes = {node: figure.value for node, figure in temperatures.items()}
+    at = {name: figure.value for name, figure in figures.items() if name in CLEARANCES}
+    errors = dict[str, dict[str, float | None]]()
+    for kind in ("statistical_error", "numerical_error"):
+        shifts = {node: getattr(figure, kind) for node, figure in temperatures.items()}
+        errors[kind] = dict.fromkeys(at)
+        if None in shifts.values():
+            continue
+        with suppress(InputError):
+            moved = [
+                _clearances(at_temperatures(scene, Temperatures(**{**nodes, node: nodes[node] + shift})))
+                for node, shift in shifts.items()
+            ]
+            errors[kind] = {name: math.fsum(abs(other[name] - value) for other in moved) for name, value in at.items()}
+    freedom = min((one.degrees_of_freedom for one in temperatures.values() if one.degrees_of_freedom), default=None)
+    return {
+        name: figure
+        if name not in at
+        else Quantity(
+            figure.value,
+            errors["statistical_error"][name],
+            errors["numerical_error"][name],
+            figure.effective_samples,
+            freedom,
+        )
+        for name, figure in figures.items()
+    }
+
+
+def _clearances(scene: Scene) -> dict[str, float]:
+    """Operating clearances [um] of a scene by the name of their figure."""
+    gaps = scene.clearances
+    return {name: 1e6 * gap.operating for name, of in CLEARANCES.items() if (gap := gaps[of]) is not None}
+
+
+def _works(power: Figure, runs: Runs) -> bool:
+    return any(power.moments(run)[:, 1].any() for run in runs)
+
+
+def _extreme(value: float, values: list[float]) -> Quantity:
+    """A figure at the largest load of all replicates: it scatters at most as one of their ``values`` does."""
+    if len(values) < 2:
+        return Quantity(value, None, None, float(len(values)))
+    freedom = len(values) - 1
+    half = float(np.std(values, ddof=1)) * student_factor(freedom)
+    return Quantity(value, half, None, float(len(values)), freedom)

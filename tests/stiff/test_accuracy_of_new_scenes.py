@@ -1,0 +1,66 @@
+"""``rbdyn accuracy`` on scenes of ``rbdyn new``: ten seeded ones, elastic contacts, some with heat, grease or a cage of PEEK."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rbdyn import accuracy
+from rbdyn.accuracy import coverage, methods
+from rbdyn.cli.app import app
+from rbdyn.scene import Scene
+
+# Whole studies of short runs: what is tested is that each ends, not what it says.
+SHORT = (
+    "numerics.turns=4", "numerics.discard_turns=2", "numerics.replicates=2", "numerics.impact_window_turns=4",
+    "numerics.extend=false",
+)  # fmt: skip
+CATALOGUE = ("NU210", "NU2208", "NU308", "NU1014", "NU2311", "N215")
+
+
+def new_scene(seed: int) -> Scene:
+    """A scene as ``rbdyn new`` writes it, by seed."""
+    draw = np.random.default_rng(seed)
+    if seed % 2:
+        arguments = [str(draw.choice(CATALOGUE))]
+    else:
+        size = float(draw.choice([7.0, 9.0, 12.0]))
+        rollers = int(draw.integers(11, 18))
+        pitch = 1.25 * size * rollers / np.pi
+        arguments = ["own", "--rollers", str(rollers), "--roller", f"{size:g}x{size:g}", "--pitch", f"{pitch:.0f}"]
+        arguments += ["--speed", f"{draw.uniform(2000.0, 9000.0):.0f}", "--load", f"{draw.uniform(300.0, 2000.0):.0f}"]
+    hot = seed in (1, 7)
+    if seed in (2, 5):
+        arguments += ["--oil", "grease VG 100"]
+    elif not hot:
+        arguments += ["--oil", f"ISO VG {draw.choice([22, 46, 100])}"]
+    if seed in (3, 8):
+        arguments += ["--cage-material", "peek"]
+    if hot:
+        arguments += ["--shaft", "k5", "--housing", "H7"]
+    done = CliRunner().invoke(app, ["new", *arguments])
+    assert done.exit_code == 0, done.output
+    data = tomllib.loads(done.stdout)
+    if hot:
+        del data["lubricant"]["temperature_C"]
+        for key in [key for key in data["mounting"] if key.endswith("temperature_C")]:
+            del data["mounting"][key]
+        data["thermal"] = {}
+    return Scene.from_dict(data, f"seed {seed}", SHORT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("study", accuracy.STUDIES)
+def test_stiff_every_study_ends(study, seed, monkeypatch):
+    """Stiff: each study of each scene ends without a failure and says something of its scene."""
+    monkeypatch.setattr(coverage, "REPEATS", 2)
+    monkeypatch.setattr(coverage, "TRUTH_REPLICATES", 2)
+    monkeypatch.setattr(coverage, "TRUTH_LENGTH", 2.0)
+    monkeypatch.setattr(methods, "STARTS", 1)
+    report = accuracy.study(study, new_scene(seed))
+    assert report.record["status"] == "ok" and not report.failed
+    assert report.tables[0].rows
