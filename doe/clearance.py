@@ -25,6 +25,7 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, read_toml, refuse
 from rbdyn.base.forecast import Measured
 from rbdyn.base.storage import code_version, run_key
+from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures, first_guess_faults
@@ -77,9 +78,7 @@ def check_responses(study: Study) -> None:
 
 def responses_of(heats: bool) -> tuple[str, ...]:
     """Names of all figures that may be responses; ``heats``: whether a heat balance gives temperatures."""
-    from rbdyn.dynamics import part_figures
-
-    return (*WHOLE, *(TEMPERATURES if heats else ()), *part_figures.NAMES)
+    return (*WHOLE, *(TEMPERATURES if heats else ()), *NAMES)
 
 
 def _has_balance(study: Study) -> bool:

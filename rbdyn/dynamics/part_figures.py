@@ -1,6 +1,6 @@
 """Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, each with its errors.
 
-Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, here.
+Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figure_names``.
 """
 
 import math
@@ -10,7 +10,8 @@ from contextlib import suppress
 import numpy as np
 
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.forces.equations import INNER_LOAD, LOSSES, OUTER_LOAD
+from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LOSSES, POWERS
+from rbdyn.dynamics.forces.equations import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
@@ -22,18 +23,6 @@ from rbdyn.scene.thermal import Temperatures, at_temperatures
 
 def _mean_power(column: int) -> Figure:
     return Figure(lambda run: np.column_stack((run.durations, run.work[:, column]))[run.first :], mean)
-
-
-POWERS = {f"{loss}_power_W": _mean_power(column) for column, loss in enumerate(LOSSES)}
-# Operating diametral clearances, and the clearance of the scene that each is.
-CLEARANCES = {f"{name}_operating_clearance_um": name for name in ("radial", "guide", "pocket")}
-# Contacts at the largest load of a race: race and key of its report.
-CONTACTS = {
-    f"{race}_{key}": (race, key)
-    for race in ("inner", "outer")
-    for key in ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
-}
-NAMES = (*POWERS, *CLEARANCES, *CONTACTS)
 
 
 def part_figures(
@@ -52,7 +41,8 @@ def part_figures(
     since = runs[0].first if since is None else since
     moving = steady and drifting(runs)
     figures = dict[str, Quantity]()
-    for name, power in POWERS.items():
+    for name, loss in POWERS.items():
+        power = _mean_power(LOSSES.index(loss))
         # Most scenes have no work at all of some losses.
         slow = slow_change(power, power, runs, since, moving=moving) if steady and _works(power, runs) else 0.0
         figures[name] = quantity(power, runs, companions, share, slow)

@@ -10,7 +10,8 @@ import numpy as np
 
 from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
-from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD, RollerBearing
+from rbdyn.dynamics.figure_names import LOSSES
+from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
     friction_check,

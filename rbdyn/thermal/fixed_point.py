@@ -18,6 +18,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.base.words import with_error
 from rbdyn.thermal.losses import HOTTEST, LONGEST_STEP, HeatModel, film_powers, gain, no_rest
 
 Status = Literal["steady", "undecided", "no steady state", "seizure", "too hot"]
@@ -170,7 +171,7 @@ def _judged(states: tuple[State, ...], measured: tuple[Array, float], status: St
         words = f"the gain of the loop is {largest:.2g}, so heat grows faster with temperature than it is carried off"
         return Search("no steady state", states, slopes, f"{reason}; {words}" if reason else words)
     if largest >= 1.0 and status == "steady":
-        reason = f"the gain of the loop is {largest:.2g} +- {error:.1g}, so the state may be unstable; lengthen numerics.turns"
+        reason = f"the gain of the loop is {with_error(largest, error)}, so the state may be unstable; lengthen numerics.turns"
         return Search("undecided", states, slopes, reason)
     return Search(status, states, slopes, reason)
 

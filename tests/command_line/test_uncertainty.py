@@ -504,13 +504,15 @@ def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: py
     assert override_notes(case, ["cage.imbalance_um=3.0"]) == []
     monkeypatch.setattr("doe.workflow.uncertainty.OUTPUTS", OUTPUTS[:1])
     found = find_uncertainty(_scene(tmp_path, IMBALANCE), overrides[:1], _Outputs(0.1), 16, 1.0)  # type: ignore[arg-type]
-    assert found.notes[0].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
+    assert found.notes[0].startswith("2 of 26 inputs vary, the others count as exact (")
+    assert found.notes[1].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
 
 
 def test_a_study_says_where_input_sets_differ_from_its_runs(judgement: tuple[Study, Any]) -> None:
     _, found = judgement
     runs = "other runs of the study, not the input sets: uncertain.set gives these numerics.turns=20, numerics.replicates=2"
-    assert found.notes == (f"scene.set: numerics.turns=40, numerics.replicates=8 changes {runs}",)
+    assert found.notes[0].startswith("2 of 26 inputs vary, the others count as exact (")
+    assert found.notes[1:] == (f"scene.set: numerics.turns=40, numerics.replicates=8 changes {runs}",)
 
 
 def test_a_factor_cannot_be_unknown_too(tmp_path: Path) -> None:

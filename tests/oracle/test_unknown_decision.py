@@ -10,12 +10,15 @@ from doe.unknown.inputs import nested
 
 
 def test_noise_is_taken_off_the_share_of_cases() -> None:
-    """Gains normal about 1 with sd 1: 84 % positive; noise of sd 2 would make 67 % of it."""
+    """Gains normal about 1 with sd 1: 84 % positive; noise of sd 2 would make 67 % of it.
+
+    Noise twice the scatter leaves the form of the distribution open, and no form is assumed.
+    """
     truth = 1.0 + stats.norm.ppf(nested(1, 1024, 1))
     gains, variances, _ = noisy(truth, 2.0, 1)
     assert float((gains > 0.0).mean()) == pytest.approx(0.67, abs=0.03)
     found = better(gains, variances, 1)
-    assert found.gains[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.04)
+    assert found.gains[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.06)
     assert found.gains[0].low < stats.norm.cdf(1.0) < found.gains[0].high
 
 

@@ -298,14 +298,16 @@ def test_command_line_sweeps(command, tmp_path):
 
 def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     """Command line: a long table is cut; failures are grouped on standard error and the exit code is 1."""
+    from rbdyn.base.folder import OutputFolder
     from rbdyn.cli import ball_studies as sweep_command
 
+    folder = OutputFolder(None, "rbdyn ball", ())
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: broken)
-    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], None, Path("scene.toml"), False, True) == 1
+    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], folder, Path("scene.toml"), False, True) == 1
     shown = capsys.readouterr()
     assert "failed" in shown.out and shown.err.startswith(f"2 points, the first at {SPEED} = 10000: no equilibrium")
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: grid)
-    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], None, Path("scene.toml"), False, True) == 0
+    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], folder, Path("scene.toml"), False, True) == 0
     assert "12 points" in capsys.readouterr().out
 
 

@@ -72,7 +72,9 @@ def test_oracle_variance_inflation_leverage_and_errors():
     assert found["leverage"] == pytest.approx(np.diag(hat).tolist())
     values = np.random.default_rng(5).normal(size=24)
     surface = fit(points, values, name="y", centre=[0] * 3, step=[1] * 3)
-    spv = 24 * surface.prediction_standard_error([0, 0, 0]) ** 2 / surface.residual_mean_square
+    # The error of a mean holds that of the model too, here the whole residual, which is no matter of the design.
+    scatter = surface.prediction_standard_error([0, 0, 0]) ** 2 - surface.model_error.variance
+    spv = 24 * scatter / surface.residual_mean_square
     assert found["scaled_prediction_variance"]["centre"] == pytest.approx(spv)
 
 

@@ -17,7 +17,7 @@ from doe import clearance
 from doe.commands.new import limits_of
 from doe.study_file import Study
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.part_figures import CLEARANCES, CONTACTS, NAMES, POWERS
+from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, NAMES, POWERS
 from rbdyn.dynamics.slip_map import slip_map
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene

@@ -164,7 +164,7 @@ def test_second_process_on_a_folder_is_refused_and_the_first_goes_on(tmp_path):
     shown, said = second.communicate(timeout=100)
     first.send_signal(signal.SIGCONT)
     assert (
-        second.returncode == 2 and f"process {first.pid} on " in said and "works on it; wait until it has ended" in said
+        second.returncode == 2 and f"process {first.pid} on " in said and "works in it; wait until it has ended" in said
     )
     (fault,) = json.loads(shown)["faults"]
     assert fault in said

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
+from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import (
     RingMotion,
@@ -35,22 +36,8 @@ from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contac
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
 
-# Powers lost, in the order of the power vector. The input by the shafts and by loads without a potential follows, and
-# last the inner race's part of the rolling resistance.
-LOSSES = (
-    "outer_race_traction",
-    "inner_race_traction",
-    "rolling_resistance",
-    "race_damping",
-    "pocket_friction",
-    "pocket_damping",
-    "pocket_film",
-    "land_film",
-    "land_friction",
-    "land_damping",
-    "roller_drag",
-    "support_damping",
-)
+# After the powers lost come the input by the shafts and by loads without a potential, and last the inner race's part of the
+# rolling resistance.
 (
     OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
     LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POWERS,

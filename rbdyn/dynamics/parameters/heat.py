@@ -9,7 +9,8 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOSSES, POWERS, ROLLING, RollerBearing
+from rbdyn.dynamics.figure_names import LOSSES
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, POWERS, ROLLING, RollerBearing
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
 from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage
@@ -60,7 +61,7 @@ class Network(NamedTuple):
 
     @property
     def shares(self) -> Array:
-        """Shares (powers, 4) of the nodes in the powers of a simulation, in the order of ``equations.LOSSES`` and what follows there."""
+        """Shares (powers, 4) of the nodes in the powers of a simulation, in the order of ``LOSSES`` and what follows there."""
         return np.asarray(TERMS_OF_POWERS.T @ self.term_shares)
 
     def terms(self, powers: Array) -> Array:
