@@ -12,7 +12,8 @@ tau_j and rho_j are sampled with the inputs.
 
 Each output is of one of three kinds, so that the sample itself shows whether the model explains it:
 - as allowed: tau_j is half-normal of the allowed scale, rho_j = tau_j
-- off in its level: tau_j is half-normal of the range of the output, rho_j is at most the allowed scale; a biased sensor
+- off in its level: tau_j is half-normal of the range of the output, rho_j is at most the allowed scale; a biased sensor,
+  and so the heavy tail of o_j: a Student t for o_j itself would explain a biased sensor, which then is not found
 - off row by row: the same tau_j, and rho_j = tau_j; missing physics
 The odds of the last two kinds in the posterior over those in the prior are a Bayes factor.
 
