@@ -295,7 +295,7 @@ class Calibration:
 
     @property
     def ends(self) -> Array:
-        """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie."""
+        """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie, or more where it is flat."""
         if self.match.sampled is None:
             raise RunError("calibration: no input set is left to sample")
         return densest_intervals(self.match.quantiles(self.match.sampled.points))

@@ -208,7 +208,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         (key, *_interval(row), f"{record['learned'][key]:.2f}", row["seen"])
         for key, row in sorted(record["inputs"].items(), key=lambda pair: -record["learned"][pair[0]])
     ]
-    caption = "Inputs: 5 to 95 % before, the densest 90 % after, which may reach an end of the range"
+    caption = "Inputs: 5 to 95 % before, the densest 90 % or more after, which may reach an end of the range"
     header = ("input", "before", "after", "median", "contraction", "")
     outputs = [
         _output_words(quantity(name)[0], explanation)
