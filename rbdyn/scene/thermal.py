@@ -59,7 +59,7 @@ class Thermal(Strict):
     """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
     surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
     sump_factor: NonNegative = 1.0
-    """Factor on the heat that the oil of a bath loses through the walls of the housing, which have 150 W/(m2 K) over
+    """Factor on the heat that the oil of a bath loses through the walls of the housing. These have 150 W/(m2 K) over
     the seat of the outer ring. It counts with lubricant.supply = "bath" only."""
     film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
