@@ -42,7 +42,7 @@ from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
-from rbdyn.thermal.fixed_point import VAGUE, State, learned, steady_state
+from rbdyn.thermal.fixed_point import VAGUE, State, learned, model_of, steady_state
 from rbdyn.thermal.input_ranges import Ranges, input_ranges
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
 from rbdyn.thermal.network import NODES, carried_off
@@ -283,7 +283,7 @@ def _result(
     )
     network = trial.network
     heat = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
-    ranges = _ranges(scene, trial.hot, state, slopes) if steady else None
+    ranges = _ranges(scene, trial.hot, path, slopes) if steady else None
     record = {
         "status": status,
         **({"reason": reason} if reason else {}),
@@ -308,8 +308,8 @@ def _result(
     )
 
 
-def _ranges(scene: Scene, hot: Scene, state: State, slopes: Array) -> Ranges:
-    """Ranges over the unknown inputs of the balance, about the steady state next to a state."""
+def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> Ranges:
+    """Ranges over the unknown inputs of the balance, about the steady state next to the last one of a path."""
     mounting = hot.mounting
     assert mounting is not None
 
@@ -317,10 +317,16 @@ def _ranges(scene: Scene, hot: Scene, state: State, slopes: Array) -> Ranges:
         mounted = mounting.model_copy(update=part_temperatures(thermal, Temperatures(*nodes.tolist())))
         return {f"{name}_um": 1e6 * play for name, play in hot.clearances_of(mounted).items()}
 
-    about = state.model.with_image_slopes(slopes)
+    # Far from the state, losses follow the exponents that the path showed; the rest, which is linear, is to hold little.
+    about = model_of(path).with_image_slopes(slopes)
     estimated = [] if scene.uncertain is None else scene.uncertain.estimated
     return input_ranges(
-        scene, about, lambda share: term_shares(hot, share), clearances, loss_levels(hot, state.run.bearing), estimated
+        scene,
+        about,
+        lambda share: term_shares(hot, share),
+        clearances,
+        loss_levels(hot, path[-1].run.bearing),
+        estimated,
     )
 
 

@@ -3,19 +3,19 @@
 | term | heats |
 |---|---|
 | race traction | ring beta, rollers 1 - beta |
-| rolling resistance, of each race | oil 1/2, ring 1/4, rollers 1/4 |
+| rolling resistance, of each race | oil f, ring and rollers (1 - f)/2 each |
 | race damping | rollers 1/2, each ring 1/4 |
 | pocket friction and damping | rollers with cage |
-| pocket film | oil 1/2, rollers with cage 1/2 |
-| land film | oil 1/2, guiding ring 1/4, cage 1/4 |
+| pocket film | oil f, rollers with cage 1 - f |
+| land film | oil f, guiding ring and cage (1 - f)/2 each |
 | land friction and damping | guiding ring beta, cage 1 - beta |
 | roller drag, windage of spin | oil |
 | support damping | no node: the damper has an oil of its own |
 
 Two surfaces that slide on each other share the heat by beta = e1 sqrt(u1)/(e1 sqrt(u1) + e2 sqrt(u2)) with the effusivity
 e = sqrt(k rho c) and the speed u at which each passes the contact (Blok, from memory). Those of races that roll, and of a
-land whose contact whirls, are taken as equal. The halves and quarters are assumptions: half of a film's heat leaves with its
-oil (0 to 1 is possible), walls of equal area share the rest.
+land whose contact whirls, are taken as equal. The share f of a film's heat that its oil takes along is ``film_to_oil``. Walls of
+equal area share the rest, and the shares of race damping are assumptions.
 """
 
 from typing import Literal, NamedTuple

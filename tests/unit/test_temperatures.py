@@ -388,6 +388,18 @@ def test_unit_a_cold_start_is_steady(oil, inlet):
     assert sum(found.thermal["carried_off_W"].values()) == pytest.approx(heat, rel=1e-9)
 
 
+def test_unit_ranges_follow_the_exponents_that_the_search_found():
+    """Unit: ranges of a cold start, far wider than its steps, rest on what its path showed of viscosity, and none is without end."""
+    cold = {
+        "lubricant": {**FLOW, "oil": "MIL-L-7808", "oil_inlet_temperature_C": -60.0},
+        "thermal": {"ambient_C": -60.0},
+    }
+    numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
+    found = simulate(_scene(**cold, numerics=numerics), workers=1, notice=None)
+    assert found.thermal["share_without_steady_state"] == 0.0
+    assert found.thermal["ranges"]["inner"][-1] < found.temperatures_C["inner"].value + 75.0
+
+
 def test_unit_ways_out_of_a_bath():
     """Unit: a sump cools the oil and is one of the ways out; a shaft that carries off less warms the inner ring over the outer one."""
 
