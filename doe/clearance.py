@@ -192,7 +192,7 @@ def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int
         raise InputError(
             [
                 f"{study.path}: the region of the design reaches {place}, where {fault}, or narrow the region"
-                if any(key in fault for key in keys)
+                if any(key in fault for key in keys) and not fault.startswith(f"{study.path}: ")
                 else fault
                 for fault in map(str, error.faults)
             ]

@@ -21,7 +21,7 @@ from scipy import special
 
 from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
-from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, hypervolume, search
+from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, growth, hypervolume, search
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 
@@ -198,7 +198,7 @@ def front(
         values=_values(objectives, points[rows]),
         costs=costs[rows],
         hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=np.array([hypervolume(archive.costs, ideal, nadir) for archive in searched.archives]),
+        hypervolume_history=growth([archive.costs for archive in searched.archives], ideal, nadir),
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(rows, best)),

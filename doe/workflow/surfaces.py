@@ -411,7 +411,8 @@ class _Posterior:
         widths = [np.sqrt(dof / squares[:, dof - 1])[:, None] for dof in self.freedom]
         changes = widths[0] * (errors @ self.roots[0].T)
         draws = self.mean + changes @ self.matrix.T + widths[1] * (fields @ self.roots[1].T)
-        if self.simulated is None:
+        # A surface without any error, such as that of an operating clearance, has nothing to learn from simulated values.
+        if self.simulated is None or not any(root.any() for root in self.roots):
             return np.asarray(draws)
         values, error = self.simulated
         simulated_rows = slice(len(self.mean) - len(values), None)

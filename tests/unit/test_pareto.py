@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from doe.pareto import front, hypervolume, knee_depth, non_dominated
+from doe.pareto.search import growth
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 LOWER, UPPER = [-1.0] * 3, [2.0] * 3
@@ -36,6 +37,20 @@ def test_hypervolume_of_two_bowls_against_the_exact_front(two):
     assert hypervolume(two.values, np.zeros(2), np.ones(2)) >= 0.99 * hypervolume(exact, np.zeros(2), np.ones(2))
     # f2 = (1 - sqrt(f1))^2 leaves 1/6 of the unit square below the front.
     assert hypervolume(exact, np.zeros(2), np.ones(2)) == pytest.approx(1.21 - 1 / 6, abs=1e-3)
+
+
+def test_volumes_of_a_search_of_five_goals_grow_to_that_of_its_front():
+    """Those counted at levels are the exact ones within a percent; the last is exact."""
+    random = np.random.default_rng(1)
+    sphere = np.abs(random.standard_normal((240, 5)))
+    costs = 1.0 - sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
+    archives, ends = [costs[:count] for count in (20, 60, 120, 240)], (costs.min(axis=0), costs.max(axis=0))
+    exact = [hypervolume(archive, *ends) for archive in archives]
+    volumes = growth(archives, *ends)
+    assert volumes[-1] == exact[-1]
+    assert volumes == pytest.approx(exact, rel=0.02)
+    pair = [archive[:, :2] for archive in archives]
+    assert growth(pair, *(end[:2] for end in ends))[0] == hypervolume(pair[0], *(end[:2] for end in ends))
 
 
 def test_hypervolume_of_three_bowls_against_the_exact_front(three):

@@ -142,6 +142,12 @@ def test_unit_a_first_guess_cannot_vary(tmp_path):
     study = Study.load(path)
     with pytest.raises(InputError, match=f"factor.key = {fault}"):
         clearance.confirmation_scene(study, study.baseline)
+    with pytest.raises(InputError) as refused:
+        clearance.design_scenes(study, study.baseline[None])
+    assert [str(one).count("lubricant.temperature_C") for one in refused.value.faults] == [1], (
+        "one sentence, and no region"
+    )
+    assert "region" not in str(refused.value)
     scene = tmp_path / "unknown.toml"
     law = '\n[uncertain]\n"lubricant.temperature_C" = {law = "uniform", low = 80.0, high = 90.0}\n'
     scene.write_text(HOT.read_text("utf-8") + law, encoding="utf-8")

@@ -106,6 +106,17 @@ def test_limit_case_draws_pass_what_was_simulated(bend):
     assert both[:, 0].std(axis=0) == pytest.approx(alike / np.sqrt(2.0), rel=0.15)
 
 
+def test_limit_case_exact_surfaces_have_one_draw():
+    """A response without scatter at a point that was simulated exactly: all draws are the truth."""
+    values = 3.0 + 2.0 * DESIGN[:, 0]
+    exact = fit(DESIGN, values, name="gap", model="linear", centre=np.zeros(3), step=np.ones(3))
+    at = DESIGN[:2] / 2.0
+    simulated = Simulated(at, 3.0 + 2.0 * at[:, :1], np.zeros((2, 1)))
+    shown = drawn([exact], at, 8, simulated)[..., 0]
+    assert exact.residual_mean_square == 0.0
+    assert shown == pytest.approx(np.tile(3.0 + 2.0 * at[:, 0], (8, 1)))
+
+
 def test_closed_form_of_intervals_of_shares():
     """Closed form: of one count the shortest interval of its beta distribution; of two it reaches over both; at the ends to these."""
     low, high = interval_of_share(np.array([300]), 400)
