@@ -3,23 +3,27 @@
 A steady law responds to a change of slip at once, as if the bodies were rigid. Elastic bodies act as a spring in series with the
 steady contact (Johnson and Tevaarwerk 1977, Proc. R. Soc. A 356, 215): T' = k (s - s_c(T)), where s_c is the slip at which the
 steady law gives T. The tangential stiffness k is, for plane contact of equal materials, the normal one, dQ/dx (Johnson 1985,
-Contact Mechanics, 7 and 8; Kalker 1990). The curve is not inverted; near the present slip it is a power law, so that
+Contact Mechanics, 7 and 8; Kalker 1990). The curve is not inverted; near the present slip it is a hyperbola, so that
 
-    T' = k s (1 - sign(T s) |T/T_s|^n),    n = d ln s/d ln T_s, from 1 to 12,
+    T' = k s (1 - r/(1 + (n - 1)(1 - r))),    r = T/T_s,    n = d ln s/d ln T_s >= 1,
 
-with T_s, the steady traction at s. The straight part of the curve has n = 1, which is exact. Close to the limit of traction n is
-large: the spring acts alone until T_s is almost reached. Traction opposite to the slip, as after a reversal, adds to the rate.
-Traction above T_s, which the unloading contact has when its slip or its load falls, decreases along the tangent of the power,
-so that its rate stays finite: T' = n k s (1 - T/T_s). What a peak of an impact on a roller differs from that of the inverted curve
-is below 1.5 % of it (``tests/oracle/test_tangential_elasticity.py``).
+with T_s, the steady traction at s. This is exact for curves T_m s/(s + s_0), and for the straight part of all, where n = 1. Close to
+the limit of traction n is large: the spring acts alone until T_s is almost reached. Traction opposite to the slip, as after a
+reversal, adds to the rate: r becomes -|r|, its share of the slip is odd. Traction above T_s, which the unloading contact has when
+its slip or its load falls, decreases along the tangent, so that its rate stays finite: T' = n k s (1 - r). What a peak of an impact
+on a roller differs from that of the inverted curve is below 1.5 % of it (``tests/oracle/test_tangential_elasticity.py``).
 
-Explicit steps must follow the rates, so no time is shorter than w, three quarters of a radian of a roller between its races, which stability allows for its vibrations too. Material damping c acts
-parallel to the spring, beta = c/k. With tau = T_s/(k s) the coefficient mu = T/Q of the state and the one that acts are
+Explicit steps must follow the rates, so no time is shorter than w, three quarters of a radian of a roller between its races, which
+stability allows for its vibrations too. Material damping c acts parallel to the spring, beta = c/k. With tau = T_s/(k s) the
+coefficient mu = T/Q of the state and the one that acts are
 
-    mu' = mu_s (1 - sign |mu/mu_s|^m)/t,    mu_a = mu + (beta + r (1 - tau (1 + 1/n)/(r + l))) mu',
-    r = max(tau, w),    l = max(tau/n, w),    t = r + beta,    m = t/(l + beta).
+    mu' = mu_s (1 - r/(1 + (m - 1) u + m (m - 1)(1 - tau/(n l)) u^2))/t,    u = 1 - r,    r = mu/mu_s,
+    mu_a = mu + (beta + h (1 - tau (1 + 1/n)/(h + l))) mu',
+    h = max(tau, w),    l = max(tau/n, w),    t = h + beta,    m = t/(l + beta).
 
-The integral of 1 - T/T_s over a step of the slip is about tau (1 + 1/n)/2. Where w is longer than tau or tau/n, a share of the steady
+Where w hides the slope of the curve at its end, the square of u keeps it as flat below as that end allows: the share of the slip
+remains convex in r, so that no rate is steeper than 1/(w + beta).
+The integral of 1 - T/T_s over a step of the slip is tau (1 + 1/n)/2. Where w is longer than tau or tau/n, a share of the steady
 traction acts at once, so that this integral remains. A contact with tau far below w acts as a rigid one. The acting
 coefficient stays within those of the steady law, no work comes out of the contact, and traction vanishes with the load. The work
 on the slip counts as loss, including the elastic energy of the contact (some microjoules).
@@ -31,13 +35,12 @@ because a jump at touch would leave no tight tolerance any step. What acts hardl
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.elementary import fast_exp, fast_log
+from rbdyn.compiled.elementary import fma
 from rbdyn.compiled.kernel import kernel, law
-from rbdyn.contact.traction import tangent, tangent_by_table, traction, traction_by_table
+from rbdyn.contact.traction import growth, growth_by_table, traction, traction_by_table
 
-SMALLEST_SLIP = 1e-12  # [m/s], keeps the slope of the law finite
-SMALLEST_RATIO = 1e-30  # of tractions, keeps the logarithm finite
-LARGEST_EXPONENT = 12.0
+SMALLEST_SPRING_RATE = 1e-3  # k s [N/s], keeps times finite
+SMALLEST_COEFFICIENT = 1e-30  # of the steady law, keeps the ratio to it finite
 
 
 class RigidContact(NamedTuple):
@@ -54,10 +57,10 @@ class ElasticContact(NamedTuple):
 
 
 class SteadyTraction(NamedTuple):
-    """Traction coefficient of the steady law, and its slope over the slip [s/m]; 0 in a rigid contact, which needs none."""
+    """Traction coefficient of the steady law, and its growth over the logarithm of the slip; 0 in a rigid contact, which needs none."""
 
     coefficient: float
-    slope: float
+    growth: float
 
 
 class Response(NamedTuple):
@@ -79,7 +82,7 @@ def _(tangential, model, slip, load):
 
 @steady_traction.body(ElasticContact)
 def _(tangential, model, slip, load):
-    return SteadyTraction(traction(model, slip, load), tangent(model, slip, load))
+    return SteadyTraction(traction(model, slip, load), growth(model, slip, load))
 
 
 @law
@@ -95,7 +98,7 @@ def _(tangential, model, slip, load, value, slope):
 @steady_by_table.body(ElasticContact)
 def _(tangential, model, slip, load, value, slope):
     steady = traction_by_table(model, slip, load, value)
-    return SteadyTraction(steady, tangent_by_table(model, slip, load, value, slope))
+    return SteadyTraction(steady, growth_by_table(model, slip, load, value, slope))
 
 
 @law
@@ -110,27 +113,34 @@ def _(tangential, steady, coefficient, load, slip, stiffness):
 
 @response.body(ElasticContact)
 def _(tangential, steady, coefficient, load, slip, stiffness):
-    compliance = load / stiffness if load > 0.0 else 0.0
-    target = steady.coefficient if load > 0.0 else 0.0
-    secant = abs(steady.coefficient) * compliance / max(abs(slip), SMALLEST_SLIP)
-    along = min(max(steady.slope * compliance, secant / LARGEST_EXPONENT), secant)
-    rise, last = max(secant, tangential.shortest_time), max(along, tangential.shortest_time)
-    whole = rise + tangential.damping_time
-    rate = (target - yielding(target, coefficient, whole / (last + tangential.damping_time))) / whole
-    at_once = tangential.damping_time + rise * (1.0 - (secant + along) / (rise + last))
+    # Times are multiplied by the spring's rate: forces, so that one division gives all quotients.
+    spring = max(stiffness * abs(slip), SMALLEST_SPRING_RATE)
+    shortest, damping = tangential.shortest_time * spring, tangential.damping_time * spring
+    secant = abs(steady.coefficient) * load
+    along = min(max(steady.growth * load, 0.0), secant)
+    rise, last = max(secant, shortest), max(along, shortest)
+    whole, end, both = rise + damping, last + damping, rise + last
+    limit, size = max(abs(steady.coefficient), SMALLEST_COEFFICIENT), abs(coefficient)
+    within, lack = min(size, limit), limit - min(size, limit)
+    # The share of the slip in creep is within/limit over curve/base.
+    ending, more = end * limit, (whole - end) * lack
+    base = last * ending * ending
+    curve = last * ending * (ending + more) + (last - along) * whole * lack * more
+    factor = whole * end
+    inverse = 1.0 / (factor * both * curve)
+    seen = within * base * end * both * inverse + (size - within) * whole * both * curve * inverse
+    share = steady.coefficient * end * both * curve * inverse - math.copysign(seen, coefficient)
+    at_once = damping + rise * (both - secant - along) * factor * curve * inverse
     engaged = min(max(load * tangential.light_density, 0.0), 1.0)
     engaged = engaged * engaged * (3.0 - 2.0 * engaged)
-    dying = coefficient / (tangential.shortest_time + tangential.damping_time)
-    return Response(coefficient + at_once * rate, engaged * (rate + dying) - dying)
+    fading = faded(tangential, coefficient)
+    return Response(coefficient + at_once * share, fma(engaged, fma(share, spring, -fading), fading))
 
 
 @kernel
-def yielding(steady, coefficient, exponent):
-    """The coefficient as the slider sees it: the steady one times a power of their ratio, with the tangent of the power above it."""
-    limit, size = abs(steady), abs(coefficient)
-    ratio = max(size / limit if size < limit else 1.0, SMALLEST_RATIO)
-    within = limit * fast_exp(exponent * fast_log(ratio))
-    return math.copysign(within + exponent * max(size - limit, 0.0), coefficient)
+def faded(tangential, coefficient):
+    """Rate of the state of an open contact [1/s]."""
+    return -coefficient / (tangential.shortest_time + tangential.damping_time)
 
 
 @law
@@ -191,5 +201,4 @@ def _(tangential, rollers, y, row, dy):
 @relax_coefficients.body(ElasticContact)
 def _(tangential, rollers, y, row, dy):
     for j in range(rollers):
-        coefficient = y[tangential.start + j]
-        dy[row, tangential.start + j] = response(tangential, SteadyTraction(0.0, 0.0), coefficient, 0.0, 0.0, 1.0).rate
+        dy[row, tangential.start + j] = faded(tangential, y[tangential.start + j])

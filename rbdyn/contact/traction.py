@@ -157,45 +157,52 @@ def _(model, slip, load):
 
 
 @law
-def tangent(model, slip, load):
-    """Slope of the traction coefficient over the slip [s/m], arguments as of ``traction``; negative past a peak."""
+def growth(model, slip, load):
+    """Growth of the size of the traction coefficient over the logarithm of the slip, arguments as of ``traction``; negative past a
+    peak."""
 
 
-@tangent.body(NoTraction)
+@growth.body(NoTraction)
 def _(model, slip, load):
     return 0.0
 
 
-@tangent.body(FourConstantTraction)
+@growth.body(FourConstantTraction)
 def _(model, slip, load):
     speed = abs(slip)
-    return (model.b - model.c * (model.a + model.b * speed)) * fast_exp(-model.c * speed)
+    return speed * (model.b - model.c * (model.a + model.b * speed)) * fast_exp(-model.c * speed)
 
 
-@tangent.body(BlendedFourConstantTraction)
+@growth.body(BlendedFourConstantTraction)
 def _(model, slip, load):
     speed, square = abs(slip), slip * slip + model.blend_speed * model.blend_speed
     drop = fast_exp(-model.c * speed)
     coefficient = (model.a + model.b * speed) * drop + model.d
     slope = (model.b - model.c * (model.a + model.b * speed)) * drop
-    return (slope * speed + coefficient * model.blend_speed * model.blend_speed / square) / math.sqrt(square)
+    return speed * (slope * speed + coefficient * model.blend_speed * model.blend_speed / square) / math.sqrt(square)
 
 
-@tangent.body(CoulombTraction)
+@growth.body(CoulombTraction)
 def _(model, slip, load):
-    saturation = fast_tanh(slip / model.blend_speed)
-    return model.coefficient * (1.0 - saturation * saturation) / model.blend_speed
+    return rubbing_growth(model.coefficient, model.blend_speed, slip)
 
 
-@tangent.body(TractionSurface)
+@growth.body(TractionSurface)
 def _(model, slip, load):
     along, across = table_place(model.axes, slip, load)
-    return tangent_by_table(model.axes, slip, load, *table_value(model, along, across))
+    return growth_by_table(model.axes, slip, load, *table_value(model, along, across))
 
 
-@tangent.body(MixedTraction)
+@growth.body(MixedTraction)
 def _(model, slip, load):
-    return mixed_tangent(model, slip, load, tangent(model.fluid, slip, load))
+    return mixed_growth(model, slip, load, growth(model.fluid, slip, load))
+
+
+@kernel
+def rubbing_growth(coefficient, blend_speed, slip):
+    """``growth`` of dry friction."""
+    saturation = fast_tanh(slip / blend_speed)
+    return coefficient * abs(slip / blend_speed) * (1.0 - saturation * saturation)
 
 
 @kernel
@@ -207,12 +214,10 @@ def mixed(model, slip, load, film):
 
 
 @kernel
-def mixed_tangent(model, slip, load, film):
-    """``mixed`` of the slopes over the slip [s/m]."""
+def mixed_growth(model, slip, load, film):
+    """``mixed`` of the growths."""
     share = asperity_load_share(model.share_scale, model.share_exponent, load)
-    saturation = fast_tanh(slip / model.blend_speed)
-    rubbing = model.boundary * (1.0 - saturation * saturation) / model.blend_speed
-    return share * rubbing + (1.0 - share) * film
+    return share * rubbing_growth(model.boundary, model.blend_speed, slip) + (1.0 - share) * film
 
 
 @law
@@ -298,20 +303,20 @@ def _(model, slip, load, value):
 
 
 @law
-def tangent_by_table(model, slip, load, value, slope):
-    """``tangent`` of a law without its table, from its ``table_value``."""
+def growth_by_table(model, slip, load, value, slope):
+    """``growth`` of a law without its table, from its ``table_value``."""
 
 
-@tangent_by_table.body(SurfaceAxes)
+@growth_by_table.body(SurfaceAxes)
 def _(model, slip, load, value, slope):
     ratio = slip_ratio(model, slip)
-    rise = 1.0 + ratio
-    return model.speed_density * fast_exp(value) * fma(ratio, slope * model.slip_density, 1.0) / (rise * rise)
+    saturation = ratio / (1.0 + ratio)
+    return saturation * fast_exp(value) * fma(saturation, slope * model.slip_density, 1.0 - saturation)
 
 
-@tangent_by_table.body(MixedTraction)
+@growth_by_table.body(MixedTraction)
 def _(model, slip, load, value, slope):
-    return mixed_tangent(model, slip, load, tangent_by_table(model.fluid, slip, load, value, slope))
+    return mixed_growth(model, slip, load, growth_by_table(model.fluid, slip, load, value, slope))
 
 
 @kernel

@@ -278,7 +278,7 @@ def roller_mass(scene):
 
 
 def elastic_traction(scene, load, curve, coefficient, slip, stiffness):
-    """Traction coefficient that acts and the rate of the state: the steady ``curve`` over the slip, a power law near it, in series
+    """Traction coefficient that acts and the rate of the state: the steady ``curve`` over the slip, a hyperbola near it, in series
     with a spring of the contact's normal stiffness and a damper beside it. Times below a radian of the most loaded roller's
     vibration are as long as that, and what acts at once keeps the integral of the lag."""
     if not scene.traction.elasticity:
@@ -295,11 +295,14 @@ def elastic_traction(scene, load, curve, coefficient, slip, stiffness):
     steady, step = curve(slip), 1e-5
     steepness = math.log(curve(slip * math.exp(step)) / curve(slip * math.exp(-step))) / (2.0 * step)
     rise = steady * load / slip / stiffness
-    last = rise * float(np.clip(steepness, 1.0 / 12.0, 1.0))
+    last = rise * float(np.clip(steepness, 0.0, 1.0))
     longer, later = max(rise, shortest), max(last, shortest)
     exponent = (longer + damping) / (later + damping)
     along = coefficient / steady
-    size = abs(along) ** exponent if abs(along) < 1.0 else 1.0 + exponent * (abs(along) - 1.0)
+    # Convex, with the slope of the exponent at its end: of the flattest such curves, where the shortest time hides the true slope.
+    lack, hidden = max(1.0 - abs(along), 0.0), 1.0 - last / later
+    size = (1.0 - lack) / (1.0 + (exponent - 1.0) * lack + exponent * (exponent - 1.0) * hidden * lack**2)
+    size += exponent * max(abs(along) - 1.0, 0.0)
     rate = steady * (1.0 - math.copysign(size, along)) / (longer + damping)
     acting = coefficient + rate * (damping + longer - longer * (rise + last) / (longer + later))
     # The state fades in over the first hundredth of the load of the most loaded roller.
