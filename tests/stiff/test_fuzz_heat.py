@@ -13,6 +13,8 @@ HOT = ROOT / "examples" / "hot_roller.toml"
 SHORT = [
     f"numerics.{key}" for key in ("turns=4", "discard_turns=2", "replicates=2", "extend=false", "impact_window_turns=2")
 ]
+# Right-hand sides of a whole balance at most: one to three minutes of processor time, which thick oil at 170 rpm comes near.
+BUDGET = 1e8
 OILS = ("MIL-L-7808", "MIL-L-23699", "ISO VG 32", "ISO VG 150")
 
 
@@ -42,6 +44,7 @@ def test_random_heat_balances_end(seed):
     except (InputError, RunError) as error:
         assert str(error)
         return
+    assert result.cost["rhs_evaluations"] <= BUDGET
     balance = result.thermal
     assert balance["status"] in ("steady", "undecided", "no steady state", "seizure", "too hot")
     assert (balance["status"] == "steady") == (result.status == "ok") and (result.status == "ok" or balance["reason"])
