@@ -81,10 +81,12 @@ def _model(scene: SingleRowScene, states: Sequence[State]) -> HeatModel:
         return model_of(states)
 
 
-def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
+def with_temperatures(
+    scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult], ranged: bool = True
+) -> BallResult:
     """The result of a scene with [thermal], at its steady temperatures; without such, its temperatures and the path alone.
 
-    ``solve`` gives the result of a scene at stated temperatures.
+    ``solve`` gives the result of a scene at stated temperatures. ``ranged``: with ranges over the inputs of the balance.
     """
     try:
         search = steady_temperatures(scene)
@@ -97,7 +99,7 @@ def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], B
     if status == "steady":
         status, reason = ceiling_verdict(scene, nodes)
     hot = solve(at_temperatures(scene, Temperatures(**nodes)))
-    ranges = ranges_of(scene, last, slopes) if search.status == "steady" else None
+    ranges = ranges_of(scene, last, slopes) if ranged and search.status == "steady" else None
     steady = status == "steady"
     return replace(
         hot,
