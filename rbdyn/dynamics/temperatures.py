@@ -8,7 +8,7 @@ small step. Temperatures are steady only if the heat of that run balances within
 Errors of the temperatures are those of the heat, divided by 1 - dM/dT of the loop, as for any other figure: each temperature is
 a weighted sum of the losses. The gain of the loop comes from two more short runs, with all nodes 5 K warmer and with the inner
 ring alone 5 K warmer; where it is near one, the other nodes follow. Ranges over the documented inputs of the balance, which are
-far wider than these errors, follow from 256 sets of a model with the slopes measured there.
+far wider than these errors, follow from 256 sets of the model of the search with the slopes measured there.
 """
 
 import math
@@ -51,6 +51,8 @@ from rbdyn.thermal.network import NODES, carried_off
 SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
 # Warmer nodes of the runs that measure the gain [K].
 WARMER = 5.0
+# Rise of all nodes by the heat [K], up to which the losses of one state serve elsewhere, and solutions of the network that follow.
+SLIGHT, SLIGHT_STEPS = 1.0, 3
 # Gain from which all nodes are measured, and random sets of noise that give its error.
 DOUBTFUL, NOISES = 0.7, 64
 # Runs of the scene's own length at most: the last deviates by less than the tolerance after one or two.
@@ -96,7 +98,7 @@ def _weighted(weights: Array, constant: float) -> Figure:
 
 
 def powers_of(runs: Sequence[Replicate]) -> Array:
-    """Mean powers [W] in the order of ``figure_names.LOSSES`` and what follows there."""
+    """Mean powers [W] in the order of ``equations.LOSSES`` and what follows there."""
     work = np.sum([run.work[run.first :].sum(axis=0) for run in runs], axis=0)
     return np.asarray(work / sum(run.duration for run in runs))
 
@@ -156,15 +158,30 @@ class Balance:
         model = heat_model(hot, network, temperatures, powers_of(ensemble.runs), self.viscosity)
         return State(temperatures, image, noise, model, Trial(hot, bearing, network, ensemble, clock))
 
+    def slight(self, state: State) -> State | None:
+        """The balance of a heat that warms no node by 1 K, from the losses of a state and networks without a simulation; else None."""
+        model, nodes = state.model, state.model.balanced()
+        for _ in range(SLIGHT_STEPS):
+            if model.rise(nodes) > SLIGHT:
+                return None
+            try:
+                hot = at_temperatures(self.scene, Temperatures(*nodes.tolist()))
+                model = model._replace(conductances=network_of(hot, self.thermal, roller_bearing(hot)).conductances)
+            except InputError:
+                return None
+            nodes = model.balanced()
+        return State(nodes, nodes, state.noise, model)
+
 
 def measured_slopes(balance: Balance, state: State, near: HeatModel) -> tuple[Array, float]:
     """Slopes after more short runs next to a state, and the error of their gain (95 %).
 
-    Where all nodes are less than 5 K above the surroundings the estimate serves: their heat cannot run away. Else all nodes are moved, then the inner ring alone; the other nodes follow where the gain is near one. A warmer ring that makes the
-    bearing impossible is replaced by a colder one.
+    Where the heat warms no node by 5 K the estimate serves: such heat cannot run away. Else all nodes are moved, then the inner
+    ring alone; the other nodes follow where the gain is near one. A warmer ring that makes the bearing impossible is replaced by a
+    colder one.
     """
     slopes = near._replace(rest=no_rest()).image_slopes(state.temperatures)
-    if state.image.max() < state.model.coldest + WARMER:
+    if near.rise(state.temperatures) < WARMER:
         return slopes, 0.0
     alone = np.eye(len(NODES))
     inner = NODES.index("inner")
@@ -219,7 +236,13 @@ def verdict_of(balance: Balance) -> Verdict:
     Raises InputError where the bearing is impossible even at the temperature of its surroundings, RunError, KeyboardInterrupt.
     """
     first = np.full(len(NODES), balance.scene.lubricant.temperature_C)
-    search = steady_state(balance.at, first, balance.cold, lambda state, near: measured_slopes(balance, state, near))
+    search = steady_state(
+        balance.at,
+        first,
+        balance.cold,
+        lambda state, near: measured_slopes(balance, state, near),
+        estimate=balance.slight,
+    )
     last = search.last
     temperatures = corrected(last, search.slopes) if search.status == "steady" else last.temperatures
     return Verdict(search.status, search.reason, search.slopes, [*search.states], temperatures)
@@ -309,7 +332,7 @@ def _result(
 
 
 def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> Ranges:
-    """Ranges over the unknown inputs of the balance, about the steady state next to the last one of a path."""
+    """Ranges over the unknown inputs of the balance, about the steady state next to the last one, by the model of the search."""
     mounting = hot.mounting
     assert mounting is not None
 
@@ -317,7 +340,6 @@ def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> R
         mounted = mounting.model_copy(update=part_temperatures(thermal, Temperatures(*nodes.tolist())))
         return {f"{name}_um": 1e6 * play for name, play in hot.clearances_of(mounted).items()}
 
-    # Far from the state, losses follow the exponents that the path showed; the rest, which is linear, is to hold little.
     about = model_of(path).with_image_slopes(slopes)
     estimated = [] if scene.uncertain is None else scene.uncertain.estimated
     return input_ranges(

@@ -61,12 +61,14 @@ def equilibrium(
     scene: BallScene | Scene | Path | str,
     start: BallResult | tuple[Solution, ...] | None = None,
     overrides: Iterable[str] = (),
+    ranges: bool = True,
 ) -> BallResult:
     """Equilibrium of a ball bearing under its load: angles, loads, stiffness, stress and life.
 
     ``scene``: a scene of balls or the path of its file; ``overrides`` of its keys, such as ``["operation.axial_load_N=500"]``.
     ``start``: a result nearby, or the solutions of its rows, to save time. Without an equilibrium the ``status`` of the result states the cause. Raises InputError for another kind of scene
-    or a start that does not fit. A scene with [thermal] has its equilibrium at its steady temperatures.
+    or a start that does not fit. A scene with [thermal] has its equilibrium at its steady temperatures, and their
+    ``ranges`` over the inputs of its balance unless left out, which saves half a second.
     """
     scene = balls_only(scene, overrides)
     starts = _solutions(start, 2 if isinstance(scene, DoubleDeckerScene) else 1)
@@ -77,7 +79,7 @@ def equilibrium(
     if scene.thermal is not None:
         from rbdyn.quasistatic.temperatures import with_temperatures
 
-        return with_temperatures(scene, single)
+        return with_temperatures(scene, single, ranges)
     return single(scene)
 
 

@@ -252,17 +252,18 @@ def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
     )
 
 
-def balance(scene: SingleRowScene, nodes: Array) -> State:
+def balance(scene: SingleRowScene, nodes: Array, viscosity: Array | None = None) -> State:
     """The map of the fixed point: temperatures [C], and those at which the network carries off their heat.
 
-    Raises InputError as ``heat_at``.
+    ``viscosity``: ``log_viscosity`` of the oil, which takes longer than all else and may be known. Raises InputError as ``heat_at``.
     """
     assert scene.lubricant is not None
     found = heat_at(scene, nodes)
     films = np.zeros((len(TERMS), len(NODES)))
     films[:, OIL] = 1.0
     exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
-    losses = Losses(nodes, found.powers, exponents, films, log_viscosity(scene.lubricant.at))
+    viscosity = log_viscosity(scene.lubricant.at) if viscosity is None else viscosity
+    losses = Losses(nodes, found.powers, exponents, films, viscosity)
     model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_rest())
     image = temperatures(found.conductances, found.boundaries, found.heat)
     return State(nodes, image, np.zeros(len(NODES)), model, found)

@@ -362,9 +362,9 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
     rows = dict(zip(names, scene.outermost_rows, strict=False))  # a single row is both of the outermost ones
     sizes = [row.balls for row in rows.values()]
     started = [len(row.balls) for row in before] == sizes
-    result = equilibrium(scene, before if started else ())
+    result = equilibrium(scene, before if started else (), ranges=False)
     if started and not result.is_equilibrium:
-        result, started = equilibrium(scene), False
+        result, started = equilibrium(scene, ranges=False), False
     if not result.is_equilibrium:
         nothing = {name: np.full((size, FIGURES), np.nan) for name, size in zip(rows, sizes, strict=True)}
         return PointRecord(result.status, {}, nothing, [], (), not started)

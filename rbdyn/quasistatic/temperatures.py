@@ -2,7 +2,7 @@
 
 The map from temperatures to those that balance their heat is exact to round-off, so a search whose slopes are central differences
 finds the fixed point to ``TOLERANCE`` (``rbdyn.thermal.fixed_point``). These slopes also give the gain of the loop, and the
-ranges of the temperatures over the documented inputs of the balance.
+ranges of the temperatures over the documented inputs of the balance follow from full solutions.
 """
 
 import math
@@ -25,11 +25,13 @@ from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
 from rbdyn.thermal.input_ranges import Ranges, input_ranges
-from rbdyn.thermal.losses import HeatModel, gain
+from rbdyn.thermal.losses import HeatModel, gain, log_viscosity
 from rbdyn.thermal.network import NODES, carried_off
 
 # Deviation from the balance that counts as none [K]; half of the difference of temperatures that gives slopes [K].
 TOLERANCE, DIFFERENCE = 1e-9, 0.01
+# Deviation from the balance of an input set of a range [K].
+RANGE_TOLERANCE = 0.1
 # Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
 FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 # SKF's friction over the heat of ISO 15312 at the reference speeds of 8 deep groove and 6 angular contact bearings of series 60 to
@@ -43,9 +45,10 @@ STARVED = 0.1
 
 def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
     """dM/dT (4, 4) by central differences. Raises InputError where the bearing is impossible next to these temperatures [C]."""
-    columns = []
+    assert scene.lubricant is not None
+    columns, viscosity = [], log_viscosity(scene.lubricant.at)
     for step in DIFFERENCE * np.eye(len(NODES)):
-        above, below = (balance(scene, temperatures + sign * step).image for sign in (1.0, -1.0))
+        above, below = (balance(scene, temperatures + sign * step, viscosity).image for sign in (1.0, -1.0))
         columns.append((above - below) / (2.0 * DIFFERENCE))
     return np.array(columns).T
 
@@ -78,10 +81,12 @@ def _model(scene: SingleRowScene, states: Sequence[State]) -> HeatModel:
         return model_of(states)
 
 
-def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
+def with_temperatures(
+    scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult], ranged: bool = True
+) -> BallResult:
     """The result of a scene with [thermal], at its steady temperatures; without such, its temperatures and the path alone.
 
-    ``solve`` gives the result of a scene at stated temperatures.
+    ``solve`` gives the result of a scene at stated temperatures. ``ranged``: with ranges over the inputs of the balance.
     """
     try:
         search = steady_temperatures(scene)
@@ -94,7 +99,7 @@ def with_temperatures(scene: SingleRowScene, solve: Callable[[SingleRowScene], B
     if status == "steady":
         status, reason = ceiling_verdict(scene, nodes)
     hot = solve(at_temperatures(scene, Temperatures(**nodes)))
-    ranges = ranges_of(scene, last, slopes) if search.status == "steady" else None
+    ranges = ranges_of(scene, last, slopes) if ranged and search.status == "steady" else None
     steady = status == "steady"
     return replace(
         hot,
@@ -131,14 +136,25 @@ def ceiling_verdict(scene: SingleRowScene, nodes: dict[str, float]) -> tuple[str
 
 
 def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
-    """Ranges of steady temperatures over the documented inputs of the balance, with the heat linear in the temperatures."""
+    """Ranges of steady temperatures over the documented inputs of the balance, by a full solution for each input set."""
+    assert scene.thermal is not None and scene.lubricant is not None
+    cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
+    about = state.model.with_image_slopes(slopes)
+
+    def near(states: Sequence[State]) -> HeatModel:
+        return states[-1].model._replace(rest=about.rest)
+
+    def full(thermal: Thermal, start: Array) -> Array | None:
+        changed = scene.model_copy(update={"thermal": thermal})
+        map_of_set = partial(balance, changed, viscosity=about.losses.log_viscosity)
+        search = steady_state(map_of_set, start, cold, _exact_slopes, near, RANGE_TOLERANCE)
+        return search.last.temperatures if search.status == "steady" else None
 
     def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
         changed = scene.model_copy(update={"thermal": thermal})
         return {"radial_um": 1e6 * clearance_of(row_of(at_temperatures(changed, Temperatures(*nodes.tolist()))).row)[0]}
 
-    about = state.model.with_image_slopes(slopes)
-    return input_ranges(scene, about, lambda share: term_shares(scene, share), clearances, {})
+    return input_ranges(scene, about, lambda share: term_shares(scene, share), clearances, {}, full=full)
 
 
 def _record(scene: SingleRowScene, search: Search, found: Heat, ranges: Ranges | None) -> dict[str, Any]:

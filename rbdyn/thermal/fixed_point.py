@@ -63,6 +63,8 @@ class State(NamedTuple):
 Balance = Callable[[Array], State]
 # Slopes dM/dT (4, 4) at a state, and the error of their gain, by runs next to it or by the model of the search.
 Slopes = Callable[[State, HeatModel], tuple[Array, float]]
+# The steady state as far as it needs no further balance, None where it does.
+Estimate = Callable[[State], State | None]
 # The model of the balance about the last state, from all states.
 Model = Callable[[Sequence[State]], HeatModel]
 
@@ -129,12 +131,18 @@ def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
 
 
 def steady_state(
-    balance: Balance, start: Array, cold: Array, measured: Slopes, model: Model = model_of, tolerance: float = TOLERANCE
+    balance: Balance,
+    start: Array,
+    cold: Array,
+    measured: Slopes,
+    model: Model = model_of,
+    tolerance: float = TOLERANCE,
+    estimate: Estimate | None = None,
 ) -> Search:
     """Search for steady temperatures from ``start`` [C].
 
-    ``cold``: temperatures before any heat, towards which an impossible start moves. ``tolerance`` [K]. Raises InputError where
-    the bearing is impossible even when cold.
+    ``cold``: temperatures before any heat, towards which an impossible start moves. ``tolerance`` [K]. ``estimate``: ends
+    the search where it answers. Raises InputError where the bearing is impossible even when cold.
     """
     visited, fault, step = [_possible_start(balance, start, cold)], "", None
     while True:
@@ -143,6 +151,8 @@ def steady_state(
         vague = float(state.noise.max())
         if state.closes(tolerance) and vague <= VAGUE:
             return _judged(tuple(visited), measured(state, near), "steady", "")
+        if estimate is not None and (known := estimate(state)) is not None:
+            return _judged((*visited, known), measured(known, known.model), "steady", "")
         if len(visited) >= MOST_STATES:
             reason = f"{len(visited)} states did not settle; the last misses its balance by {np.abs(state.deviation).max():.2g} K"
             if vague > VAGUE:

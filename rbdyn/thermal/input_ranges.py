@@ -1,6 +1,7 @@
 """Ranges of steady temperatures over the unknown inputs of a heat balance: conductances, shares of the heat, level of the loss.
 
-Each set of these inputs is one balance of the model about the steady state (``losses``). Their laws are the documented ones
+Each set of these inputs is one balance: of the model about the steady state (``losses``), or, where a full solution takes no
+simulation, of that, with the model's answer as its first guess. Their laws are the documented ones
 (rbdyn/scene/unknown_inputs.toml). A key that the scene states is exact unless [uncertain] names it as estimated, as for ``doe
 uncertainty``, which also varies all other inputs, by simulation.
 """
@@ -58,6 +59,8 @@ Levels = Mapping[str, Callable[[float], Array]]
 Clearances = Callable[[Array, "Thermal"], Mapping[str, float]]
 # Shares of the nodes in the losses (terms, 4) by the share of a film's heat that its oil takes.
 Shares = Callable[[float], Array]
+# Steady temperatures (4,) [C] with keys of [thermal] by a full solution from a first guess (4,) [C], None where there are none.
+Full = Callable[["Thermal", Array], Array | None]
 
 
 def input_ranges(
@@ -67,10 +70,11 @@ def input_ranges(
     clearances: Clearances,
     levels: Levels,
     estimated: Collection[str] = (),
+    full: Full | None = None,
 ) -> Ranges:
     """Ranges about a steady state: of the nodes [C], of the inner ring over the outer one [K], and of clearances [um].
 
-    ``estimated``: keys of the scene whose stated values are estimates. Sets whose temperatures run away, or beyond what any oil
+    ``estimated``: keys of the scene whose stated values are estimates. Without ``full`` the model's answers count. Sets whose temperatures run away, or beyond what any oil
     bears, count as without a steady state and as the hottest; their clearances are left out.
     """
     thermal = scene.thermal
@@ -89,8 +93,12 @@ def input_ranges(
         for key in sorted(set(levels) & set(values)):
             level *= levels[key](values[key])
         varied = model.varied(ratios, level, dry + changed.film_share_to_oil * (wet - dry))
-        nodes = varied.balanced()
-        if not varied.is_stable(nodes):
+        guess = varied.balanced()
+        stable = varied.is_stable(guess)
+        nodes = guess if stable else None
+        if full is not None:
+            nodes = full(changed, guess if stable else model.losses.temperatures)
+        if nodes is None:
             rows.append(np.full(len(NODES), HOTTEST))
             continue
         rows.append(nodes)

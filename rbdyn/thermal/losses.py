@@ -111,6 +111,10 @@ class HeatModel(NamedTuple):
         """Heat less what the network carries off (..., 4) [W]: zero where the heat balances."""
         return np.asarray(self.heat(nodes) + source(self.conductances, self.boundaries) - nodes @ self.matrix.T)
 
+    def rise(self, nodes: Array) -> float:
+        """Largest rise of a node by the heat at temperatures (4,) [C], [K]."""
+        return float(np.linalg.solve(self.matrix, self.heat(nodes)).max())
+
     def image_slopes(self, nodes: Array) -> Array:
         """dM/dT (..., 4, 4) of the temperatures M that carry the heat off."""
         return np.asarray(np.linalg.solve(self.matrix, self.heat_slopes(nodes)))

@@ -13,18 +13,20 @@ HOT = ROOT / "examples" / "hot_roller.toml"
 SHORT = [
     f"numerics.{key}" for key in ("turns=4", "discard_turns=2", "replicates=2", "extend=false", "impact_window_turns=2")
 ]
+# Right-hand sides of a whole balance at most: one to three minutes of processor time, which thick oil at 170 rpm comes near.
+BUDGET = 1e8
 OILS = ("MIL-L-7808", "MIL-L-23699", "ISO VG 32", "ISO VG 150")
 
 
 def random_keys(seed: int) -> list[str]:
-    """Speed, oil and ways out of the heat over the ranges that a user may state; slow bearings take long runs, with heat or without."""
+    """Speed, oil and ways out of the heat over the ranges that a user may state."""
     random_state = random.Random(seed)
 
     def decades(low: float, high: float) -> float:
         return math.exp(random_state.uniform(math.log(low), math.log(high)))
 
     return [
-        f"operation.inner_speed_rpm={decades(3e3, 1e5):.6g}",
+        f"operation.inner_speed_rpm={decades(1e2, 1e5):.6g}",
         f"lubricant.oil_inlet_temperature_C={random_state.uniform(-40.0, 115.0):.4g}",
         f"lubricant.oil_flow_l_min={decades(1e-3, 50.0):.4g}",
         f"thermal.housing_factor={decades(1e-3, 30.0):.4g}",
@@ -42,6 +44,7 @@ def test_random_heat_balances_end(seed):
     except (InputError, RunError) as error:
         assert str(error)
         return
+    assert result.cost["rhs_evaluations"] <= BUDGET
     balance = result.thermal
     assert balance["status"] in ("steady", "undecided", "no steady state", "seizure", "too hot")
     assert (balance["status"] == "steady") == (result.status == "ok") and (result.status == "ok" or balance["reason"])
@@ -54,10 +57,10 @@ def test_random_heat_balances_end(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("designation", ["308", "218"])
-def test_maker_s_bearings_in_a_bath(designation, tmp_path):
-    """At the reference speed, 0.05 C0 and ISO VG 32, oil is colder than the rollers, the 70 C of ISO 15312 are in the range of the outer
-    ring, and 5 to 10 K in that of the inner ring over it."""
+@pytest.mark.parametrize(("designation", "miss"), [("308", 0.0), ("218", 0.0), ("1014", 4.0)])
+def test_maker_s_bearings_in_a_bath(designation, miss, tmp_path):
+    """At the reference speed, 0.05 C0 and ISO VG 32, oil is colder than the rollers, none is too hot, and 5 to 10 K are in the range of
+    the inner ring over the outer one. The 70 C of ISO 15312 are in the range of the outer ring, which that of NU 1014 misses by up to 4 K."""
     from rbdyn.properties.catalogue import envelope, read_designation
 
     sizes = envelope(read_designation(f"NU {designation}"))
@@ -81,5 +84,5 @@ def test_maker_s_bearings_in_a_bath(designation, tmp_path):
     result = simulate(Scene.load(path, SHORT), 2, notice=None)
     nodes, ranges = {node: figure.value for node, figure in result.temperatures_C.items()}, result.thermal["ranges"]
     assert result.status == "ok" and nodes["oil"] < nodes["rollers"]
-    assert ranges["outer"][0] < 70.0 < ranges["outer"][2]
+    assert ranges["outer"][0] < 70.0 + miss and ranges["outer"][2] > 70.0
     assert ranges["inner_minus_outer_K"][0] < 5.0 and ranges["inner_minus_outer_K"][2] > 10.0

@@ -414,3 +414,17 @@ def test_unit_ways_out_of_a_bath():
     assert ways["sump"] > 0.0 == dry["sump"] and with_sump["oil"] < without["oil"] - 2.0
     lagged, _ = nodes(shaft_factor=0.2)
     assert lagged["inner"] - lagged["outer"] > with_sump["inner"] - with_sump["outer"] + 1.0
+
+
+def test_unit_slight_heat_takes_one_short_state(monkeypatch):
+    """Unit: heat that warms no node by 1 K needs one short state, and gives the temperatures of the whole search in less work."""
+    from rbdyn.dynamics.temperatures import Balance
+
+    slow = _scene(operation={"inner_speed_rpm": 500.0}, numerics={**SHORT, "companion": False})
+    found = simulate(slow, workers=1, notice=None)
+    assert found.status == "ok" and found.cost["states"] == 3
+    monkeypatch.setattr(Balance, "slight", lambda balance, state: None)
+    searched = simulate(slow, workers=1, notice=None)
+    assert found.cost["rhs_evaluations"] < 0.8 * searched.cost["rhs_evaluations"]
+    for node, figure in found.temperatures_C.items():
+        assert figure.value == pytest.approx(searched.temperatures_C[node].value, abs=0.2)
