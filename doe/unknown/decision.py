@@ -64,7 +64,11 @@ class Better:
 
 @one_thread
 def better(gains: Array, variances: Array, seed: int) -> Better:
-    """Probabilities that the true gains (n, m) are positive, from simulated gains and their variances (n, m)."""
+    """Probabilities that the true gains (n, m) are positive, from simulated gains and their variances (n, m).
+
+    The variances are smoothed over the inputs. Those of few replicates scatter; where one is too small by chance, its row seems
+    sure, and the distribution follows its noise.
+    """
     *alone, every = _likely_shares(
         gains, variances, lambda points: np.column_stack([points > 0.0, (points > 0.0).all(axis=1)]), seed
     )
@@ -158,7 +162,7 @@ def _root(matrix: Array) -> Array:
 def odds(values: Array, variances: Array, lower: float, upper: float, seed: int) -> Share:
     """Probability that the true value of an input set is from ``lower`` to ``upper``; either may be infinite.
 
-    ``values`` (n,) are simulated, with ``variances`` (n,).
+    ``values`` (n,) are simulated, with ``variances`` (n,) smoothed over the inputs as in ``better``.
     """
     (share,) = _likely_shares(
         values[:, None], variances[:, None], lambda points: (lower <= points) & (points <= upper), seed

@@ -60,4 +60,4 @@ def test_intervals_of_chances_cover_gains_of_any_form(kind: str, noise: float) -
     held = np.mean([share.low <= CHANCE[kind] <= share.high for share in found])
     bias = np.mean([share.value for share in found]) - CHANCE[kind]
     print(f"{kind}, noise {noise:g}: coverage {held:.3f}, bias {bias:+.3f}")
-    assert held >= 0.85 and abs(bias) < 0.05
+    assert held >= 0.9 and abs(bias) < 0.05

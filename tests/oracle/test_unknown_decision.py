@@ -5,28 +5,38 @@ import pytest
 from decisions import noisy, smooth
 from scipy import stats
 
-from doe.unknown.decision import better, decides, in_doubt, wilson
+from doe.unknown.decision import _shares, better, decides, in_doubt, wilson
 from doe.unknown.inputs import nested
 
 
 def test_noise_is_taken_off_the_share_of_cases() -> None:
-    """Gains normal about 1 with sd 1: 84 % positive; noise of sd 2 would make 67 % of it.
-
-    Noise twice the scatter leaves the form of the distribution open, and no form is assumed.
-    """
-    truth = 1.0 + stats.norm.ppf(nested(1, 1024, 1))
-    gains, variances, _ = noisy(truth, 2.0, 1)
+    """Gains normal about 1 with sd 1: 84 % positive; noise of sd 2 would make 67 % of it."""
+    quantiles, chance = nested(1, 1024, 1), stats.norm.cdf(1.0)
+    truth = 1.0 + stats.norm.ppf(quantiles)
+    gains, *rest = noisy(truth, 2.0, 1)
     assert float((gains > 0.0).mean()) == pytest.approx(0.67, abs=0.03)
-    found = better(gains, variances, 1)
-    assert found.gains[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.06)
-    assert found.gains[0].low < stats.norm.cdf(1.0) < found.gains[0].high
+    found = better(gains, smooth(quantiles, *rest), 1)
+    assert found.gains[0].value == pytest.approx(chance, abs=0.04)
+    assert found.gains[0].low < chance < found.gains[0].high
+
+
+@pytest.mark.slow
+def test_noise_leaves_no_bias_in_the_share_of_cases() -> None:
+    """Mean of twelve samples of that noise, whose single shares scatter by 0.04."""
+    quantiles, random, every = nested(1, 1024, 1), np.random.default_rng(1), np.ones(1024, dtype=np.int64)
+    shares = []
+    for seed in range(12):
+        gains, *rest = noisy(1.0 + stats.norm.ppf(quantiles), 2.0, seed)
+        shares.append(_shares(gains, smooth(quantiles, *rest), every, lambda points: points > 0.0, random)[-1, 0])
+    assert np.mean(shares) == pytest.approx(stats.norm.cdf(1.0), abs=0.03)
 
 
 def test_gains_that_go_together_are_not_multiplied() -> None:
     """Two gains of one sign always: all is as likely as each, a half, not a quarter."""
-    one = stats.norm.ppf(nested(1, 256, 2))
-    gains, variances, _ = noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
-    found = better(gains, variances, 1)
+    quantiles = nested(1, 256, 2)
+    one = stats.norm.ppf(quantiles)
+    gains, *rest = noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
+    found = better(gains, smooth(quantiles, *rest), 1)
     assert found.all.value == pytest.approx(0.5, abs=0.03)
     assert [each.value for each in found.gains] == pytest.approx([0.5, 0.5], abs=0.03)
 
@@ -36,17 +46,20 @@ def test_intervals_of_shares_cover() -> None:
     held = []
     for seed in range(60):
         random = np.random.default_rng(seed)
-        gains, variances, _ = noisy(0.5 + random.standard_normal((128, 1)), 0.5, seed)
-        share = better(gains, variances, seed).gains[0]
+        quantiles = random.random((128, 1))
+        gains, *rest = noisy(0.5 + stats.norm.ppf(quantiles), 0.5, seed)
+        share = better(gains, smooth(quantiles, *rest), seed).gains[0]
         held.append(share.low <= stats.norm.cdf(0.5) <= share.high)
     assert np.mean(held) >= 0.9
 
 
 def test_a_design_that_always_wins_is_sure_within_its_rows() -> None:
-    gains, variances, freedom = noisy(np.full((256, 2), 0.2), 0.02, 3)
+    quantiles = nested(3, 256, 3)
+    gains, *rest = noisy(np.full((256, 2), 0.2), 0.02, 3)
+    variances = smooth(quantiles, *rest)
     found = better(gains, variances, 1)
     assert found.all.value > 0.98 and found.all.low > 0.97
-    sure = decides(nested(3, 256, 3), gains, smooth(nested(3, 256, 3), variances, freedom), nested(3, 4096, 4), 1)
+    sure = decides(quantiles, gains, variances, nested(3, 4096, 4), 1)
     assert all(each.worth < 0.01 for each in sure.inputs)
     assert in_doubt(gains, variances).size == 0
 
