@@ -130,8 +130,10 @@ def run(app: Callable[[], object]) -> NoReturn:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether an error is Ctrl-C, or comes from one that interrupted the creation of a class."""
-    return error is not None and (isinstance(error, KeyboardInterrupt) or _is_interrupt(error.__cause__))
+    """Whether an error is Ctrl-C, or comes from one that interrupted the creation of a class; pydantic gives its name alone."""
+    if error is None or isinstance(error, KeyboardInterrupt):
+        return error is not None
+    return "KeyboardInterrupt:" in str(error) or _is_interrupt(error.__cause__)
 
 
 def _shorten_warnings() -> None:

@@ -194,6 +194,14 @@ def test_an_interrupt_that_a_callback_swallows_comes_again():
     assert (found.returncode, found.stderr) == (130, "")
 
 
+def test_an_interrupt_that_pydantic_words_is_one():
+    """Unit: Ctrl-C while a model is built, of which pydantic leaves the name in the text of its own error."""
+    wrapped = "Error building `default` serializer:\\n  SchemaError: Error building `literal` serializer:\\n  KeyboardInterrupt: "
+    program = f"from rbdyn.base.streams import run\ndef app():\n    raise ValueError('{wrapped}')\nrun(app)"
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=300)
+    assert (found.returncode, found.stderr) == (130, "")
+
+
 def test_the_guard_loads_nothing_heavy():
     """Unit: what meets streams and interrupts stands before anything else is loaded."""
     program = "import sys, rbdyn.base.loading; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"

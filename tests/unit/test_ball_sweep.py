@@ -149,8 +149,8 @@ def test_invariant_a_snake_visits_all_and_steps_by_one(sizes):
 def broken():
     """A sweep in which two points of five are declared lost."""
 
-    def lose(scene, *before):
-        found = solve(scene, *before)
+    def lose(scene, *before, **options):
+        found = solve(scene, *before, **options)
         lost = scene.operation.inner_speed_rpm in (10e3, 15e3)
         return SimpleNamespace(is_equilibrium=False, status=LOST) if lost else found
 

@@ -58,7 +58,9 @@ def test_unit_a_point_has_the_companions_of_a_single_run(make_scene):
 def test_physics_light_load_slips_more(outer):
     """Trend: at both speeds the cage slips more under 60 N than under 1300 N, beyond the errors of both."""
     found = slip_map(
-        with_options(outer, ("numerics.replicates=6", "numerics.turns=24", "numerics.discard_turns=12")),
+        with_options(
+            outer, ("numerics.replicates=6", "numerics.turns=24", "numerics.discard_turns=20", "numerics.extend=true")
+        ),
         SPEEDS,
         LOADS,
         workers=2,
