@@ -1,12 +1,12 @@
 """Whether one design is better than another over the unknown inputs, whether it keeps its limits, and which input is decisive.
 
 Gains. Rows are pairs: both designs at the same input set, with relative gains D (n, m) and their variances s^2 (n, m) of the
-simulation. Single gains scatter more than the true ones, so the noise is removed from their distribution. It begins as if the true
-gains were normal, those of row i about m + V (V + S_i)^-1 (D_i - m), V = cov D - mean S, with a few points drawn for each row.
-Steps of expectation maximisation then move the weights of all points to the distribution under which the gains are likeliest,
-whatever its form. They end before it follows the noise, and how far the share still moves lengthens its interval on that side.
-A probability is the weight of the points at which all gains are positive; its interval is by resampling rows, and no shorter than
-Wilson's. Gains are joint: their probabilities are never multiplied.
+simulation. Single gains scatter more than the true ones, so the noise is removed from their distribution. It begins as if the
+true gains were normal, those of row i about m + V (V + S_i)^-1 (D_i - m), V = cov D - mean S, with a few points drawn for each
+row. Steps of expectation maximisation then move the weights of all points to the distribution under which the gains are
+likeliest, whatever its form. They end before it follows the noise; how far the share still moves lengthens its interval. A
+probability is the weight of the points at which all gains are positive; its interval is by resampling rows, and no shorter than
+Wilson's. Gains are joint, so their probabilities are never multiplied.
 
 Limits. The noise is removed alike from values at input sets. The probability is the weight of the points between the limits.
 
@@ -64,11 +64,9 @@ class Better:
 
 @one_thread
 def better(gains: Array, variances: Array, seed: int) -> Better:
-    """Probabilities that the true gains (n, m) are positive, from simulated gains and their variances (n, m).
+    """Probabilities that the true gains (n, m) are positive, from simulated gains and their smoothed variances (n, m).
 
-    The variances are smoothed over the inputs. Those of few replicates scatter; where one is too small by chance, its row seems
-    sure, and the distribution follows its noise.
-    """
+    Raw variances of few replicates scatter, and the distribution would follow the noise of a row that seems sure by chance."""
     *alone, every = _likely_shares(
         gains, variances, lambda points: np.column_stack([points > 0.0, (points > 0.0).all(axis=1)]), seed
     )
