@@ -49,8 +49,7 @@ from rbdyn.base.arrays import Array, Whole
 POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER, CONFIDENCE = 4, 1024, 100, 25, 0.95
 # Resamplings of up to 512 rows; of more rows fewer.
 RESAMPLES, FEWEST_RESAMPLES, USUAL_ROWS = 200, 50, 512
-# Least standard deviation of noise over the size of the values: smaller noise is lost in rounding.
-LEAST_NOISE = 1e-9
+LEAST_NOISE = 1e-9  # standard deviation over the size of the values; smaller noise is lost in rounding
 Hits = Callable[[Array], NDArray[np.bool_]]  # from points (k, m) to whether each hits (k, q)
 
 
