@@ -20,6 +20,7 @@ from short_studies import EXAMPLES, SHORT, short_study
 import rbdyn
 from rbdyn.cli.manual.drawings import roller_bearing, scene_of
 from rbdyn.cli.manual.page import markdown, rendered
+from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.plots.sketches import clearances
 from rbdyn.scene import Scene
 from rbdyn.scene.keys import keys, lines
@@ -262,7 +263,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
         tables = list(folder.glob("*.csv"))
         assert tables
         for path in tables:
-            assert undescribed(floors, path, figure=figures) == [], path.name
+            assert undescribed(floors, path, figure=[*figures, *NAMES]) == [], path.name
     study = short_study(tmp_path)
     doe("study", str(study), "--out", str(tmp_path / "study"))
     tables = sorted((tmp_path / "study").glob("*.csv"))
@@ -274,7 +275,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
 
 @pytest.mark.slow
 def test_command_writes_the_page_and_nothing_else(tmp_path, command):
-    """Command line: the declared entry points bring both floors in; equal bytes in any process; one JSON object."""
+    """Command line: the declared entry points bring both floors in; the note of what made it stands next to it; equal bytes in any process; one JSON object."""
     meta = tmp_path / f"rbdyn-{rbdyn.__version__}.dist-info"
     meta.mkdir()
     (meta / "METADATA").write_text(f"Metadata-Version: 2.1\nName: rbdyn\nVersion: {rbdyn.__version__}\n")
@@ -284,7 +285,7 @@ def test_command_writes_the_page_and_nothing_else(tmp_path, command):
     ran = command("manual", "--out", tmp_path / "out", "--json", PYTHONPATH=where, PYTHONHASHSEED="7")
     assert ran.returncode == 0, ran.stderr
     assert json.loads(ran.stdout) == {"status": "ok", "page": str(tmp_path / "out" / "manual.html")}
-    assert os.listdir(tmp_path / "out") == ["manual.html"]
+    assert os.listdir(tmp_path / "out") == ["made_by.json", "manual.html"]
     assert (tmp_path / "out" / "manual.html").read_text(encoding="utf-8") == whole_page()
 
 
