@@ -260,7 +260,7 @@ def test_bad_rows_of_pulses_end_in_a_sentence(tmp_path: Path, row: str, sentence
 
 @pytest.mark.slow
 def test_the_stiffness_of_the_bars_is_found_from_pulses_of_a_simulated_rig(tmp_path: Path) -> None:
-    """The traces of all pockets one after the other, of a cage whose stiffness is hidden, at four speeds."""
+    """The traces of all pockets one after the other, of a cage whose stiffness is hidden, at four speeds; sensors are within 10 %."""
     short = [
         "numerics.turns=4", "numerics.discard_turns=2", "numerics.impact_window_turns=1", "numerics.replicates=2",
         "numerics.extend=false", "numerics.companion=false",
@@ -286,5 +286,5 @@ def test_the_stiffness_of_the_bars_is_found_from_pulses_of_a_simulated_rig(tmp_p
 
     record_ = json.loads(answer.stdout)
     found = record_["inputs"][key]
-    assert found["low"] < hidden < found["high"] < 2.0 * found["low"] and found["seen"] == "learned"
+    assert found["low"] < hidden < found["high"] < 3.0 * found["low"] and found["seen"] == "learned"
     assert record_["outputs"].keys() == set(PULSE_OUTPUTS)
