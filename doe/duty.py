@@ -18,6 +18,7 @@ from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, key_path, refuse
+from rbdyn.dynamics.figure_names import HARMONIC
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
@@ -27,11 +28,15 @@ if TYPE_CHECKING:
 
 
 class Rule(NamedTuple):
-    """How a response follows from its figures at the points, and its goal, which decides what is worse."""
+    """How a response follows from its figures at the points, and its goal, which decides what is worse.
+
+    ``harmonic``: the mean over time is that of the inverse figures, as of lives.
+    """
 
     aggregate: Aggregate
     goal: str
     target: float | None
+    harmonic: bool = False
 
     def badness(self, values: Array) -> Array:
         """Values on a scale on which the largest is the worst."""
@@ -49,6 +54,11 @@ class Rule(NamedTuple):
         """The response (n,) of figures (n, p) at points with ``weights`` (p,), which for worst_relative are ratios already."""
         from doe.aggregation import Estimates, largest, weighted_mean
 
+        if self.aggregate == "mean" and self.harmonic:
+            mean = weighted_mean(
+                Estimates(1.0 / estimates.values, estimates.errors / estimates.values**2, estimates.freedom), weights
+            )
+            return mean._replace(values=1.0 / mean.values, errors=mean.errors / mean.values**2)
         if self.aggregate == "mean":
             return weighted_mean(estimates, weights)
         badness = self.badness(estimates.values)
@@ -75,7 +85,7 @@ class Duty:
     def of(cls, study: Study) -> "Duty | None":
         """The duty of a study; None without one."""
         rules = {
-            response.name: Rule(response.aggregate, response.goal, response.target)
+            response.name: Rule(response.aggregate, response.goal, response.target, response.name in HARMONIC)
             for response in study.file.response
             if not isinstance(response, PointResponse)
         }

@@ -24,4 +24,8 @@ CONTACTS = {
     for race in ("inner", "outer")
     for key in ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
 }
-NAMES = (*POWERS, *CLEARANCES, *CONTACTS)
+# Reference life L10r [h] by the static loads at the operating clearance (ISO/TS 16281).
+LIFE = "life_h"
+# Figures whose mean over time is that of their inverse: 1/L is damage an hour (Palmgren and Miner).
+HARMONIC = {LIFE}
+NAMES = (*POWERS, *CLEARANCES, LIFE, *CONTACTS)

@@ -1,4 +1,4 @@
-"""Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, each with its errors.
+"""Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, life, each with its errors.
 
 Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figure_names``.
 """
@@ -10,7 +10,8 @@ from contextlib import suppress
 import numpy as np
 
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LOSSES, POWERS
+from rbdyn.dynamics.duty import static_life
+from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, LOSSES, POWERS
 from rbdyn.dynamics.forces.equations import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
@@ -35,7 +36,7 @@ def part_figures(
 ) -> dict[str, Quantity]:
     """Every figure that the scene has, by its name; ``share`` and ``since`` as of `quantities`, ``races`` of `race_report`.
 
-    A clearance is exact for its scene. The error of a contact follows from the scatter of the replicates' largest loads.
+    A clearance is exact for its scene, and so is the life; there is none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
@@ -46,7 +47,7 @@ def part_figures(
         # Most scenes have no work at all of some losses.
         slow = slow_change(power, power, runs, since, moving=moving) if steady and _works(power, runs) else 0.0
         figures[name] = quantity(power, runs, companions, share, slow)
-    figures |= {name: Quantity(gap, 0.0, 0.0, float(len(runs))) for name, gap in _clearances(scene).items()}
+    figures |= {name: Quantity(gap, 0.0, 0.0, float(len(runs))) for name, gap in _exact(scene).items()}
     reports = [race_report(scene, *(run.largest_load(race) for race in (INNER_LOAD, OUTER_LOAD))) for run in runs]
     if races is None:
         races = race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
@@ -60,12 +61,12 @@ def part_figures(
 def at_temperatures_with_errors(
     scene: Scene, figures: Mapping[str, Quantity], temperatures: Mapping[str, Quantity]
 ) -> dict[str, Quantity]:
-    """The figures of a scene with a heat balance, whose clearances have the errors of its ``temperatures`` by node.
+    """The figures of a scene with a heat balance, whose clearances and life have the errors of its ``temperatures`` by node.
 
     These errors have one cause, the friction, so that their effects add; unknown where a temperature within them is impossible.
     """
     nodes = {node: figure.value for node, figure in temperatures.items()}
-    at = {name: figure.value for name, figure in figures.items() if name in CLEARANCES}
+    at = {name: figure.value for name, figure in figures.items() if name in (*CLEARANCES, LIFE)}
     errors = dict[str, dict[str, float | None]]()
     for kind in ("statistical_error", "numerical_error"):
         shifts = {node: getattr(figure, kind) for node, figure in temperatures.items()}
@@ -74,7 +75,7 @@ def at_temperatures_with_errors(
             continue
         with suppress(InputError):
             moved = [
-                _clearances(at_temperatures(scene, Temperatures(**{**nodes, node: nodes[node] + shift})))
+                _exact(at_temperatures(scene, Temperatures(**{**nodes, node: nodes[node] + shift})))
                 for node, shift in shifts.items()
             ]
             errors[kind] = {name: math.fsum(abs(other[name] - value) for other in moved) for name, value in at.items()}
@@ -93,10 +94,12 @@ def at_temperatures_with_errors(
     }
 
 
-def _clearances(scene: Scene) -> dict[str, float]:
-    """Operating clearances [um] of a scene by the name of their figure."""
+def _exact(scene: Scene) -> dict[str, float]:
+    """Operating clearances [um] of a scene and its life [h], by the name of their figure."""
     gaps = scene.clearances
-    return {name: 1e6 * gap.operating for name, of in CLEARANCES.items() if (gap := gaps[of]) is not None}
+    figures = {name: 1e6 * gap.operating for name, of in CLEARANCES.items() if (gap := gaps[of]) is not None}
+    hours = static_life(scene).hours(*scene.operation.speeds)
+    return figures | ({LIFE: hours} if math.isfinite(hours) else {})
 
 
 def _works(power: Figure, runs: Runs) -> bool:

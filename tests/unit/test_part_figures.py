@@ -14,16 +14,25 @@ from short_studies import short_study
 
 import rbdyn
 from doe import clearance
+from doe.aggregation import Estimates
 from doe.commands.new import limits_of
+from doe.duty import Rule
 from doe.study_file import Study
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, NAMES, POWERS
+from rbdyn.dynamics.duty import static_life
+from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, NAMES, POWERS
 from rbdyn.dynamics.slip_map import slip_map
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
 SHORT = ["numerics.turns=2", "numerics.replicates=3"]
-ONE_OF_EACH = ("land_film_power_W", "guide_operating_clearance_um", "outer_max_pressure_MPa", "inner_minimum_film_um")
+ONE_OF_EACH = (
+    "land_film_power_W",
+    "guide_operating_clearance_um",
+    "outer_max_pressure_MPa",
+    "inner_minimum_film_um",
+    "life_h",
+)
 
 
 @cache
@@ -46,7 +55,18 @@ def test_the_figures_of_parts_are_those_of_the_report_with_errors():
         assert figures[name].value == pytest.approx(run.clearance_um[of]["operating"]) and figures[name].error == 0.0
     for name, (race, key) in CONTACTS.items():
         assert figures[name].value == run.races[race][key] and figures[name].statistical_error > 0.0
+    scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml")
+    assert figures[LIFE].value == static_life(scene).hours(*scene.operation.speeds) and figures[LIFE].error == 0.0
     assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).part_figures == figures
+
+
+def test_a_life_over_a_duty_is_that_of_palmgren_and_miner():
+    """The mean over points of time is the life of the damage that they do."""
+    lives, shares = np.array([[2e4, 300.0, 9e5]]), np.array([0.7, 0.05, 0.25])
+    errors, freedom = 0.01 * lives, np.full((1, 3), np.inf)
+    mean = Rule("mean", "max", None, harmonic=True).over(Estimates(lives, errors, freedom), shares)
+    assert mean.values[0] == pytest.approx(1.0 / (shares / lives[0]).sum())
+    assert mean.errors[0] == pytest.approx(0.01 * mean.values[0] ** 2 * np.sqrt(((shares / lives[0]) ** 2).sum()))
 
 
 def test_clearances_of_a_heat_balance_have_the_errors_of_its_temperatures():
