@@ -56,6 +56,7 @@ SCENES: dict[str, tuple[tuple[str, ...], tuple[str, ...], int]] = {
     "example": ((), (), 8),
     "pick": ((), clearances(0.025, 0.214, 0.221), 8),
     "loose": ((), clearances(0.025, 0.2, 0.35), 8),
+    "slow": ((), clearances(0.028, 0.15, 0.35), 8),
     "inner-guided": ((), ("cage.guidance=inner",), 4),
     "roller-guided": ((), ("cage.guidance=roller",), 4),
     "2000 rpm, 4 kN": ((), ("operation.inner_speed_rpm=2000", "operation.radial_load_N=4000"), 4),
