@@ -189,7 +189,7 @@ def slip_map(
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
     duty: Annotated[
         Path | None,
-        command.valued("FILE.toml", "Mark its points of operation, such as the duty of a study.", "no marks", "--duty"),
+        command.valued("FILE", "Mark its points of operation: TOML such as a study, or CSV.", "no marks", "--duty"),
     ] = None,
     assignments: command.Set = None,
     turns: command.Turns = None,

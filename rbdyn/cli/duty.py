@@ -10,7 +10,7 @@ from rbdyn.base.faults import key_path
 from rbdyn.base.records import finite
 from rbdyn.base.words import shown
 from rbdyn.scene import Scene
-from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty
+from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,18 +38,18 @@ class MapDuty:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A row a point: share of the time, place on the map, life there, share of the damage."""
-        whole = sum(point.share for point in self.points)
+        times = zip(self.points, shares_of_time(self.points), strict=True)
         lives = zip(self.life.point_hours, self.life.damage, strict=True)
         return [
             {
                 "name": point.name,
-                "share": point.share / whole,
+                "share": share,
                 "inner_speed_rpm": speed,
                 "radial_load_N": load,
                 "L10_h": finite(hours),
                 "damage_share": damage,
             }
-            for point, (speed, load), (hours, damage) in zip(self.points, self.marks.values(), lives, strict=True)
+            for (point, share), (speed, load), (hours, damage) in zip(times, self.marks.values(), lives, strict=True)
         ]
 
     def as_record(self) -> dict[str, Any]:
@@ -99,8 +99,7 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
 
     points = read_duty(path)
     scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
-    whole = sum(point.share for point in points)
-    life = roller_duty_life(scenes, [point.share / whole for point in points])
+    life = roller_duty_life(scenes, shares_of_time(points))
     return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))
 
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
-from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column
-from doe.study_file.table import is_number as is_numeral
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, one_line
+from rbdyn.base.tables.sheet import LONGEST_NUMBER, WHOLE, Column
+from rbdyn.base.tables.sheet import is_number as is_numeral
 from rbdyn.scene import Scene
 
 # Bits of the largest whole number, as in TOML.
