@@ -16,7 +16,13 @@ class Level(StrEnum):
 
 
 # Level of each code.
-CODES: dict[str, Level] = {"seizure": Level.DANGER, "remark": Level.NOTE}
+CODES: dict[str, Level] = {
+    "seizure": Level.DANGER,
+    "other_versions": Level.NOTE,
+    "other_windows": Level.WARNING,
+    "point_failed": Level.WARNING,
+    "remark": Level.NOTE,
+}
 
 
 class Note(str):

@@ -17,6 +17,7 @@ from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
 from rbdyn.cli.ball import ball
+from rbdyn.cli.compare import compare
 from rbdyn.cli.manual import describe_keys, manual
 from rbdyn.cli.new import new
 
@@ -60,6 +61,7 @@ FORMER = {
 }
 
 app.command()(ball)
+app.command()(compare)
 app.command("keys")(describe_keys)
 app.command()(new)
 app.command()(manual)
