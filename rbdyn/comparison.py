@@ -12,12 +12,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
-from rbdyn.base.intervals import joint_half_width, standard_errors, times_wider
-from rbdyn.base.notes import Level, Note
+from rbdyn.base.intervals import errors_of_differences
+from rbdyn.base.notes import Level, Note, merged
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import Brief, Figure, counted, quantity
 from rbdyn.result import Quantity, SavedRecord, SimulationResult
@@ -193,7 +190,7 @@ def differences(first: Mapping[str, Quantity], second: Mapping[str, Quantity]) -
     """Every figure of two tables, whose intervals hold together; the count leaves out figures without scatter or errors."""
     common = [name for name in first if name in second]
     ours, theirs = [first[name] for name in common], [second[name] for name in common]
-    error, wide = _errors_of_differences(ours, theirs)
+    error, wide = errors_of_differences(ours, theirs)
     found = {
         name: _difference(one.value, other.value, float(half), float(together))
         for name, one, other, half, together in zip(common, ours, theirs, error, wide, strict=True)
@@ -215,27 +212,6 @@ def _difference(a: float, b: float, error: float, together: float) -> Difference
     else:
         verdict = SIGNIFICANT if size > together else WITHIN
     return Difference(a, b, b - a, finite(error), finite(together), verdict)
-
-
-def _errors_of_differences(first: Sequence[Quantity], second: Sequence[Quantity]) -> tuple[Array, Array]:
-    """95 % half-widths (m,) of the differences alone, and of all of them together; NaN where a statistical error is unknown.
-
-    Statistical errors are those of Welch with the freedom of the fewer replicates for both: with its own, many replicates on one
-    side lend theirs to the few on the other wherever these scatter little by chance (3 against 16: 13 % of five equal figures
-    showed a difference, 2 % by this rule). Numerical errors are added as normal ones.
-    """
-    statistical, numerical, freedom = (
-        np.array([[getattr(figure, kind) for figure in side] for side in (first, second)], float)
-        for kind in ("statistical_error", "numerical_error", "degrees_of_freedom")
-    )
-    freedom = np.nan_to_num(freedom, nan=np.inf, posinf=np.inf)
-    errors = np.where(np.isnan(statistical), np.nan, standard_errors(statistical, freedom))
-    fewer = freedom.min(axis=0)
-    half, joint = joint_half_width([*errors], [fewer, fewer])
-    known = np.hypot(*np.nan_to_num(numerical))
-    alone = np.hypot(half, known)
-    count = max(int((np.nan_to_num(alone) > 0.0).sum()), 1)
-    return alone, np.hypot(half * times_wider(joint, count), known * times_wider(np.inf, count))
 
 
 def _half(progress: Any, place: int) -> "Reporter":
@@ -320,12 +296,7 @@ def _parts(result: Any) -> dict[str, Quantity]:
 
 def _notes(a: Any, b: Any) -> list[str]:
     """Dangers and warnings of both, and what makes figures of one unlike those of the other besides the inputs."""
-    found = [
-        Note(note.code, f"{place}: {note}")
-        for place, result in (("A", a), ("B", b))
-        for note in result.notes or ()
-        if isinstance(note, Note) and note.level != Level.NOTE
-    ]
+    found = merged({"A": a.notes or (), "B": b.notes or ()}, least=Level.WARNING)
     other = [name for name in a.versions if a.versions[name] != b.versions.get(name)]
     if other:
         change = ", ".join(f"{name} {a.versions[name]} and {b.versions.get(name, 'unknown')}" for name in other)
@@ -339,7 +310,7 @@ def _notes(a: Any, b: Any) -> list[str]:
                 "for that alone; make numerics.impact_window_turns and the turns alike",
             )
         )
-    return list(found)
+    return found
 
 
 def different_inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Input, ...]:

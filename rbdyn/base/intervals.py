@@ -5,12 +5,16 @@ Half-widths are of 95 %, by Student's t at their degrees of freedom; infinite on
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
 from rbdyn.base.arrays import Array
+
+if TYPE_CHECKING:
+    from rbdyn.result import Quantity
 
 LEVEL = 0.95  # probability that a stated interval holds the truth
 
@@ -50,3 +54,24 @@ def chance_above(room: ArrayLike, half_width: ArrayLike, freedom: ArrayLike) -> 
     """Probability that a value, estimated ``room`` above a bound with a ``half_width`` of 95 %, lies above it."""
     scaled = np.asarray(room) / np.asarray(half_width) * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
     return np.asarray(special.stdtr(freedom, scaled))
+
+
+def errors_of_differences(first: Sequence["Quantity"], second: Sequence["Quantity"]) -> tuple[Array, Array]:
+    """95 % half-widths (m,) of the differences of figures alone, and of all of them together; NaN where a statistical error is unknown.
+
+    Statistical errors are those of Welch with the freedom of the fewer replicates for both: with its own, many replicates on one
+    side lend theirs to the few on the other wherever these scatter little by chance (3 against 16: 13 % of five equal figures
+    showed a difference, 2 % by this rule). Numerical errors are added as normal ones.
+    """
+    statistical, numerical, freedom = (
+        np.array([[getattr(figure, kind) for figure in side] for side in (first, second)], float)
+        for kind in ("statistical_error", "numerical_error", "degrees_of_freedom")
+    )
+    freedom = np.nan_to_num(freedom, nan=np.inf, posinf=np.inf)
+    errors = np.where(np.isnan(statistical), np.nan, standard_errors(statistical, freedom))
+    fewer = freedom.min(axis=0)
+    half, joint = joint_half_width([*errors], [fewer, fewer])
+    known = np.hypot(*np.nan_to_num(numerical))
+    alone = np.hypot(half, known)
+    count = max(int((np.nan_to_num(alone) > 0.0).sum()), 1)
+    return alone, np.hypot(half * times_wider(joint, count), known * times_wider(np.inf, count))

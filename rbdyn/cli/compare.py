@@ -76,7 +76,7 @@ def blocks(found: "Comparison") -> list[Block]:
         *failed,
         Paragraph(statement(found), "statement"),
         _input_table(found.inputs),
-        _figure_table("Figures", found.figures),
+        _figure_table("Figures", found.figures if _in_common(found) else {}),
         Paragraph(_part_sentence(found.parts), detail=Detail.USUAL),
         _figure_table("Parts", found.parts, Detail.ALL),
         *notes(found.notes),
@@ -90,7 +90,7 @@ MOST_NAMED = 8
 
 def statement(found: "Comparison") -> str:
     """The significant changes from A to B in words, then the other figures."""
-    if not found.figures:
+    if not _in_common(found):
         return "There are no figures to compare."
     if all(one.verdict == "equal" for one in found.figures.values()):
         return f"No {'' if found.inputs else 'input and no '}figure differs."
@@ -100,6 +100,10 @@ def statement(found: "Comparison") -> str:
     groups = {verdict: _named(found.figures, verdict) for verdict in ORDER}
     said = "; ".join(f"{verdict}: {names}" for verdict, names in groups.items() if names)
     return f"{'' if found.inputs else 'No input differs. '}B against A{together or exact}: {said}."
+
+
+def _in_common(found: "Comparison") -> bool:
+    return any(one.difference is not None for one in found.figures.values())
 
 
 def _named(figures: Mapping[str, "Difference"], verdict: str) -> str:

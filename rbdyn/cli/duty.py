@@ -1,4 +1,7 @@
-"""A duty on a map of ``rbdyn map``: its points with speed and load, where they lie, and the life over the duty."""
+"""A duty on a map of ``rbdyn map``, and what ``rbdyn simulate --duty`` prints and writes of each point.
+
+Both show its points with speed and load, and the life there and over the duty.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,16 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Paragraph, Table, notes
 from rbdyn.base.faults import key_path
-from rbdyn.base.records import finite
-from rbdyn.base.words import shown
+from rbdyn.base.records import finite, save_table
+from rbdyn.base.words import quantity, shown, with_error
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rbdyn.dynamics.duty_simulation import DutySimulation, SimulatedPoint, Worst
     from rbdyn.life.duty import DutyLife
+    from rbdyn.result import Quantity
 
+# Figures of a point on the screen by the heading of their column, and their factor; all of them stand in duty.csv.
+SHOWN = {
+    "impact [N]": ("impact_force_N", 1.0),
+    "whirl": ("whirl_deviation_ratio", 1.0),
+    "loss [W]": ("power_loss_W", 1.0),
+    "slip [%]": ("cage_slip", 100.0),
+}
+CLEARANCES = {name: f"{name}_operating_clearance_um" for name in ("radial", "guide", "pocket")}
 # Keys of the axes of a map.
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 
@@ -64,24 +77,29 @@ class MapDuty:
 
     def blocks(self) -> list[Block]:
         """The points with their lives, the life over the duty, and notes."""
-        header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
-        rows = [
-            (
-                row["name"],
-                f"{100.0 * row['share']:.4g} %",
-                f"{row['inner_speed_rpm']:g}",
-                f"{row['radial_load_N']:g}",
-                shown(row["L10_h"], 3),
-                f"{100.0 * row['damage_share']:.3g} %",
-            )
-            for row in self.rows
-        ]
-        return [Table("Duty", header, rows), Paragraph(life_sentence(self.life.as_record())), *notes(self.notes)]
+        return [*duty_blocks(self.rows, self.life.as_record()), *notes(self.notes)]
+
+
+def duty_blocks(points: Sequence[Mapping[str, Any]], life: Mapping[str, float | None]) -> list[Block]:
+    """Table of points with name, share, speed, load, life and share of the damage, and the life over the duty."""
+    header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
+    rows = [
+        (
+            row["name"],
+            f"{100.0 * row['share']:.4g} %",
+            f"{row['inner_speed_rpm']:g}",
+            f"{row['radial_load_N']:g}",
+            shown(row["L10_h"], 3),
+            "" if row["damage_share"] is None else f"{100.0 * row['damage_share']:.3g} %",
+        )
+        for row in points
+    ]
+    return [Table("Duty", header, rows), Paragraph(life_sentence(life))]
 
 
 def life_sentence(life: Mapping[str, float | None]) -> str:
     """Life over a duty in words; empty where it has no end."""
-    if life["L10_h"] is None:
+    if life.get("L10_h") is None:
         return ""
     return (
         f"Life over the duty, L10r: {shown(life['L10_h'], 3)} h (ISO/TS 16281 static loads, Palmgren and Miner); equivalent load "
@@ -125,3 +143,59 @@ def _notes(
 
 def _place(scene: Scene) -> tuple[float, float]:
     return scene.operation.inner_speed_rpm, scene.operation.radial_load_N
+
+
+def simulated_blocks(found: "DutySimulation") -> list[Block]:
+    """Figures at each point, the worst points in words, clearances in operation, lives, notes."""
+    ran = [point for point in found.points if point.figures]
+    rows = [
+        (_marked(point), *(_with_error(point.figures.get(name), factor) for name, factor in SHOWN.values()))
+        for point in ran
+    ]
+    plays = [
+        (_marked(point), *(_with_error(point.figures.get(name), 1.0) for name in CLEARANCES.values())) for point in ran
+    ]
+    named = {name: name.replace("_operating", "") for name in CLEARANCES.values()}
+    worst = [
+        _worst(named.get(name, name), found.worst[name])
+        for name in (*(n for n, _ in SHOWN.values()), *named)
+        if name in found.worst
+    ]
+    return [
+        *(
+            Paragraph(f"{point.name} failed: {point.status.removeprefix('failed: ')}", "warning")
+            for point in found.failed
+        ),
+        Table("Figures", ("point", *SHOWN), rows),
+        Table("Clearances in operation [µm]", ("point", *CLEARANCES), plays).without_empty_columns(),
+        Paragraph(f"Worst: {', '.join(worst)}." if worst else ""),
+        *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
+        Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
+        *notes(found.notes),
+    ]
+
+
+def _marked(point: "SimulatedPoint") -> str:
+    return point.name if point.status == "ok" else f"{point.name} (failed)"
+
+
+def _with_error(figure: "Quantity | None", factor: float) -> str:
+    """A figure with the error to print next to it; a clearance, which is exact, to a tenth of a micrometre."""
+    if figure is None:
+        return ""
+    if figure.error == 0.0:
+        return f"{factor * figure.value:.1f}"
+    error = figure.stated_error
+    return with_error(factor * figure.value, None if error is None else factor * error)
+
+
+def _worst(name: str, worst: "Worst") -> str:
+    doubt = f" (not told apart from {', '.join(worst.not_told_apart)})" if worst.not_told_apart else ""
+    return f"{quantity(name)[0]} at {worst.point}{doubt}"
+
+
+def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
+    """Write duty.json and duty.csv; returns their names."""
+    found.save(folder / "duty.json")
+    save_table(found.table(), folder / "duty.csv", "%.8g")
+    return ["duty.json", "duty.csv"]
