@@ -17,7 +17,7 @@ from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, merged
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import Brief, Figure, counted, quantity
-from rbdyn.result import Quantity, SavedRecord, SimulationResult
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, full_status
 from rbdyn.scene import BallScene, Scene, scene_of
 from rbdyn.scene.key_columns import default_of
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 SOLVER, ROUNDING = 1e-6, 1e-9
 # Forces on a pocket, of contact and film together and of the contact alone.
 WHOLE, CONTACT = "impact_force_N", "impact_contact_force_N"
+# Replicates from which Student's quantile for six figures together is small: 3.1 where both have eight, 4.9 where both have three.
+ENOUGH = 8
 SIGNIFICANT, WITHIN, EQUAL, UNKNOWN = "significant", "within error", "equal", "error unknown"
 
 
@@ -166,14 +168,21 @@ def compare(
 def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparison:
     """Compare two results of one kind that are already there."""
     sides = [
-        Side(name, one.status, one.scene, one.versions, getattr(one, "seed", None), getattr(one, "replicates", None))
+        Side(
+            name,
+            full_status(one),
+            one.scene,
+            one.versions,
+            getattr(one, "seed", None),
+            getattr(one, "replicates", None),
+        )
         for name, one in ((name_a, a), (name_b, b))
     ]
     figures = [_figures(a), _figures(b)]
     if all(one.get(CONTACT) == one.get(WHOLE) for one in figures):
         # Without films in the pockets the force of the contact is the whole force.
         figures = [{name: figure for name, figure in one.items() if name != CONTACT} for one in figures]
-    failed = [f"{place}: {one.status}" for place, one in (("A", a), ("B", b)) if one.status != "ok"]
+    failed = [f"{place}: {full_status(one)}" for place, one in (("A", a), ("B", b)) if one.status != "ok"]
     return Comparison(
         status="; ".join(failed) or "ok",
         kind=_kind(a),
@@ -308,6 +317,15 @@ def _notes(a: Any, b: Any) -> list[str]:
                 "other_windows",
                 f"the impact force is the largest in {windows[0]:g} shaft turns of A and in {windows[1]:g} of B, so that it differs "
                 "for that alone; make numerics.impact_window_turns and the turns alike",
+            )
+        )
+    replicates = [getattr(result, "replicates", ENOUGH) for result in (a, b)]
+    if min(replicates) < ENOUGH:
+        found.append(
+            Note(
+                "few_replicates",
+                f"intervals rest on {replicates[0]} and {replicates[1]} replicates; with {ENOUGH} of each (--replicates) they are far "
+                "narrower",
             )
         )
     return found

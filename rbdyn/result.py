@@ -64,6 +64,12 @@ class Quantity(Record):
         return value_alone(self.value, self.stated_error)
 
 
+def full_status(result: Any) -> str:
+    """Status of a result with the reason of its heat balance, where that has no steady state."""
+    reason = (result.thermal or {}).get("reason")
+    return f"{result.status}: {reason}" if reason and result.status != "ok" else str(result.status)
+
+
 def figure_columns(figures: Mapping[str, Quantity]) -> dict[str, float | None]:
     """Cells of a row of a table: each figure with its two errors."""
     columns: dict[str, float | None] = {}

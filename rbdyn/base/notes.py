@@ -21,7 +21,8 @@ CODES: dict[str, Level] = {
     "seizure": Level.DANGER,
     "other_versions": Level.NOTE,
     "other_windows": Level.WARNING,
-    "point_failed": Level.WARNING,
+    "point_failed": Level.DANGER,
+    "few_replicates": Level.NOTE,
     "remark": Level.NOTE,
 }
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
 SIMULATION_FILES = ("result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png")
-DUTY_FILES = ("duty.json", "duty.csv")
+DUTY_FILES = ("duty.json", "points.csv")
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"

@@ -19,7 +19,7 @@ from rbdyn.base.words import counted, improvement, label, quantity, shown, signe
 if TYPE_CHECKING:
     from rbdyn.comparison import Comparison, Difference, Input
 
-FILES = ("comparison.json", "inputs.csv", "figures.csv")
+FILES = ("comparison.json", "inputs.csv", "differences.csv")
 # Units in which a change is stated in place of a percentage: their zero is no size.
 ABSOLUTE = ("°C", "µm", "mrad", "deg")
 
@@ -37,7 +37,7 @@ def compare(
     seed: command.Seed = None,
     workers: command.Workers = None,
     out: Annotated[
-        Path | None, command.folder_option("Write comparison.json, inputs.csv and figures.csv here.")
+        Path | None, command.folder_option("Write comparison.json, inputs.csv and differences.csv here.")
     ] = None,
     force: command.Force = False,
     as_json: command.Json = False,
@@ -174,7 +174,7 @@ def _part_sentence(parts: Mapping[str, "Difference"]) -> str:
 
 
 def _write(found: "Comparison", folder: Path) -> list[str]:
-    """Write comparison.json, inputs.csv and figures.csv; returns the names of the files."""
+    """Write comparison.json, inputs.csv and differences.csv; returns the names of the files."""
     found.save(folder / FILES[0])
     import pandas as pd
 

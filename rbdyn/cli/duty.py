@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rbdyn.life.duty import DutyLife
     from rbdyn.result import Quantity
 
-# Figures of a point on the screen by the heading of their column, and their factor; all of them stand in duty.csv.
+# Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
 SHOWN = {
     "impact [N]": ("impact_force_N", 1.0),
     "whirl": ("whirl_deviation_ratio", 1.0),
@@ -195,7 +195,7 @@ def _worst(name: str, worst: "Worst") -> str:
 
 
 def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
-    """Write duty.json and duty.csv; returns their names."""
+    """Write duty.json and points.csv; returns their names."""
     found.save(folder / "duty.json")
-    save_table(found.table(), folder / "duty.csv", "%.8g")
-    return ["duty.json", "duty.csv"]
+    save_table(found.table(), folder / "points.csv", "%.8g")
+    return ["duty.json", "points.csv"]

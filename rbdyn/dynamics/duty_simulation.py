@@ -18,7 +18,7 @@ from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life
-from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, versions
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 from rbdyn.scene.thermal import simulated_scene
@@ -122,7 +122,7 @@ def simulate_duty(
             share,
             at_point.operation.inner_speed_rpm,
             at_point.operation.radial_load_N,
-            result if isinstance(result, str) else result.status,
+            result if isinstance(result, str) else full_status(result),
             {} if isinstance(result, str) else result.responses,
             None if case is None else finite(case.hours),
             None if life is None else life.damage[place],
@@ -189,7 +189,7 @@ def _notes(results: Mapping[str, SimulationResult | str]) -> list[str]:
     """Points that failed, with the reason; then the notes of the others, those of all points once."""
     ran = {name: result for name, result in results.items() if isinstance(result, SimulationResult)}
     reasons = {name: result for name, result in results.items() if isinstance(result, str)}
-    reasons |= {name: result.status for name, result in ran.items() if result.status != "ok"}
+    reasons |= {name: full_status(result) for name, result in ran.items() if result.status != "ok"}
     return [
         *(Note("point_failed", f"{name}: {reason}") for name, reason in reasons.items()),
         *merged({name: result.notes for name, result in ran.items()}),

@@ -368,7 +368,8 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         if isinstance(report, DoubleDeckerReport):
             figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
         figures |= {f"fit_{race}_pressure_MPa": (self.fits or {}).get(f"{race}_pressure_MPa") for race in RACES}
-        figures |= {f"{node}_temperature_C": value for node, value in (self.temperatures_C or {}).items()}
+        nodes = {("ball" if node == "rollers" else node): value for node, value in (self.temperatures_C or {}).items()}
+        figures |= {f"{node}_temperature_C": value for node, value in nodes.items()}
         if "clearance_um" in heat:
             figures["operating_clearance_um"] = heat["clearance_um"]["operating"]
             figures["friction_W"] = math.fsum(heat["friction_W"].values())

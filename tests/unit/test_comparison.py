@@ -181,7 +181,7 @@ def test_command_line_compare(command, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
         "comparison.json",
         "inputs.csv",
-        "figures.csv",
+        "differences.csv",
         "report.html",
         "tables.xlsx",
     }
