@@ -1,7 +1,8 @@
 """Comparison of two bearings, simulated or saved: the inputs that differ, and each figure with the error of its difference.
 
-The runs are independent, so errors add as squares, statistical ones by Welch. The intervals of all figures of the bearing hold together with 95 % (Bonferroni), and so do those of its parts. A ball
-bearing in equilibrium has no scatter, so each difference beyond the accuracy of the solver counts.
+The runs are independent, so errors add as squares, statistical ones by Welch. The intervals of all figures of the bearing hold
+together with 95 % (Bonferroni), and so do those of its parts. A ball bearing in equilibrium has no scatter, so each difference
+beyond the accuracy of the solver counts.
 """
 
 import json
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
+from rbdyn.base.forecast import Notice, named, part_of
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, merged
 from rbdyn.base.records import Record, finite
@@ -24,7 +26,6 @@ from rbdyn.scene.key_columns import default_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rbdyn.base.forecast import Notice
     from rbdyn.dynamics.ensemble import Reporter
     from rbdyn.quasistatic.result import BallResult
 
@@ -128,7 +129,7 @@ def compare(
     both: Iterable[str] = (),
     workers: int | None = None,
     progress: "Reporter" = None,
-    notice: "Notice" = None,
+    notice: Notice = None,
 ) -> Comparison:
     """Compare two bearings of one kind, rollers or balls.
 
@@ -154,12 +155,13 @@ def compare(
                 f"A is a bearing with {kinds[0]} and B one with {kinds[1]}: they have no figures in common; compare two of one kind"
             ]
         )
-    same = all(isinstance(one, Scene | BallScene) for one in sources) and sources[0] == sources[1]
+    if isinstance(sources[0], Scene | BallScene) and sources[0] == sources[1]:
+        sources = sources[:1]
     results: list[Any] = []
-    for place, source in enumerate(sources[:1] if same else sources):
-        steps = None if progress is None else _half(progress, place)
+    for place, source in enumerate(sources):
+        steps, words = part_of(progress, place, len(sources)), named(notice, "AB"[place])
         try:
-            results.append(_result(source, workers, steps, notice))
+            results.append(_result(source, workers, steps, words))
         except RunError as error:
             raise RunError(f"{'AB'[place]}, {names[place]}: {error}") from None
     return comparison(results[0], results[-1], *names)
@@ -223,11 +225,6 @@ def _difference(a: float, b: float, error: float, together: float) -> Difference
     return Difference(a, b, b - a, finite(error), finite(together), verdict)
 
 
-def _half(progress: Any, place: int) -> "Reporter":
-    """Progress of one of two runs as that of both."""
-    return lambda count, total: progress(place * total + count, 2 * total)
-
-
 def _name(source: Any, otherwise: str) -> str:
     return str(source) if isinstance(source, str | PathLike) else otherwise
 
@@ -279,7 +276,7 @@ def _kind(source: Any) -> str:
     return "rollers" if isinstance(source, Scene | SimulationResult) else "balls"
 
 
-def _result(source: Any, workers: int | None, progress: "Reporter", notice: "Notice") -> Any:
+def _result(source: Any, workers: int | None, progress: "Reporter", notice: Notice) -> Any:
     if isinstance(source, Scene):
         from rbdyn.dynamics.simulate import simulate
 

@@ -166,9 +166,9 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
             Paragraph(f"{point.name} failed: {point.status.removeprefix('failed: ')}", "warning")
             for point in found.failed
         ),
+        Paragraph(f"Worst: {', '.join(worst)}." if worst else ""),
         Table("Figures", ("point", *SHOWN), rows),
         Table("Clearances in operation [µm]", ("point", *CLEARANCES), plays).without_empty_columns(),
-        Paragraph(f"Worst: {', '.join(worst)}." if worst else ""),
         *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
         Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
         *notes(found.notes),

@@ -4,12 +4,12 @@ A point that cannot go on is a record with the reason, and the others go on.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.forecast import Notice
+from rbdyn.base.forecast import Notice, named, part_of
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Note, merged
 from rbdyn.base.records import Record, derived, finite, keyed
@@ -105,8 +105,7 @@ def simulate_duty(
     scenes, started = duty_scenes(scene, duty, source), time.perf_counter()
     results: dict[str, SimulationResult | str] = {}
     for place, (point, at_point) in enumerate(zip(duty, scenes, strict=True)):
-        steps = None if progress is None else _part(progress, place, len(duty))
-        words = None if notice is None else _named(notice, point.name)
+        steps, words = part_of(progress, place, len(duty)), named(notice, point.name)
         try:
             results[point.name] = simulate(at_point, workers, steps, target=target, notice=words)
         except (InputError, RunError) as error:
@@ -167,15 +166,6 @@ def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
 def _size(name: str, value: float) -> float:
     """What a larger one is worse of: a slip is as bad in either direction."""
     return abs(value) if name == "cage_slip" else value
-
-
-def _part(progress: Callable[[int, int], None], place: int, count: int) -> Reporter:
-    """Progress of one of ``count`` simulations as that of all."""
-    return lambda done, total: progress(place * total + done, count * total)
-
-
-def _named(notice: Callable[[str], object], name: str) -> Notice:
-    return lambda sentence: notice(f"{name}: {sentence}")
 
 
 def _hot(scene: Scene, result: SimulationResult | str) -> Scene | None:
