@@ -144,9 +144,7 @@ def compare(
     overrides, both = list(overrides), list(both)
     if b is None and not overrides:
         raise InputError(["B: missing; name a second scene or result, or say by --set what differs from A"])
-    names = [_name(a, "A"), _name(a if b is None else b, "B")]
-    if names[0] == names[1]:
-        names = [names[0], ", ".join([names[1], *overrides])]
+    names = [_name(a, "A"), ", ".join([_name(a if b is None else b, "B"), *overrides])]
     sources = [_resolved(a, both), _resolved(a if b is None else b, [*overrides, *both])]
     kinds = [_kind(source) for source in sources]
     if kinds[0] != kinds[1]:

@@ -27,10 +27,16 @@ ABSOLUTE = ("°C", "µm", "mrad", "deg")
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A", help="A scene, a saved result, or a folder that holds one.")],
     b: Annotated[
-        Path | None, typer.Argument(metavar="[B]", help="Another of the same kind.", show_default="A with --set")
+        Path | None, typer.Argument(metavar="B", help="Another of the same kind.", show_default="A with --set")
     ] = None,
     assignments: Annotated[
-        list[str] | None, command.valued("KEY.PATH=VALUE", "Replace a key of B; repeatable.", "B as written", "--set")
+        list[str] | None,
+        command.valued(
+            "KEY.PATH=VALUE",
+            "Replace a key of B; without B it is A with these keys; repeatable.",
+            "B as written",
+            "--set",
+        ),
     ] = None,
     turns: command.Turns = None,
     replicates: command.Replicates = None,

@@ -29,7 +29,7 @@ SHOWN = {
     "loss [W]": ("power_loss_W", 1.0),
     "slip [%]": ("cage_slip", 100.0),
 }
-CLEARANCES = {name: f"{name}_operating_clearance_um" for name in ("radial", "guide", "pocket")}
+CLEARANCES = {name: (f"{name}_operating_clearance_um", 1.0) for name in ("radial", "guide", "pocket")}
 # Keys of the axes of a map.
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 
@@ -146,33 +146,28 @@ def _place(scene: Scene) -> tuple[float, float]:
 
 
 def simulated_blocks(found: "DutySimulation") -> list[Block]:
-    """Figures at each point, the worst points in words, clearances in operation, lives, notes."""
-    ran = [point for point in found.points if point.figures]
-    rows = [
-        (_marked(point), *(_with_error(point.figures.get(name), factor) for name, factor in SHOWN.values()))
-        for point in ran
-    ]
-    plays = [
-        (_marked(point), *(_with_error(point.figures.get(name), 1.0) for name in CLEARANCES.values())) for point in ran
-    ]
-    named = {name: name.replace("_operating", "") for name in CLEARANCES.values()}
-    worst = [
-        _worst(named.get(name, name), found.worst[name])
-        for name in (*(n for n, _ in SHOWN.values()), *named)
-        if name in found.worst
-    ]
+    """Points that failed, the worst points in words, figures and clearances in operation at each point, lives, notes."""
+    failures = {point.name: point.status.removeprefix("failed: ") for point in found.failed}
+    names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
     return [
-        *(
-            Paragraph(f"{point.name} failed: {point.status.removeprefix('failed: ')}", "warning")
-            for point in found.failed
-        ),
-        Paragraph(f"Worst: {', '.join(worst)}." if worst else ""),
-        Table("Figures", ("point", *SHOWN), rows),
-        Table("Clearances in operation [µm]", ("point", *CLEARANCES), plays).without_empty_columns(),
+        *(Paragraph(f"{name} failed: {reason}", "warning") for name, reason in failures.items()),
+        Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
+        _point_table("Figures", found, SHOWN),
+        _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
         Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
         *notes(found.notes),
     ]
+
+
+def _point_table(caption: str, found: "DutySimulation", columns: Mapping[str, tuple[str, float]]) -> Table:
+    """A row a point that has figures; ``columns``: figure and factor by heading."""
+    rows = [
+        (_marked(point), *(_with_error(point.figures.get(name), factor) for name, factor in columns.values()))
+        for point in found.points
+        if point.figures
+    ]
+    return Table(caption, ("point", *columns), rows).without_empty_columns()
 
 
 def _marked(point: "SimulatedPoint") -> str:
@@ -191,7 +186,7 @@ def _with_error(figure: "Quantity | None", factor: float) -> str:
 
 def _worst(name: str, worst: "Worst") -> str:
     doubt = f" (not told apart from {', '.join(worst.not_told_apart)})" if worst.not_told_apart else ""
-    return f"{quantity(name)[0]} at {worst.point}{doubt}"
+    return f"{quantity(name)[0].replace(' operating', '')} at {worst.point}{doubt}"
 
 
 def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
