@@ -12,9 +12,8 @@ import numpy as np
 from scipy import special
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.intervals import LEVEL, joint_freedom
 
-# Probability that an interval holds the truth.
-LEVEL = 0.95
 # Draws of the errors, each with its mirror image, and their seed.
 DRAWS, SEED = 2048, 1
 
@@ -52,19 +51,15 @@ def quantile(freedom: Array) -> Array:
 
 
 def weighted_mean(estimates: Estimates, weights: Array) -> Aggregated:
-    """Mean with ``weights`` (p,) that sum to 1; its error has the freedom of Welch and Satterthwaite.
-
-    Source: B. L. Welch, Biometrika 34 (1947) 28, eq. 28.
-    """
+    """Mean with ``weights`` (p,) that sum to 1; its error has the freedom of Welch and Satterthwaite."""
     odds = np.broadcast_to(weights, estimates.values.shape)
     counted = np.flatnonzero(weights > 0.0).tolist()
     values, errors, freedom = estimates.columns(counted)
     if len(counted) == 1:
         return Aggregated(values[:, 0], errors[:, 0], freedom[:, 0], odds)
-    variances = (weights[counted] * errors) ** 2
-    total, spread = variances.sum(axis=1), (variances**2 / freedom).sum(axis=1)
-    joint = np.divide(total**2, spread, out=np.full_like(total, np.inf), where=spread > 0.0)
-    return Aggregated((weights[counted] * values).sum(axis=1), np.sqrt(total), joint, odds)
+    parts = weights[counted] * errors
+    joint = joint_freedom([*parts.T], [*freedom.T])
+    return Aggregated((weights[counted] * values).sum(axis=1), np.sqrt((parts**2).sum(axis=1)), joint, odds)
 
 
 def largest(estimates: Estimates) -> Aggregated:

@@ -1,7 +1,7 @@
 """Dynamics of rolling bearings: from a drawing and an operating point to forces, whirl and power loss, with errors.
 
 ``Scene`` reads and checks the input. ``simulate`` runs a roller bearing, ``history`` returns its motion, ``equilibrium`` solves
-a ball bearing. Each takes a scene or the path of its file. Results save themselves, and ``load`` reads them back.
+a ball bearing, ``simulate_duty`` runs a roller bearing at the points of a duty, ``compare`` sets two bearings side by side. Each takes a scene or the path of its file. Results save themselves, and ``load`` reads them back.
 Names are fetched when first used: importing the package loads neither numba nor scipy, nor anything else but itself.
 """
 
@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rbdyn.base.faults import InputError, RunError
+    from rbdyn.comparison import Comparison, compare
+    from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty
     from rbdyn.dynamics.motion import History, history
     from rbdyn.dynamics.simulate import simulate
     from rbdyn.quasistatic.bearing import equilibrium
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
     from rbdyn.scene import BallScene, Scene
 
 __all__ = [
-    "BallResult", "BallScene", "History", "InputError", "RunError", "Scene", "SimulationResult", "equilibrium", "history", "load",
-    "simulate",
+    "BallResult", "BallScene", "Comparison", "DutySimulation", "History", "InputError", "RunError", "Scene", "SimulationResult", "compare", "equilibrium", "history",
+    "load", "simulate", "simulate_duty",
 ]  # fmt: skip
 
 _HOMES = {
@@ -28,6 +30,10 @@ _HOMES = {
     "equilibrium": "rbdyn.quasistatic.bearing",
     "BallResult": "rbdyn.quasistatic.result",
     "simulate": "rbdyn.dynamics.simulate",
+    "simulate_duty": "rbdyn.dynamics.duty_simulation",
+    "DutySimulation": "rbdyn.dynamics.duty_simulation",
+    "compare": "rbdyn.comparison",
+    "Comparison": "rbdyn.comparison",
     "history": "rbdyn.dynamics.motion",
     "History": "rbdyn.dynamics.motion",
     "SimulationResult": "rbdyn.result",

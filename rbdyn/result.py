@@ -5,7 +5,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -62,6 +62,21 @@ class Quantity(Record):
     def value_text(self) -> str:
         """The value to the digits that its stated error bears; to five without one."""
         return value_alone(self.value, self.stated_error)
+
+
+def full_status(result: Any) -> str:
+    """Status of a result with the reason of its heat balance, where that has no steady state."""
+    reason = (result.thermal or {}).get("reason")
+    return f"{result.status}: {reason}" if reason and result.status != "ok" else str(result.status)
+
+
+def figure_columns(figures: Mapping[str, Quantity]) -> dict[str, float | None]:
+    """Cells of a row of a table: each figure with its two errors."""
+    columns: dict[str, float | None] = {}
+    for name, figure in figures.items():
+        columns[name] = figure.value
+        columns |= {f"{name}_{kind}": getattr(figure, kind) for kind in ("statistical_error", "numerical_error")}
+    return columns
 
 
 class SavedRecord(Record):

@@ -72,7 +72,10 @@ def new(
     duty: Annotated[
         Path | None,
         valued(
-            "FILE.csv", "Points of operation: columns name, share, and keys of the scene.", "the scene's own", "--duty"
+            "FILE",
+            "Points of operation: CSV with name, share or hours, and keys; or TOML.",
+            "the scene's own",
+            "--duty",
         ),
     ] = None,
     as_json: Json = False,
@@ -175,12 +178,15 @@ def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bo
 
 
 def _duty(path: Path | None, scene: "Scene") -> str:
-    """The duty of the study; empty without a table of its points. Raises InputError."""
+    """The duty of the study; empty without a file of its points. Raises InputError."""
     if path is None:
         return ""
-    from doe.commands.new_duty import duty_text, read_points
+    from doe.commands.new_duty import duty_text
+    from rbdyn.scene.duty import duty_scenes, read_duty
 
-    return duty_text(read_points(path, scene))
+    points = read_duty(path)
+    duty_scenes(scene, points, str(path))
+    return duty_text(points)
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:

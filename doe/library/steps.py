@@ -215,8 +215,8 @@ def _study_or_table(
 
 def _read_later(study: "Study", data: Path | None) -> list[Path]:
     """Files that a step reads only as it runs: those that its study names, and the table of runs."""
-    from doe.study_file.workbook import split_path
     from doe.workflow.status import named_files
+    from rbdyn.base.tables.workbook import split_path
 
     named = [] if study.file.scene is None else named_files(study)
     return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]
@@ -345,7 +345,8 @@ def _point(study: "Study", text: str) -> list[float]:
     from collections import Counter
     from math import nan
 
-    from doe.study_file.table import RUN, is_number
+    from doe.study_file.table import RUN
+    from rbdyn.base.tables.sheet import is_number
 
     values = study.by_factor(study.baseline)
     parts = [part.strip() for part in text.split(",")]

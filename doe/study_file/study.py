@@ -16,11 +16,9 @@ from pydantic import Field, model_validator
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
-from doe.study_file.decimal_marks import is_like_number
 from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
 from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Robust, StudyChain, Tolerances
-from doe.study_file.table import COUNT, DATE, LABELS, Column, Sheet, listed, quoted, read_sheet, table_of
-from doe.study_file.workbook import split_path
+from doe.study_file.table import COUNT, LABELS, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
@@ -34,6 +32,9 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
+from rbdyn.base.tables.decimal_marks import is_like_number
+from rbdyn.base.tables.sheet import DATE, Column, Sheet, listed, quoted, read_sheet
+from rbdyn.base.tables.workbook import split_path
 from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 

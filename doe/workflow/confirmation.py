@@ -9,8 +9,6 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
@@ -22,6 +20,7 @@ from doe.unknown.propagation import Share
 from doe.workflow.surfaces import gain_verdict, goals_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
+from rbdyn.base.intervals import chance_above, joint_freedom, joint_half_width, one_sided, standard_errors, times_wider
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, improvement, with_error
 from rbdyn.result import Quantity, SimulationResult
@@ -30,39 +29,6 @@ from rbdyn.scene.thermal import simulated_scene
 
 # Key of the only scene of a study without a duty.
 EVERYWHERE = ""
-LEVEL = 0.95  # probability that a stated interval holds the truth
-
-
-def standard_errors(half_widths: ArrayLike, freedom: ArrayLike) -> Array:
-    """Standard errors from half-widths of 95 %, any shape; 0 for an unknown half-width (NaN)."""
-    return np.nan_to_num(np.asarray(half_widths, float)) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
-
-
-def joint_freedom(errors: Sequence[Array], freedom: Sequence[Array]) -> Array:
-    """Degrees of freedom of the root sum square of independent standard ``errors``; infinite where all errors are 0."""
-    variances = [error**2 for error in errors]
-    spread = np.sum([variance**2 / dof for variance, dof in zip(variances, freedom, strict=True)], axis=0)
-    total = np.sum(variances, axis=0)
-    return np.divide(total**2, spread, out=np.full_like(total, np.inf), where=spread > 0.0)
-
-
-def times_wider(freedom: ArrayLike, count: int) -> Array:
-    """Factor by which half-widths of 95 % grow so that ``count`` of them hold together (Bonferroni)."""
-    level = 1.0 - 0.5 * (1.0 - LEVEL) / count
-    return np.asarray(special.stdtrit(freedom, level) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
-
-
-def one_sided(freedom: ArrayLike, probability: float) -> Array:
-    """Share of a half-width of 95 % that holds on one side with a ``probability``."""
-    return np.asarray(special.stdtrit(freedom, probability) / special.stdtrit(freedom, 0.5 + 0.5 * LEVEL))
-
-
-def chance_above(room: ArrayLike, half_width: ArrayLike, freedom: ArrayLike) -> Array:
-    """Probability that a value, estimated ``room`` above a bound with a ``half_width`` of 95 %, lies above it."""
-    scaled = np.asarray(room) / np.asarray(half_width) * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL)
-    return np.asarray(special.stdtr(freedom, scaled))
-
-
 WHIRL = "whirl_deviation_ratio"
 # Verdicts on gains: the first is good news, the others are not.
 REAL, LOSS, NOISE = (
@@ -233,10 +199,8 @@ def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
 
 def error_of_difference(first: Confirmed, second: Confirmed) -> tuple[Array, Array]:
     """95 % half-widths (m,) of the differences of two simulated points, and the degrees of freedom behind them (Welch)."""
-    errors, dofs = zip(first.parts, second.parts, strict=True)
-    all_errors, freedom = [*errors[0], *errors[1]], joint_freedom([*errors[0], *errors[1]], [*dofs[0], *dofs[1]])
-    total = np.sqrt(np.sum([error**2 for error in all_errors], axis=0))
-    return total * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL), freedom
+    errors, freedom = zip(first.parts, second.parts, strict=True)
+    return joint_half_width([*errors[0], *errors[1]], [*freedom[0], *freedom[1]])
 
 
 def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:

@@ -15,10 +15,8 @@ from doe import clearance
 from doe.clearance import Simulations, work_of
 from doe.duty import Duty, Run, Simulated, over_points
 from doe.running.store import Failure, sentence
-from doe.study_file.table import read_sheet
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
-from doe.workflow.key_columns import key_values, unknown_keys
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import (
     Claims,
@@ -33,9 +31,11 @@ from rbdyn.base.faults import (
     validated,
 )
 from rbdyn.base.storage import digest_of
+from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import shown
 from rbdyn.result import read_json
 from rbdyn.scene import Scene, rollers_only
+from rbdyn.scene.key_columns import key_values, unknown_keys
 from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put, value_of, with_values
 

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from doe.clearance import TEMPERATURES
-from doe.study_file.table import UNKNOWN, Column, Limits, Sheet, gap_notes, listed, read_sheet
-from doe.workflow.key_columns import key_values, unknown_keys
+from doe.study_file.table import gap_notes
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
+from rbdyn.scene.key_columns import key_values, unknown_keys
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
 PULSE_OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")

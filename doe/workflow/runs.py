@@ -21,9 +21,10 @@ from doe.study_file import Study
 from doe.study_file.duty import at_point
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
-from doe.study_file.table import Table, read_sheet, read_table
+from doe.study_file.table import Table, read_table
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
+from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from doe.study_file.table import Limits, read_sheet
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.tables.sheet import Limits, read_sheet
 from rbdyn.base.words import counted
 
 if TYPE_CHECKING:

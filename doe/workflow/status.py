@@ -20,11 +20,11 @@ from doe.running.runner import ANSWER, ANSWER_S, Agenda, Stage, agendas_of, fore
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file import Study
 from doe.study_file.sections import Front
-from doe.study_file.workbook import split_path
 from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.storage import code_version, digest_of, intact
+from rbdyn.base.tables.workbook import split_path
 from rbdyn.result import read_json, versions
 
 # Typical wall times [s] of the surfaces with their front, and of the pick's tolerances with the chains.

@@ -25,6 +25,16 @@ LOOK_BACK = 256
 AT_ONCE_S = 0.2
 
 
+def named(notice: Notice, name: str) -> Notice:
+    """A notice whose sentences begin with the name of one of several simulations."""
+    return None if notice is None else lambda sentence: notice(f"{name}: {sentence}")
+
+
+def part_of(progress: Callable[[int, int], None] | None, place: int, count: int) -> Callable[[int, int], None] | None:
+    """Progress of one of ``count`` simulations as that of all, where each has as many runs."""
+    return None if progress is None else lambda done, total: progress(place * total + done, count * total)
+
+
 class Measured(NamedTuple):
     """Measured runs: their number, work and time [s], the mean logarithm of their pace and the sum of its squared deviations."""
 

@@ -10,13 +10,14 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
-from rbdyn.base.folder import output_folder
+from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
 from rbdyn.cli.ball import ball
+from rbdyn.cli.compare import compare
 from rbdyn.cli.manual import describe_keys, manual
 from rbdyn.cli.new import new
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
 SIMULATION_FILES = ("result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png")
+DUTY_FILES = ("duty.json", "points.csv")
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"
@@ -60,6 +62,7 @@ FORMER = {
 }
 
 app.command()(ball)
+app.command()(compare)
 app.command("keys")(describe_keys)
 app.command()(new)
 app.command()(manual)
@@ -86,17 +89,27 @@ def simulate(
             "those given",
         ),
     ] = None,
+    duty: Annotated[
+        Path | None,
+        command.valued(
+            "FILE", "Each point of a duty: CSV with name, share or hours, and keys; or TOML.", "one point", "--duty"
+        ),
+    ] = None,
     out: command.Out = None,
     force: command.Force = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: command.Verbose = False,
 ) -> None:
-    """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
-    files = (*SIMULATION_FILES, *REPORT_FILES)
+    """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss; at one point or over a duty."""
+    files = (*SIMULATION_FILES, *DUTY_FILES, *REPORT_FILES)
     with command.guarded(as_json), output_folder(out, "rbdyn simulate", files, force=force) as folder:
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
+        if duty is not None:
+            raise typer.Exit(
+                _over_duty(loaded, (scene, duty), aim, workers, folder, as_json, Detail.of(quiet, verbose))
+            )
         folder.claim(scene)
         from rbdyn.dynamics.simulate import simulate as run_scene
 
@@ -116,6 +129,37 @@ def simulate(
         )
     if result.status != "ok":
         raise typer.Exit(command.FAILED)
+
+
+def _over_duty(
+    scene: "Scene",
+    files: tuple[Path, Path],
+    aim: float | None,
+    workers: int | None,
+    folder: OutputFolder,
+    as_json: bool,
+    detail: Detail,
+) -> int:
+    """Simulate every point of a duty, of the ``files`` of scene and duty; returns the exit code. Raises InputError before anything runs."""
+    from rbdyn.scene.duty import duty_scenes, read_duty
+
+    points, quiet = read_duty(files[1]), detail == Detail.LEAST
+    duty_scenes(scene, points, str(files[1]))
+    folder.claim(*files)
+    from rbdyn.cli.duty import simulated_blocks, write_simulated
+    from rbdyn.dynamics.duty_simulation import simulate_duty
+
+    with command.progress_bar("simulating", quiet or as_json, workers) as progress:
+        found = simulate_duty(scene, points, workers, progress, aim, command.notice(quiet))
+    places = zip(*((point.inner_speed_rpm, point.radial_load_N) for point in found.points), strict=True)
+    swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), places, strict=True))
+    identity = identity_of("rbdyn simulate --duty", found.scene, files, swept=swept)
+    answer = partial(simulated_blocks, found)
+    written = write_with_report(folder, identity, answer, partial(write_simulated, found))
+    command.hand_over(
+        found.as_dict, as_json, lambda: show_blocks([identity_line(identity), *answer()], detail), folder.path, written
+    )
+    return command.FAILED if found.failed else 0
 
 
 @app.command(cls=command.refusing(FORMER))
@@ -189,7 +233,7 @@ def slip_map(
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
     duty: Annotated[
         Path | None,
-        command.valued("FILE.toml", "Mark its points of operation, such as the duty of a study.", "no marks", "--duty"),
+        command.valued("FILE", "Mark its points of operation: TOML such as a study, or CSV.", "no marks", "--duty"),
     ] = None,
     assignments: command.Set = None,
     turns: command.Turns = None,

@@ -1,4 +1,7 @@
-"""A duty on a map of ``rbdyn map``: its points with speed and load, where they lie, and the life over the duty."""
+"""A duty on a map of ``rbdyn map``, and what ``rbdyn simulate --duty`` prints and writes of each point.
+
+Both show its points with speed and load, and the life there and over the duty.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,16 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Paragraph, Table, notes
 from rbdyn.base.faults import key_path
-from rbdyn.base.records import finite
-from rbdyn.base.words import shown
+from rbdyn.base.records import finite, save_table
+from rbdyn.base.words import quantity, shown, with_error
 from rbdyn.scene import Scene
-from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty
+from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rbdyn.dynamics.duty_simulation import DutySimulation, SimulatedPoint, Worst
     from rbdyn.life.duty import DutyLife
+    from rbdyn.result import Quantity
 
+# Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
+SHOWN = {
+    "impact [N]": ("impact_force_N", 1.0),
+    "whirl": ("whirl_deviation_ratio", 1.0),
+    "loss [W]": ("power_loss_W", 1.0),
+    "slip [%]": ("cage_slip", 100.0),
+}
+CLEARANCES = {name: (f"{name}_operating_clearance_um", 1.0) for name in ("radial", "guide", "pocket")}
 # Keys of the axes of a map.
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 
@@ -38,18 +51,18 @@ class MapDuty:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A row a point: share of the time, place on the map, life there, share of the damage."""
-        whole = sum(point.share for point in self.points)
+        times = zip(self.points, shares_of_time(self.points), strict=True)
         lives = zip(self.life.point_hours, self.life.damage, strict=True)
         return [
             {
                 "name": point.name,
-                "share": point.share / whole,
+                "share": share,
                 "inner_speed_rpm": speed,
                 "radial_load_N": load,
                 "L10_h": finite(hours),
                 "damage_share": damage,
             }
-            for point, (speed, load), (hours, damage) in zip(self.points, self.marks.values(), lives, strict=True)
+            for (point, share), (speed, load), (hours, damage) in zip(times, self.marks.values(), lives, strict=True)
         ]
 
     def as_record(self) -> dict[str, Any]:
@@ -64,24 +77,29 @@ class MapDuty:
 
     def blocks(self) -> list[Block]:
         """The points with their lives, the life over the duty, and notes."""
-        header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
-        rows = [
-            (
-                row["name"],
-                f"{100.0 * row['share']:.4g} %",
-                f"{row['inner_speed_rpm']:g}",
-                f"{row['radial_load_N']:g}",
-                shown(row["L10_h"], 3),
-                f"{100.0 * row['damage_share']:.3g} %",
-            )
-            for row in self.rows
-        ]
-        return [Table("Duty", header, rows), Paragraph(life_sentence(self.life.as_record())), *notes(self.notes)]
+        return [*duty_blocks(self.rows, self.life.as_record()), *notes(self.notes)]
+
+
+def duty_blocks(points: Sequence[Mapping[str, Any]], life: Mapping[str, float | None]) -> list[Block]:
+    """Table of points with name, share, speed, load, life and share of the damage, and the life over the duty."""
+    header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
+    rows = [
+        (
+            row["name"],
+            f"{100.0 * row['share']:.4g} %",
+            f"{row['inner_speed_rpm']:g}",
+            f"{row['radial_load_N']:g}",
+            shown(row["L10_h"], 3),
+            "" if row["damage_share"] is None else f"{100.0 * row['damage_share']:.3g} %",
+        )
+        for row in points
+    ]
+    return [Table("Duty", header, rows), Paragraph(life_sentence(life))]
 
 
 def life_sentence(life: Mapping[str, float | None]) -> str:
     """Life over a duty in words; empty where it has no end."""
-    if life["L10_h"] is None:
+    if life.get("L10_h") is None:
         return ""
     return (
         f"Life over the duty, L10r: {shown(life['L10_h'], 3)} h (ISO/TS 16281 static loads, Palmgren and Miner); equivalent load "
@@ -99,8 +117,7 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
 
     points = read_duty(path)
     scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
-    whole = sum(point.share for point in points)
-    life = roller_duty_life(scenes, [point.share / whole for point in points])
+    life = roller_duty_life(scenes, shares_of_time(points))
     return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))
 
 
@@ -126,3 +143,54 @@ def _notes(
 
 def _place(scene: Scene) -> tuple[float, float]:
     return scene.operation.inner_speed_rpm, scene.operation.radial_load_N
+
+
+def simulated_blocks(found: "DutySimulation") -> list[Block]:
+    """Points that failed, the worst points in words, figures and clearances in operation at each point, lives, notes."""
+    failures = {point.name: point.status.removeprefix("failed: ") for point in found.failed}
+    names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
+    return [
+        *(Paragraph(f"{name} failed: {reason}", "warning") for name, reason in failures.items()),
+        Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
+        _point_table("Figures", found, SHOWN),
+        _point_table("Clearances in operation [µm]", found, CLEARANCES),
+        *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
+        Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
+        *notes(found.notes),
+    ]
+
+
+def _point_table(caption: str, found: "DutySimulation", columns: Mapping[str, tuple[str, float]]) -> Table:
+    """A row a point that has figures; ``columns``: figure and factor by heading."""
+    rows = [
+        (_marked(point), *(_with_error(point.figures.get(name), factor) for name, factor in columns.values()))
+        for point in found.points
+        if point.figures
+    ]
+    return Table(caption, ("point", *columns), rows).without_empty_columns()
+
+
+def _marked(point: "SimulatedPoint") -> str:
+    return point.name if point.status == "ok" else f"{point.name} (failed)"
+
+
+def _with_error(figure: "Quantity | None", factor: float) -> str:
+    """A figure with the error to print next to it; a clearance, which is exact, to a tenth of a micrometre."""
+    if figure is None:
+        return ""
+    if figure.error == 0.0:
+        return f"{factor * figure.value:.1f}"
+    error = figure.stated_error
+    return with_error(factor * figure.value, None if error is None else factor * error)
+
+
+def _worst(name: str, worst: "Worst") -> str:
+    doubt = f" (not told apart from {', '.join(worst.not_told_apart)})" if worst.not_told_apart else ""
+    return f"{quantity(name)[0].replace(' operating', '')} at {worst.point}{doubt}"
+
+
+def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
+    """Write duty.json and points.csv; returns their names."""
+    found.save(folder / "duty.json")
+    save_table(found.table(), folder / "points.csv", "%.8g")
+    return ["duty.json", "points.csv"]

@@ -56,8 +56,11 @@ def roller_duty_life(scenes: Sequence[Scene], shares: Sequence[float]) -> DutyLi
 
     Raises MethodError for shares that do not sum to 1.
     """
-    cases = []
-    for scene, share in zip(scenes, shares, strict=True):
-        inner, outer = scene.operation.speeds
-        cases.append(LoadCase(share, inner - outer, scene.operation.largest_load_N, static_life(scene)))
+    cases = [load_case(scene, share) for scene, share in zip(scenes, shares, strict=True)]
     return duty_life(cases, ROLLER_EXPONENT)
+
+
+def load_case(scene: Scene, share: float) -> LoadCase:
+    """The scene as a point of a duty with this share of the time."""
+    inner, outer = scene.operation.speeds
+    return LoadCase(share, inner - outer, scene.operation.largest_load_N, static_life(scene))

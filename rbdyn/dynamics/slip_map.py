@@ -26,7 +26,7 @@ from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
-from rbdyn.result import Quantity, versions
+from rbdyn.result import Quantity, figure_columns, versions
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
@@ -71,14 +71,8 @@ class SlipMap(Record):
 
         rows = []
         for point in self.points:
-            row: dict[str, Any] = {"inner_speed_rpm": point.inner_speed_rpm, "radial_load_N": point.radial_load_N}
-            for name, figure in point.figures.items():
-                row |= {
-                    name: figure.value,
-                    f"{name}_statistical_error": figure.statistical_error,
-                    f"{name}_numerical_error": figure.numerical_error,
-                }
-            rows.append(row | {"power_gap": point.power_gap, "status": point.status})
+            place: dict[str, Any] = {"inner_speed_rpm": point.inner_speed_rpm, "radial_load_N": point.radial_load_N}
+            rows.append(place | figure_columns(point.figures) | {"power_gap": point.power_gap, "status": point.status})
         return pd.DataFrame(rows)
 
     def grid(self, figure: str) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -245,6 +245,22 @@ class RowReport(Record):
     searches: int | None = None
     reaction: dict[str, dict[str, float]] | None = None
 
+    @property
+    def figures(self) -> dict[str, float | None]:
+        """Pressures, life, films, and the extremes of the balls' loads and angles, units in the names."""
+        loaded = [ball for ball in self.balls if ball["inner_load_N"] > NO_LOAD]
+        angles = [ball["inner_angle_deg"] for ball in loaded]
+        figures: dict[str, float | None] = {f"{race}_pressure_MPa": p for race, p in self.max_stress_MPa.items()}
+        figures["life_Mrev" if self.life["L10_h"] is None else "life_h"] = self.life["L10_h"] or self.life["L10_Mrev"]
+        for race, contact in self.contacts.items():
+            figures |= {
+                f"{race}_{key}": contact.get(key)
+                for key in ("load_N", "central_film_um", "lambda_ratio", "edge_angle_deg")
+            }
+        if angles:
+            figures |= {"inner_angle_min_deg": min(angles), "inner_angle_max_deg": max(angles)}
+        return figures | {"loaded_balls": float(len(loaded)), "needed_friction": self.needed_friction}
+
 
 class DoubleDeckerReport(Record):
     """Equilibrium of a double-decker bearing: its inner ring, its middle ring and both rows."""
@@ -336,6 +352,28 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         """Report of each row by name: "inner" and "outer", or "" for a single row. Raises MethodError as ``reached``."""
         report = self.reached
         return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """All figures by name, units in the names; none without an equilibrium."""
+        if self.report is None:
+            return {}
+        report, heat = self.report, self.thermal or {}
+        figures: dict[str, float | None] = {}
+        for name, row in self.row_reports.items():
+            figures |= {f"{name}_row_{key}" if name else key: value for key, value in row.figures.items()}
+        figures |= {f"displacement_{axis}_um": 1e3 * report.displacement_mm[axis] for axis in "xyz"}
+        figures |= {f"tilt_{axis}_mrad": report.tilt_mrad[axis] for axis in "xy"}
+        figures |= {f"stiffness_{key}": value for key, value in report.stiffness.items() if key != "matrix_SI"}
+        if isinstance(report, DoubleDeckerReport):
+            figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+        figures |= {f"fit_{race}_pressure_MPa": (self.fits or {}).get(f"{race}_pressure_MPa") for race in RACES}
+        nodes = {("ball" if node == "rollers" else node): value for node, value in (self.temperatures_C or {}).items()}
+        figures |= {f"{node}_temperature_C": value for node, value in nodes.items()}
+        if "clearance_um" in heat:
+            figures["operating_clearance_um"] = heat["clearance_um"]["operating"]
+            figures["friction_W"] = math.fsum(heat["friction_W"].values())
+        return {name: float(value) for name, value in figures.items() if value is not None}
 
     def brief(self) -> tuple[str, list[Figure]]:
         """Status and number of notes; pressures and life of each row, displacement and stiffness, exact in the model."""

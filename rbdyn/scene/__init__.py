@@ -8,6 +8,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
 - ``thermal``: heat balance; ``geometry``: radii, masses and speeds; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys
+- ``key_columns``: columns of tables named by keys; ``duty``: points of operation
 """
 
 import math

@@ -1,12 +1,14 @@
 """Duty of a machine: points of operation, each with its share of the time and the keys of the scene that it changes.
 
-The ``[[duty]]`` tables of a study are also those of a file of their own, so that both can mark a map.
+A duty stands in the ``[[duty]]`` tables of a study or of a file of its own, or in a table of text or a workbook: a row a point,
+with its name, its share of the time or its hours, and values of scene keys. ``read_duty`` reads them all.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rbdyn.base.faults import (
     Consistent,
@@ -19,12 +21,16 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
+from rbdyn.base.tables.sheet import Limits, Sheet, listed, read_sheet
 from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
+from rbdyn.scene.key_columns import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 
 MOST_POINTS = 12
+# Columns of a table of points besides the keys of the scene: the name, and the share of the time, or hours in its place.
+NAME, TIMES = "name", {"share": Limits(1.0, sign="not negative"), "hours": Limits(1e9, sign="not negative")}
 # Keys that a point may not set, with the reasons.
 OF_EVERY_POINT = {
     ("numerics", "seed"): SEEDS,
@@ -73,17 +79,88 @@ def point_faults(
     if not total > 0.0:
         yield "duty.share: is 0 at every point; state the shares of the time"
     elif not normalise and abs(total - 1.0) > SHARE_ROUNDING:
-        yield f"duty.share: sums to {total:.6g} over all points, not to 1; change a share or write normalise_shares = true"
+        yield f"duty.share: sums to {total:.6g} over all points, not to 1; change a share or write normalise_shares = true (in a table: name the column hours)"
     for point in points:
         yield from assignment_faults(f"duty.set of {point.name}", point.set, {**(claims or {}), **OF_EVERY_POINT})
 
 
 def read_duty(path: Path) -> list[DutyPoint]:
-    """Points of the ``[[duty]]`` tables of a file; its other tables are not read. Raises InputError with all faults."""
+    """Points of a duty: ``[[duty]]`` of a TOML file, whose other tables are not read, or the rows of any other table.
+
+    The shares of a duty in hours have any sum. Raises InputError with all faults.
+    """
+    if path.suffix.lower() != ".toml":
+        return _points_of_table(read_sheet(path))
     tables = read_toml(path)
     if not tables.get("duty"):
         raise InputError([f"{path}: duty: missing; add a [[duty]] table for each point of operation"])
     return validated(DutyTables, {key: tables[key] for key in DutyTables.model_fields if key in tables}, str(path)).duty
+
+
+def shares_of_time(points: Sequence[DutyPoint]) -> list[float]:
+    """Shares of the time, which sum to 1 where those of the points are hours."""
+    total = math.fsum(point.share for point in points)
+    rounding = abs(total - 1.0) <= SHARE_ROUNDING
+    return [point.share if rounding else point.share / total for point in points]
+
+
+def _points_of_table(sheet: Sheet) -> list[DutyPoint]:
+    """Points in the rows of a table; a cell without a value leaves that key at the scene's value.
+
+    Raises InputError with all faults: columns that are neither name, share, hours nor keys, and bad cells.
+    """
+    keys, time = _columns(sheet)
+    shares, faults = sheet.column(time).numbers(TIMES[time])
+    values = {}
+    for key in keys:
+        # An empty cell is one of the choices, so it has a value.
+        values[key], slips = key_values(sheet.column(key), ("",))
+        faults += slips
+    refuse(faults)
+    points = []
+    for row, name in enumerate(sheet.column(NAME).texts):
+        table = {"name": name, "share": float(shares[row]), "set": list(_assignments(values, row))}
+        try:
+            points.append(validated(DutyPoint, table, f"{sheet.path}: row {row + 1}"))
+        except InputError as error:
+            faults += error.faults
+    refuse(faults)
+    refuse(f"{sheet.path}: {fault}" for fault in point_faults(points, normalise=time == "hours"))
+    return points
+
+
+def _columns(sheet: Sheet) -> tuple[list[str], str]:
+    """Scene keys among the columns, and the column of times. Raises InputError for any other column but the name, and for missing ones."""
+    sheet.refuse_nameless()
+    names = [name for name in sheet.header if name]
+    keys, times = [name for name in names if "." in name], [name for name in TIMES if name in names]
+    missing = [NAME] * (NAME not in names) + ["share"] * (not times)
+    faults = [
+        f"{sheet.path}: column {name} is missing; add it, or rename one of {listed(sheet.header)}" for name in missing
+    ]
+    if len(times) > 1:
+        faults.append(f"{sheet.path}: columns {' and '.join(times)}: both state the time; keep one of them")
+    faults += [
+        f"{sheet.path}: column {listed([name])}: neither {NAME}, share, hours nor a key of a scene (table.key); rename or remove it"
+        for name in names
+        if name not in (NAME, *times, *keys)
+    ]
+    faults += [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
+    # A wrong sheet or separator may be the reason.
+    refuse([*faults, *(sheet.notes if faults else ())])
+    return keys, times[0]
+
+
+def _assignments(values: Mapping[str, list[Any]], row: int) -> Iterator[str]:
+    for key, column in values.items():
+        if column[row] != "":
+            yield f"{key}={_text(column[row])}"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return str(value).lower() if isinstance(value, bool) else repr(value).removesuffix(".0")
 
 
 def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[Scene]:

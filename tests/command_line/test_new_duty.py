@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from doe_command import doe
 
-from doe.commands.new_duty import duty_text, read_points
+from doe.commands.new_duty import duty_text
 from doe.study_file import Study
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
+from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
 KEYS = "operation.inner_speed_rpm,operation.radial_load_N,lubricant.temperature_C"
@@ -34,6 +35,13 @@ def table(folder: Path, text: str) -> Path:
     path = folder / "duty.csv"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def read_points(path: Path, scene: Scene) -> list[DutyPoint]:
+    """Points of a file, checked in a scene."""
+    points = read_duty(path)
+    duty_scenes(scene, points, str(path))
+    return points
 
 
 def test_command_line_writes_the_duty(tmp_path):
@@ -62,6 +70,19 @@ def test_unit_a_european_table_means_the_same(scene, tmp_path):
     ]
 
 
+def test_unit_hours_stand_for_shares(scene, tmp_path):
+    """Unit: a column of hours gives the study of the shares, and both in one table are refused; so does TOML in place of CSV."""
+    shares = duty_text(read_points(table(tmp_path, TABLE), scene))
+    hours = TABLE.replace("share", "hours").replace("0.2,", "400,").replace("0.75,", "1500,").replace("0.05,", "100,")
+    assert duty_text(read_points(table(tmp_path, hours), scene)) == shares
+    (tmp_path / "duty.toml").write_text(shares)
+    assert duty_text(read_points(tmp_path / "duty.toml", scene)) == shares
+    with pytest.raises(InputError, match="columns share and hours: both state the time; keep one of them"):
+        read_points(table(tmp_path, "name,share,hours\na,1,5\n"), scene)
+    with pytest.raises(InputError, match="hours in row 1 = -5: is below 0; check the sign"):
+        read_points(table(tmp_path, "name,hours\na,-5\n"), scene)
+
+
 def test_unit_names_survive_the_template(scene, tmp_path):
     """Unit: braces, number signs and umlauts of a name come out of the study as they went in."""
     points = read_points(table(tmp_path, "name,share\n{start} # 1,0.5\nLäufer,0.5\n"), scene)
@@ -74,7 +95,7 @@ def test_unit_names_survive_the_template(scene, tmp_path):
     ("text", "faults"),
     [
         ("share,x.y\n1,2\n", ["column name is missing; add it", "column x.y: unknown key"]),
-        (TABLE.replace("share", "part"), ["column share is missing", "column part: neither name, share nor a key of a"]),
+        (TABLE.replace("share", "part"), ["column share is missing", "column part: neither name, share, hours nor a key of a"]),
         (TABLE.replace("inner_speed", "iner_speed"), ["iner_speed_rpm: unknown key; did you mean operation.inner_speed_rpm?"]),
         (TABLE.replace("0.75", "often"), ["share in row 2 = 'often': is not a finite number"]),
         (TABLE.replace("0.75", "75"), ["share in row 2 = 75: is beyond 1; check the unit"]),

@@ -241,6 +241,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
     brief = [f"--set=numerics.{each}" for each in SHORT.split(",")]
     rollers, balls = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "angular_contact_ball.toml"
     figures = ["cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio"]
+    others = ["impact_contact_force_N", "cage_speed_rpm", "cage_orbit_radius_share"]
     for name, *call in (
         ("simulate", rollers, *brief),
         (
@@ -254,6 +255,8 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
             EXAMPLES / "duty_study.toml",
             *brief,
         ),
+        ("simulate", rollers, "--duty", EXAMPLES / "duty_study.toml", *brief),
+        ("compare", balls, "--set", "operation.inner_speed_rpm=12000"),
         ("ball", balls),
         ("ball", balls, "--sweep", "operation.inner_speed_rpm=1000:2000:2"),
         ("ball", balls, "--preload", "100:300:3"),
@@ -263,7 +266,7 @@ def test_every_column_that_commands_write_is_described(tmp_path, command, floors
         tables = list(folder.glob("*.csv"))
         assert tables
         for path in tables:
-            assert undescribed(floors, path, figure=[*figures, *NAMES]) == [], path.name
+            assert undescribed(floors, path, figure=[*figures, *others, *NAMES]) == [], path.name
     study = short_study(tmp_path)
     doe("study", str(study), "--out", str(tmp_path / "study"))
     tables = sorted((tmp_path / "study").glob("*.csv"))

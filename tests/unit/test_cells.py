@@ -13,9 +13,9 @@ from instant_runs import instantly
 from short_studies import short_study, silent
 
 from doe.study_file import Study
-from doe.study_file.table import read_sheet
 from doe.workflow.runs import read_runs, run_design
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell, save_table
+from rbdyn.base.tables.sheet import read_sheet
 
 DANGEROUS = tuple("=+-@\t\r\n")
 

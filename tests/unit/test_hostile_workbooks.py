@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from raw_workbook import BOOK, HEADER, MAIN, SHEET, STRINGS, STYLES, book, row, sheet, write
 
-from doe.study_file import workbook, workbook_parts
-from doe.study_file.table import read_sheet, read_table
+from doe.study_file.table import read_table
 from rbdyn.base.faults import InputError
+from rbdyn.base.tables import workbook, workbook_parts
+from rbdyn.base.tables.sheet import read_sheet
 
 
 def end_of(path: Path | str) -> str:

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from doe.workflow.confirmation import (
-    Confirmed,
-    Gain,
-    chance_above,
-    error_of_difference,
-    joint_freedom,
-    one_sided,
-    times_wider,
-)
+from doe.workflow.confirmation import Confirmed, Gain, error_of_difference
+from rbdyn.base.intervals import chance_above, joint_freedom, one_sided, times_wider
 
 REPEATS, TOGETHER = 40_000, 3
 # Three standard errors of a share of so many repeats of 95 %.

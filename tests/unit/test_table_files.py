@@ -22,10 +22,11 @@ from hypothesis import strategies as st
 from scipy.special import stdtrit
 
 from doe.study_file import Study
-from doe.study_file.table import RUN, read_sheet, read_table
+from doe.study_file.table import RUN, read_table
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import drawn_responses, fit_surfaces, residual_correlation
 from rbdyn.base.faults import InputError
+from rbdyn.base.tables.sheet import read_sheet
 
 TABLE = ROOT / "examples" / "ccd_table4.csv"
 STUDY = ROOT / "examples" / "clearance_study.toml"

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from doe.study_file.table import text_of
 from doe.unknown import inputs
 from doe.unknown.calibration import allowance_words
 from doe.unknown.offsets import Unseen
@@ -23,6 +22,7 @@ from rbdyn.base.identity import Identity
 from rbdyn.base.page import REPORT, with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
+from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.result import read_json, write_json

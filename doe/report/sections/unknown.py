@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from doe.report.sections.record import of_hundred
-from doe.study_file.table import text_of
 from doe.unknown.decision import Better
 from doe.unknown.propagation import CONFIDENCE, Share
 from doe.workflow.robust import Decider, Robust, RobustFront
 from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
 from rbdyn.base.records import save_table
+from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 from rbdyn.scene.unknown import is_number

@@ -12,9 +12,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.study_file.decimal_marks import POINT, Marks, is_like_number, marks_of
-from doe.study_file.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
 from rbdyn.base.faults import InputError, not_utf_8, read_bytes, refuse
+from rbdyn.base.tables.decimal_marks import POINT, Marks, is_like_number, marks_of
+from rbdyn.base.tables.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
 from rbdyn.base.words import counted
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}

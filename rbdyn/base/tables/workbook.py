@@ -11,10 +11,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doe.study_file.decimal_marks import Exact
-from doe.study_file.workbook_parts import DamageError, Parts
 from rbdyn.base.faults import LARGEST_FILE, LONGEST_NAME, MOST_FAULTS, InputError, one_line, refuse
 from rbdyn.base.records import NUMBER
+from rbdyn.base.tables.decimal_marks import Exact
+from rbdyn.base.tables.workbook_parts import DamageError, Parts
 from rbdyn.base.words import counted
 
 NAMED = re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)

@@ -8,9 +8,10 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
-from doe.study_file.table import LONGEST_NUMBER, WHOLE, Column
-from doe.study_file.table import is_number as is_numeral
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, one_line
+from rbdyn.base.records import plain
+from rbdyn.base.tables.sheet import LONGEST_NUMBER, WHOLE, Column
+from rbdyn.base.tables.sheet import is_number as is_numeral
 from rbdyn.scene import Scene
 
 # Bits of the largest whole number, as in TOML.
@@ -93,9 +94,15 @@ def _adapter(key: str) -> TypeAdapter[Any]:
     return TypeAdapter(limited)
 
 
-def _fields(key: str) -> dict[str, FieldInfo]:
+def default_of(key: str, scene: type[BaseModel] = Scene) -> Any:
+    """Default of a dotted key of a kind of ``scene``, as JSON has it; None for a key without one."""
+    field = _fields(key, scene).get(key.rpartition(".")[2])
+    return None if field is None or field.is_required() else plain(field.get_default(call_default_factory=True))
+
+
+def _fields(key: str, scene: type[BaseModel] = Scene) -> dict[str, FieldInfo]:
     """Fields of the table of a dotted key; none if no scene has that table."""
-    models: list[type[BaseModel]] = [Scene]
+    models: list[type[BaseModel]] = [scene]
     for part in key.split(".")[:-1]:
         fields = [model.model_fields[part] for model in models if part in model.model_fields]
         models = [inner for field in fields for inner in _models(field.annotation)]

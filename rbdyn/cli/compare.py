@@ -1,0 +1,190 @@
+"""The command ``rbdyn compare``. Physics is imported inside it, so that help comes at once."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbdyn.base import command
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.folder import output_folder
+from rbdyn.base.identity import identity_line, identity_of
+from rbdyn.base.page import REPORT_FILES, write_with_report
+from rbdyn.base.records import save_table
+from rbdyn.base.terminal import show
+from rbdyn.base.words import counted, improvement, label, quantity, shown, signed_with_error, value_alone
+
+if TYPE_CHECKING:
+    from rbdyn.comparison import Comparison, Difference, Input
+
+FILES = ("comparison.json", "inputs.csv", "differences.csv")
+# Units in which a change is stated in place of a percentage: their zero is no size.
+ABSOLUTE = ("°C", "µm", "mrad", "deg")
+
+
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A scene, a saved result, or a folder that holds one.")],
+    b: Annotated[
+        Path | None, typer.Argument(metavar="B", help="Another of the same kind.", show_default="A with --set")
+    ] = None,
+    assignments: Annotated[
+        list[str] | None,
+        command.valued(
+            "KEY.PATH=VALUE",
+            "Replace a key of B; without B it is A with these keys; repeatable.",
+            "B as written",
+            "--set",
+        ),
+    ] = None,
+    turns: command.Turns = None,
+    replicates: command.Replicates = None,
+    seed: command.Seed = None,
+    workers: command.Workers = None,
+    out: Annotated[
+        Path | None, command.folder_option("Write comparison.json, inputs.csv and differences.csv here.")
+    ] = None,
+    force: command.Force = False,
+    as_json: command.Json = False,
+    quiet: command.Quiet = False,
+    verbose: Annotated[bool, command.verbose_flag("Also losses, clearances and contacts one by one.")] = False,
+) -> None:
+    """Compare two bearings: inputs that differ, figures, and which of the differences are significant."""
+    files = (*FILES, *REPORT_FILES)
+    with command.guarded(as_json), output_folder(out, "rbdyn compare", files, force=force) as folder:
+        folder.claim(a, *([] if b is None else [b]))
+        from rbdyn.comparison import compare as run
+        from rbdyn.comparison import file_of
+
+        shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
+        both = [f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None]
+        with command.progress_bar("comparing", quiet or as_json, workers) as progress:
+            found = run(a, b, assignments or [], both, workers, progress, command.notice(quiet))
+        inputs = [file_of(path) for path in (a, b) if path is not None]
+        identity = identity_of("rbdyn compare", found.a.scene, inputs)
+        answer = partial(blocks, found)
+        written = write_with_report(folder, identity, answer, partial(_write, found))
+        detail = Detail.of(quiet, verbose)
+        command.hand_over(
+            found.as_dict, as_json, lambda: show([identity_line(identity), *answer()], detail), out, written
+        )
+    if found.failed:
+        raise typer.Exit(command.FAILED)
+
+
+def blocks(found: "Comparison") -> list[Block]:
+    """What differs and by how much, first in a sentence; the inputs, the figures, the parts, notes."""
+    sides = [f"{place}: {side.name}" for place, side in (("A", found.a), ("B", found.b))]
+    failed = [] if not found.failed else [Paragraph(f"{found.status}.", "warning")]
+    return [
+        *map(Paragraph, sides),
+        *failed,
+        Paragraph(statement(found), "statement"),
+        _input_table(found.inputs),
+        _figure_table("Figures", found.figures if _in_common(found) else {}),
+        Paragraph(_part_sentence(found.parts), detail=Detail.USUAL),
+        _figure_table("Parts", found.parts, Detail.ALL),
+        *notes(found.notes),
+    ]
+
+
+# Verdicts in the order in which they are said, and most figures that a sentence names of each.
+ORDER = ("significant", "within error", "error unknown", "equal", "only in A", "only in B")
+MOST_NAMED = 8
+
+
+def statement(found: "Comparison") -> str:
+    """The significant changes from A to B in words, then the other figures."""
+    if not _in_common(found):
+        return "There are no figures to compare."
+    if all(one.verdict == "equal" for one in found.figures.values()):
+        return f"No {'' if found.inputs else 'input and no '}figure differs."
+    scatter = sum(bool(one.error_together) for one in found.figures.values())
+    together = f" (intervals of 95 % that hold for all {scatter} together)" if scatter > 1 else ""
+    exact = "" if scatter else " (an equilibrium has no scatter, so every difference counts)"
+    groups = {verdict: _named(found.figures, verdict) for verdict in ORDER}
+    said = "; ".join(f"{verdict}: {names}" for verdict, names in groups.items() if names)
+    return f"{'' if found.inputs else 'No input differs. '}B against A{together or exact}: {said}."
+
+
+def _in_common(found: "Comparison") -> bool:
+    return any(one.difference is not None for one in found.figures.values())
+
+
+def _named(figures: Mapping[str, "Difference"], verdict: str) -> str:
+    """Figures with this verdict, of significant ones also the change."""
+    names = [
+        f"{quantity(name)[0]} {change(name, one)}" if verdict == "significant" else quantity(name)[0]
+        for name, one in figures.items()
+        if one.verdict == verdict
+    ]
+    more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
+    return ", ".join([*names[:MOST_NAMED], *more])
+
+
+def change(name: str, one: "Difference") -> str:
+    """'3.30 ± 0.62 % less', of B against A; in the figure's own unit where a percentage says nothing."""
+    unit = quantity(name)[1]
+    if one.difference is None:
+        return one.verdict
+    if unit in ABSOLUTE or one.percent is None:
+        return improvement(-one.difference, one.error_together, "min", unit)
+    scale = one.percent / one.difference if one.difference else 0.0
+    return improvement(-one.percent, None if one.error_together is None else scale * one.error_together, "min")
+
+
+def _input_table(inputs: Sequence["Input"]) -> Table:
+    """The inputs; of a table that only one scene has without the keys at their defaults."""
+    rows = [
+        (one.key, _value(one.a, one.a_default), _value(one.b, one.b_default))
+        for one in inputs
+        if not ((one.a is None and one.b_default) or (one.b is None and one.a_default))
+    ]
+    caption = "1 input differs" if len(inputs) == 1 else f"{len(inputs)} inputs differ"
+    left = len(inputs) - len(rows)
+    note = f"{counted(left, 'more key')} at the default, in tables that only A or only B has" if left else ""
+    return Table(caption, ("key", "A", "B"), rows, note, text_columns=(1, 2))
+
+
+def _value(value: Any, is_default: bool) -> str:
+    text = "not stated" if value is None else shown(value, 8)
+    return f"{text} (default)" if is_default else text
+
+
+def _figure_table(caption: str, figures: Mapping[str, "Difference"], detail: Detail = Detail.LEAST) -> Table:
+    rows = [
+        (
+            label(name),
+            "" if one.a is None else value_alone(one.a, one.error_together),
+            "" if one.b is None else value_alone(one.b, one.error_together),
+            _difference(one),
+            one.verdict,
+        )
+        for name, one in figures.items()
+        if one.a or one.b
+    ]
+    return Table(caption, ("figure", "A", "B", "B - A", "difference"), rows, text_columns=(4,), detail=detail)
+
+
+def _difference(one: "Difference") -> str:
+    if one.difference is None or one.verdict == "equal":
+        return "" if one.difference is None else "0"
+    return signed_with_error(one.difference, one.error_together)
+
+
+def _part_sentence(parts: Mapping[str, "Difference"]) -> str:
+    """The significant differences of the parts, losses last; empty where no part has figures."""
+    by_kind = dict(sorted(parts.items(), key=lambda item: item[0].endswith("_power_W")))
+    return f"Parts that differ: {_named(by_kind, 'significant') or 'none'} (all of them: -v)." if parts else ""
+
+
+def _write(found: "Comparison", folder: Path) -> list[str]:
+    """Write comparison.json, inputs.csv and differences.csv; returns the names of the files."""
+    found.save(folder / FILES[0])
+    import pandas as pd
+
+    columns = ("key", "a", "b", "a_default", "b_default")
+    save_table(pd.DataFrame([one.as_dict() for one in found.inputs], columns=columns), folder / FILES[1])
+    save_table(found.table(), folder / FILES[2], "%.8g")
+    return list(FILES)

@@ -1,0 +1,186 @@
+"""A roller bearing simulated at every point of a duty: figures there, the worst of them, and the life over the duty.
+
+A point that cannot go on is a record with the reason, and the others go on.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.forecast import Notice, named, part_of
+from rbdyn.base.intervals import errors_of_differences
+from rbdyn.base.notes import Note, merged
+from rbdyn.base.records import Record, derived, finite, keyed
+from rbdyn.base.words import counted
+from rbdyn.dynamics.duty import load_case
+from rbdyn.dynamics.ensemble import Reporter, log
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.life.duty import ROLLER_EXPONENT, duty_life
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
+from rbdyn.scene import Scene, rollers_only
+from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
+from rbdyn.scene.thermal import simulated_scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Figures of which neither end is bad, and ends of the names of those whose least value is the worst one.
+NEUTRAL, LEAST = ("cage_speed_rpm", "pulse_rate_hz"), ("_clearance_um", "_film_um", "_lambda_ratio")
+
+
+class SimulatedPoint(Record):
+    """A point of the duty: its share of the time, speed and load, and what came of it.
+
+    ``figures``: by name, those of the parts included; empty where ``status`` says why there are none. ``L10_h``: life of ISO/TS 16281
+    if the machine ran at this point alone, None where it has no end or is unknown. ``damage_share``: share of the damage over the
+    duty.
+    """
+
+    name: str
+    share: float
+    inner_speed_rpm: float
+    radial_load_N: float  # noqa: N815
+    status: str
+    figures: dict[str, Quantity]
+    L10_h: float | None
+    damage_share: float | None
+
+
+class Worst(Record):
+    """The worst value of a figure over the duty, its point, and the other points that it is not told apart from by its error."""
+
+    point: str
+    value: float
+    not_told_apart: tuple[str, ...]
+
+
+class DutySimulation(SavedRecord, kw_only=True):
+    """A bearing at each point of a duty; ``life``: over the duty, None where a point failed; ``worst``: by name of the figure."""
+
+    FORMAT = "rbdyn.duty/1"
+    WHAT = "simulation over a duty"
+    status: str = derived(
+        lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
+    )
+    points: tuple[SimulatedPoint, ...]
+    worst: dict[str, Worst]
+    life: dict[str, float | None] | None
+    notes: tuple[str, ...]
+    wall_s: float = keyed("cost", "wall_s")
+    seed: int
+    versions: dict[str, str]
+    scene: dict[str, Any]
+
+    @property
+    def failed(self) -> list[SimulatedPoint]:
+        """Points without figures that hold."""
+        return [point for point in self.points if point.status != "ok"]
+
+    def table(self) -> "pd.DataFrame":
+        """A row a point; figures with their 95 % errors, units in the names."""
+        import pandas as pd
+
+        rows = [{**point.as_dict(), **figure_columns(point.figures)} for point in self.points]
+        return pd.DataFrame(rows).drop(columns="figures")
+
+
+def simulate_duty(
+    scene: Scene | Path | str,
+    duty: Sequence[DutyPoint] | Path | str,
+    workers: int | None = None,
+    progress: Reporter = None,
+    target: float | None = None,
+    notice: Notice = log,
+) -> DutySimulation:
+    """Simulate a scene at each point of a duty, in its order; a path is a file that ``rbdyn.scene.duty.read_duty`` reads.
+
+    ``workers``, ``progress``, ``target``, ``notice``: as of ``rbdyn.simulate``, for each point. Raises InputError with the faults of
+    all points before any runs, KeyboardInterrupt.
+    """
+    scene, source = rollers_only(scene), "duty"
+    if isinstance(duty, str | Path):
+        source, duty = str(duty), read_duty(Path(duty))
+    scenes, started = duty_scenes(scene, duty, source), time.perf_counter()
+    results: dict[str, SimulationResult | str] = {}
+    for place, (point, at_point) in enumerate(zip(duty, scenes, strict=True)):
+        steps, words = part_of(progress, place, len(duty)), named(notice, point.name)
+        try:
+            results[point.name] = simulate(at_point, workers, steps, target=target, notice=words)
+        except (InputError, RunError) as error:
+            results[point.name] = f"failed: {error}"
+    shares = shares_of_time(duty)
+    hot = [_hot(at_point, result) for at_point, result in zip(scenes, results.values(), strict=True)]
+    cases = [None if one is None else load_case(one, share) for one, share in zip(hot, shares, strict=True)]
+    known = [case for case in cases if case is not None]
+    life = duty_life(known, ROLLER_EXPONENT) if len(known) == len(cases) else None
+    points = tuple(
+        SimulatedPoint(
+            point.name,
+            share,
+            at_point.operation.inner_speed_rpm,
+            at_point.operation.radial_load_N,
+            result if isinstance(result, str) else full_status(result),
+            {} if isinstance(result, str) else result.responses,
+            None if case is None else finite(case.hours),
+            None if life is None else life.damage[place],
+        )
+        for place, (point, share, at_point, result, case) in enumerate(
+            zip(duty, shares, scenes, results.values(), cases, strict=True)
+        )
+    )
+    return DutySimulation(
+        points=points,
+        worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
+        life=None if life is None else life.as_record(),
+        notes=tuple(_notes(results)),
+        wall_s=time.perf_counter() - started,
+        seed=scene.numerics.seed,
+        versions=versions(),
+        scene=scene.model_dump(mode="json"),
+    )
+
+
+def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
+    """The worst point of each figure that all points have; none of those that are equal everywhere, and none of one point."""
+    found = {}
+    for name in next(iter(points.values()), {}):
+        figures = {point: own[name] for point, own in points.items() if name in own}
+        values = {figure.value for figure in figures.values()}
+        if name in NEUTRAL or len(figures) < len(points) or len(values) < 2:
+            continue
+        sign = -1.0 if name.endswith(LEAST) else 1.0
+        badness = {point: sign * _size(name, figure.value) for point, figure in figures.items()}
+        worst = max(badness, key=lambda point: badness[point])
+        others = [point for point in figures if point != worst]
+        error, _ = errors_of_differences([figures[worst]] * len(others), [figures[point] for point in others])
+        apart = [
+            abs(figures[worst].value - figures[point].value) > half for point, half in zip(others, error, strict=True)
+        ]
+        alike = tuple(point for point, is_apart in zip(others, apart, strict=True) if not is_apart)
+        found[name] = Worst(worst, figures[worst].value, alike)
+    return found
+
+
+def _size(name: str, value: float) -> float:
+    """What a larger one is worse of: a slip is as bad in either direction."""
+    return abs(value) if name == "cage_slip" else value
+
+
+def _hot(scene: Scene, result: SimulationResult | str) -> Scene | None:
+    """The scene at the temperatures of its run; None where it has a heat balance and no steady state."""
+    if isinstance(result, str):
+        return scene if scene.thermal is None else None
+    return simulated_scene(result) if result.status == "ok" else None
+
+
+def _notes(results: Mapping[str, SimulationResult | str]) -> list[str]:
+    """Points that failed, with the reason; then the notes of the others, those of all points once."""
+    ran = {name: result for name, result in results.items() if isinstance(result, SimulationResult)}
+    reasons = {name: result for name, result in results.items() if isinstance(result, str)}
+    reasons |= {name: full_status(result) for name, result in ran.items() if result.status != "ok"}
+    return [
+        *(Note("point_failed", f"{name}: {reason}") for name, reason in reasons.items()),
+        *merged({name: result.notes for name, result in ran.items()}),
+    ]
