@@ -135,7 +135,7 @@ def scene_text(words: str, typed: "Typed") -> str:
     fill = new_scene.roller_values if rollers else new_scene.ball_values
     name = OWN if own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
     cause = f"--clearance {point.clearance}" if own else name
-    values = _or_fault(cause, lambda: fill(subject, point)) | _mounting(subject.sizes, typed, point)
+    values = _or_fault(cause, lambda: fill(subject, point)) | _mounting(subject, typed, point)
     template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
     text = fill_template(template.read_text(encoding="utf-8"), values)
     # What is wrong with an estimate comes from the sizes that were given.
@@ -177,27 +177,28 @@ def _operating_point(subject: "Subject", typed: "Typed") -> "OperatingPoint":
     return OperatingPoint(speed, load, preload, oil, temperature, clearance, supply_of(typed), stated, heat)
 
 
-def _mounting(sizes: "Envelope", typed: "Typed", point: "OperatingPoint") -> dict[str, Any]:
+def _mounting(subject: "Subject", typed: "Typed", point: "OperatingPoint") -> dict[str, Any]:
     """Values of [mounting], none of them without a class or a heat balance. Raises InputError for a class or a size that is not listed."""
     from rbdyn.cli.new_options import HEAT
     from rbdyn.cli.new_scene import mounting_values
     from rbdyn.properties.tolerances import housing_interference, shaft_interference
 
-    typed.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone))
-    typed.read("--housing", lambda zone: housing_interference(sizes.outside, zone))
+    sizes, rings = subject.sizes, subject.rings
+    typed.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone, rings.ring_class))
+    typed.read("--housing", lambda zone: housing_interference(sizes.outside, zone, rings.ring_class))
     refuse(typed.faults)
     shaft, housing = typed["--shaft"], typed["--housing"]
     if shaft is None and housing is None and point.heat is None:
         return {}
     where = " ".join(typed.listing("--shaft", "--housing", *HEAT))
     name = f"{where}: a usual seat of the rings, of {sizes.bore:g} x {sizes.outside:g} mm"
-    return _or_fault(name, lambda: mounting_values(sizes, shaft, housing, point.temperature))
+    return _or_fault(name, lambda: mounting_values(sizes, rings, shaft, housing, point.temperature))
 
 
 def _catalogue_bearing(words: str, typed: "Typed") -> "Subject":
     """The bearing of a designation. Raises InputError with all faults at once."""
     from rbdyn.cli.new_drawing import OF_DRAWINGS, OWN
-    from rbdyn.cli.new_options import cage_material_of, clearance_of, guidance_of, kind_faults
+    from rbdyn.cli.new_options import HEAT, cage_material_of, clearance_of, guidance_of, kind_faults
     from rbdyn.cli.new_scene import catalogue_subject
     from rbdyn.properties.catalogue import ROLLERS, read_designation
 
@@ -215,7 +216,8 @@ def _catalogue_bearing(words: str, typed: "Typed") -> "Subject":
     _note_contradictions(named, typed, clearance)
     refuse(typed.faults)
     sizes = _or_fault(f"DESIGNATION {name}", lambda: _envelope(named, typed))
-    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, sizes, *cage))
+    mounted = bool(typed.listing("--shaft", "--housing", *HEAT))
+    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, sizes, *cage, mounted))
 
 
 def _note_contradictions(named: "Designation", typed: "Typed", clearance: str | float | None) -> None:
@@ -223,6 +225,13 @@ def _note_contradictions(named: "Designation", typed: "Typed", clearance: str | 
     from rbdyn.properties.catalogue import ANGULAR
 
     of_suffix, cage = named.value_of("clearance"), named.value_of("cage")
+    if named.value_of("bore") is not None:
+        if not isinstance(clearance, float):
+            typed.note(
+                f"DESIGNATION {named.name}: a tapered bore is driven up its seat; add --clearance in mm, as it is then"
+            )
+        if typed["--shaft"] is not None:
+            typed.fault("--shaft", "a tapered bore has no such seat; leave it out")
     angular = "an angular contact bearing has a contact angle instead; leave it out"
     if named.kind == ANGULAR and clearance is not None:
         typed.fault("--clearance", angular)

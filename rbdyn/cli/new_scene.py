@@ -40,36 +40,47 @@ USUAL_SHAFT, USUAL_HOUSING = "k5", "H7"
 HOUSING_SHARE, INNER_RISE = 1.5, 7.5
 # By how much of the inner ring's rise above its drawing, at 20 C, the shaft stays below it: 0.10 to 0.15 (NSK).
 SHAFT_LAG, DRAWING = 0.125, 20.0
+DRIVEN_UP = Interference(0.0, 0.0, 0.0, 0.0, 0.0)
 # Values of a bearing that is not mounted, and what only a mounted one has.
 LOOSE = ("loose_bore", "loose_outside")
 NONE = dict.fromkeys(
-    ("shaft_by", "housing_by", "mounted_bore", "mounted_outside", "mounted_width", "housing_diameter", "inner_temperature", "shaft_temperature",
+    ("shaft_by", "rings_by", "housing_by", "mounted_bore", "mounted_outside", "mounted_width", "housing_diameter", "inner_temperature", "shaft_temperature",
      "outer_temperature", "temperatures_by", "inner_interference", "inner_fit_by", "outer_interference", "outer_fit_by", "inner_law",
      "outer_law")
 )  # fmt: skip
 
 
+class Rings(NamedTuple):
+    """Rings as bought: class of ISO 492, what the scene says of it, and whether the bore is tapered, so driven up its seat."""
+
+    ring_class: str = "Normal"
+    words: str = "bearing of normal tolerances (ISO 492)"
+    tapered: bool = False
+
+
 def mounting_values(
-    sizes: Envelope, shaft: str | None, housing: str | None, temperature: float | None
+    sizes: Envelope, rings: Rings, shaft: str | None, housing: str | None, temperature: float | None
 ) -> dict[str, Any]:
     """Values of the templates for the classes of shaft and housing, the usual one where one is None.
 
-    ``temperature``: of the oil [C], None where a heat balance computes it and those of the parts. Raises MethodError as
+    A tapered bore has no interference: its clearance is stated as driven up. ``temperature``: of the oil [C], None where a heat balance computes it and those of the parts. Raises MethodError as
     ``shaft_interference``.
     """
-    inner = shaft_interference(sizes.bore, shaft or USUAL_SHAFT)
-    outer = housing_interference(sizes.outside, housing or USUAL_HOUSING)
+    inner = DRIVEN_UP if rings.tapered else shaft_interference(sizes.bore, shaft or USUAL_SHAFT, rings.ring_class)
+    outer = housing_interference(sizes.outside, housing or USUAL_HOUSING, rings.ring_class)
+    seat = "tapered shaft" if rings.tapered else f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}"
     return {
         **dict.fromkeys(LOOSE),
         **_assumed_temperatures(temperature),
-        "shaft_by": f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}",
+        "shaft_by": seat,
+        "rings_by": rings.words,
         "housing_by": f"housing {housing or f'{USUAL_HOUSING} (not stated, usual)'}",
         "mounted_bore": sizes.bore,
         "mounted_width": sizes.width,
         "mounted_outside": sizes.outside,
         "housing_diameter": round(HOUSING_SHARE * sizes.outside, 1),
         "inner_interference": round(inner.mean, 2) + 0.0,
-        "inner_fit_by": _reason(inner),
+        "inner_fit_by": "in the clearance, which is that of the bearing driven up" if rings.tapered else _reason(inner),
         "inner_law": _law(inner),
         "outer_interference": round(outer.mean, 2) + 0.0,
         "outer_fit_by": _reason(outer),
@@ -206,6 +217,7 @@ class Subject(NamedTuple):
     cage: CageKind | None = None
     grooves: tuple[float, float] | None = None
     clearance: str | None = None
+    rings: Rings = Rings()
 
     @property
     def width_known(self) -> bool:
@@ -214,11 +226,14 @@ class Subject(NamedTuple):
 
 
 def catalogue_subject(
-    named: Designation, sizes: Envelope, guidance: str | None = None, material: str | None = None
+    named: Designation, sizes: Envelope, guidance: str | None = None, material: str | None = None, mounted: bool = False
 ) -> Subject:
     """A bearing by its designation; guidance and cage material as stated, else of its suffix. Raises MethodError for
     impossible dimensions.
     """
+    stated, listed = named.value_of("tolerance"), named.ring_class
+    alike = "" if stated in (None, listed) else f", diameters as of {listed}"
+    words = Rings().words if listed == "Normal" else f"bearing of class {stated}{alike} (ISO 492)"
     rollers = named.kind == ROLLERS
     return Subject(
         kind=named.kind,
@@ -230,9 +245,10 @@ def catalogue_subject(
         series=named.series,
         # Sizes that are typed are those of no listed bearing.
         designation=named.name if rollers and sizes.reference_speed is not None else None,
-        without_effect=named.without_effect or None,
+        without_effect=named.without_effect(mounted) or None,
         cage=cage_kind(named.value_of("cage"), guidance, material) if rollers else None,
         clearance=named.value_of("clearance"),
+        rings=Rings(listed, words, named.value_of("bore") is not None),
     )
 
 
