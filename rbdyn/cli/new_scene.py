@@ -327,8 +327,12 @@ def _estimated(subject: Subject, inside: RollerInterior) -> Values:
     """Keys named in [uncertain] where they are estimates: not the bars between rollers that are counted, nor an effective length
     whose documented range is longer than the roller.
     """
+    sources = {"roller_diameter_mm": inside.roller_diameter_by, "pitch_diameter_mm": inside.pitch_diameter_by}
     short = LONGEST_EFFECTIVE * inside.effective_length <= inside.roller_length
     return {
+        "estimated_sizes": "".join(
+            f'"bearing.{key}", ' for key, source in sources.items() if source.startswith("estimated")
+        ),
         "estimated_length": '"bearing.effective_length_mm", ' if short else "",
         "estimated_bar": '"cage.bar_width_mm", ' if subject.boundary is None else "",
     }

@@ -9,7 +9,7 @@ from string import ascii_uppercase
 from typing import Any
 
 from doe.clearance import TEMPERATURES
-from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
+from doe.report.sections.chain import estimates_note, grade_cell, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points
 from doe.report.sections.record import (
     LIMITS,
@@ -166,15 +166,21 @@ def _edge(summary: Record) -> str:
 def _parts_to_make(summary: Record) -> list[Block]:
     """Parts of every dimension chain, and what a refused one takes and needs; all else is in a section of its own."""
     chains = part(summary, "chains") or {}
+    parts = {name: sizes(chain, "parts") or sizes(chain) for name, chain in chains.items()}
     rows = [
         (label(name), label(chain_name), dimension(size), grade_cell(size), moved(size))
-        for chain_name, chain in chains.items()
-        for name, size in (sizes(chain, "parts") or sizes(chain)).items()
+        for chain_name, of_chain in parts.items()
+        for name, size in of_chain.items()
     ]
     header = ("part", "chain", "dimension [mm]", "grade", "moved [mm]")
     shares = (f"{label(name)}: {words}" for name, chain in chains.items() if (words := yield_words(chain)))
     table = Table("Parts to make", header, rows, "; ".join(shares), text_columns=(1, 3))
-    return [table, *(block for name, chain in chains.items() for block in refusal_blocks(name, chain))]
+    estimates = estimates_note({name: size for of_chain in parts.values() for name, size in of_chain.items()})
+    return [
+        table,
+        Paragraph(estimates, "warning"),
+        *(block for name, chain in chains.items() for block in refusal_blocks(name, chain)),
+    ]
 
 
 def _clearances(summary: Record) -> list[Block]:
@@ -242,24 +248,38 @@ def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
-    running = part(summary, "operating_clearances_mm", factor.name) or {}
     before = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors") or {}
     tolerance = tolerance_of(summary, factor)
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
         "baseline": factor.text(before.get(factor.name)),
-        "in operation": factor.text(running.get("pick")),
-        "baseline in operation": factor.text(running.get("baseline")),
+        "in operation": _least_in_operation(summary, factor, "pick"),
+        "baseline in operation": _least_in_operation(summary, factor, "baseline"),
     }
     entries = [entry for entry in further.items() if entry[1]]
-    grade = part(summary, "tolerances", factor.name, "grade")
+    grade = part(summary, "made", factor.name, "grade") or part(summary, "tolerances", factor.name, "grade")
     remarks = [("grade of the parts", grade)] if grade else []
     return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, entries, remarks)
 
 
+def _least_in_operation(summary: Record, factor: Factor, end: str) -> str:
+    """Clearance in operation of the "pick" or the "baseline": over a duty the least, with the name of its point."""
+    key = "operating_clearances_mm"
+    points = {point["name"]: part(point, key, factor.name, end) for point in part(summary, "duty", "points") or []}
+    plays = {name: play for name, play in points.items() if play is not None}
+    if not plays:
+        return factor.text(part(summary, key, factor.name, end))
+    least = min(plays, key=plays.__getitem__)
+    return f"{factor.text(plays[least])} at {least}"
+
+
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
-    """Half-width of the tolerance of a factor: the widened one of the pick, else the one that the study states."""
-    return part(summary, "tolerances", factor.name, "half_width") or factor.tolerance
+    """Half-width of the tolerance of a factor: that its parts are made to, else the widened one of the pick, else as stated."""
+    return (
+        part(summary, "made", factor.name, "half_width")
+        or part(summary, "tolerances", factor.name, "half_width")
+        or factor.tolerance
+    )
 
 
 def gains_statement(summary: Record) -> str:
