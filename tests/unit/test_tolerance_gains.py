@@ -243,6 +243,7 @@ def test_unit_a_tolerance_has_the_grades_of_the_parts_to_make():
             "points": [
                 {
                     "name": name,
+                    "share": 0.5,
                     "operating_clearances_mm": {"radial_clearance_mm": {"baseline": play, "pick": play - 1.0}},
                 }
                 for name, play in (("cruise", 9.95), ("take-off", 9.75))
@@ -252,7 +253,8 @@ def test_unit_a_tolerance_has_the_grades_of_the_parts_to_make():
     }
     screen = text(first_screen(record))
     card = next(line for line in screen.splitlines() if line.strip().startswith("radial clearance"))
-    assert "± 0.007 " in card and card.rstrip().endswith("IT3 and IT4") and "9.75 at take-off" in card
+    assert "± 0.0070 " in card and card.rstrip().endswith("IT3 and IT4") and " 8.750 " in card
+    assert "They are the least over the duty: at take-off." in screen
 
 
 def test_unit_estimates_of_a_scene_mark_its_parts():

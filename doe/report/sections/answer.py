@@ -10,7 +10,7 @@ from typing import Any
 
 from doe.clearance import TEMPERATURES
 from doe.report.sections.chain import estimates_note, grade_cell, refusal_blocks, yield_words
-from doe.report.sections.duty import at_points
+from doe.report.sections.duty import at_points, in_operation, least_words
 from doe.report.sections.record import (
     LIMITS,
     SENSES,
@@ -191,6 +191,7 @@ def _clearances(summary: Record) -> list[Block]:
     meaning = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
     if meaning and part(summary, "operating_clearances_mm"):
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
+        meaning += least_words(summary)
     sentence = part(summary, "tolerances_sentence")
     return [
         Tiles("Chosen clearances", "pick", tiles),
@@ -253,24 +254,13 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
         "baseline": factor.text(before.get(factor.name)),
-        "in operation": _least_in_operation(summary, factor, "pick"),
-        "baseline in operation": _least_in_operation(summary, factor, "baseline"),
+        "in operation": factor.text(in_operation(summary, factor, "pick")[0]),
+        "baseline in operation": factor.text(in_operation(summary, factor, "baseline")[0]),
     }
     entries = [entry for entry in further.items() if entry[1]]
     grade = part(summary, "made", factor.name, "grade") or part(summary, "tolerances", factor.name, "grade")
     remarks = [("grade of the parts", grade)] if grade else []
     return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, entries, remarks)
-
-
-def _least_in_operation(summary: Record, factor: Factor, end: str) -> str:
-    """Clearance in operation of the "pick" or the "baseline": over a duty the least, with the name of its point."""
-    key = "operating_clearances_mm"
-    points = {point["name"]: part(point, key, factor.name, end) for point in part(summary, "duty", "points") or []}
-    plays = {name: play for name, play in points.items() if play is not None}
-    if not plays:
-        return factor.text(part(summary, key, factor.name, end))
-    least = min(plays, key=plays.__getitem__)
-    return f"{factor.text(plays[least])} at {least}"
 
 
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
