@@ -44,7 +44,7 @@ Temperature = Annotated[
     Text, valued("C", "Temperature of the oil.", f"{TEMPERATURE_C:g}, or by the heat balance of --ambient")
 ]
 OilFlow = Annotated[
-    Text, valued("L_MIN", "Oil flow; a heat balance then computes the temperatures.", "no flow", "--oil-flow")
+    Text, valued("L_MIN", "Oil flow in L/min; a heat balance computes the temperatures.", "no flow", "--oil-flow")
 ]
 OilInlet = Annotated[Text, valued("C", "Temperature of the oil that flows in.", "no flow", "--oil-inlet")]
 Ambient = Annotated[
@@ -52,7 +52,7 @@ Ambient = Annotated[
 ]
 Clearance = Annotated[Text, valued("CLASS|MM", "C2, CN, C3, C4 or C5, or diametral in mm.", "of DESIGNATION, else CN")]
 Lubrication = Annotated[
-    Text, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath, or grease where --oil is one")
+    Text, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath; grease if --oil is one, jet with --oil-flow")
 ]
 Guidance = Annotated[
     Text, valued("PART", "What guides the cage: outer, inner or roller.", "of DESIGNATION, else outer")
