@@ -17,7 +17,6 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError
 from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import Part as ChainPart
-from doe.dimension_chain.links import stated_parts
 from doe.study_file import Study
 from doe.study_file.sections import StudyChain, chain_table
 from rbdyn.base.arrays import Array
@@ -36,8 +35,6 @@ GRADES = list(STANDARD_TOLERANCES)
 FINER = f"finer than {GRADES[0]}"
 # ISO 286 begins its coarse grades at this size [mm]; smaller lengths are no sizes of a part.
 SMALLEST_SIZE = 1.0
-# Half width [mm] of a chain whose links are read but not solved.
-ANY_WIDTH = 1.0
 
 
 class Part(NamedTuple):
@@ -166,22 +163,17 @@ class Grade(NamedTuple):
 
 @dataclass(frozen=True)
 class SharedTolerance:
-    """``parts`` that share a tolerance, and the widths [mm] ``taken`` by bought or graded parts.
-
-    ``squares``: widths add by the root sum square, as the chain asks; else by the worst case.
-    """
+    """``parts`` that share a tolerance in the worst case, and the widths [mm] ``taken`` by graded parts."""
 
     parts: tuple[Part, ...]
     taken: tuple[float, ...] = ()
-    squares: bool = False
 
     def grade(self, width: float) -> Grade:
         """The widest grade of the parts that fits a width [mm]. Raises MethodError for a size outside the tables."""
         tables = {part.name: list(grade_tolerances(part.nominal).values()) for part in self.parts}
 
         def whole(place: int) -> float:
-            terms = [abs(part.coefficient) * tables[part.name][place] for part in self.parts]
-            return math.hypot(*terms, *self.taken) if self.squares else sum((*terms, *self.taken))
+            return sum((*(abs(part.coefficient) * tables[part.name][place] for part in self.parts), *self.taken))
 
         fitting = [place for place in range(len(GRADES)) if whole(place) <= width * (1.0 + 1e-9)]
         if not fitting:
@@ -195,12 +187,12 @@ def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> d
     groups, grades = clearance_parts(scene), {}
     closing = {chain.factor: chain for chain in reversed(study.file.chain)}
     for factor, value, half in zip(study.file.factor, point.tolist(), half_widths.tolist(), strict=True):
-        chain = _chain_at(study, closing.get(factor.name), value, half)
-        if chain is not None and half > 0.0 and not chain.is_stated:
+        chain = _chain_at(study, closing.get(factor.name), value, half) if half > 0.0 else None
+        if chain is not None and not chain.is_stated:
             if (grade := _allocated_grade(chain)) is not None:
                 grades[factor.name] = grade
             continue
-        shared = (chain and _shared(chain)) or _of_scene(groups, factor.key, factor.name, value)
+        shared = _of_scene(groups, factor.key, factor.name, value)
         if shared is None or math.isnan(half):
             continue
         try:
@@ -217,9 +209,7 @@ def _chain_at(study: Study, chain: StudyChain | None, value: float, half_width: 
         return None
     free = chain.model_copy(update={"half_width_mm": None})
     try:
-        return chain_from(
-            chain_table(free, study.path.parent, value, half_width if half_width > 0.0 else ANY_WIDTH), chain.name
-        )
+        return chain_from(chain_table(free, study.path.parent, value, half_width), chain.name)
     except InputError:
         # The solution of the chain names its faults.
         return None
@@ -244,17 +234,6 @@ def grade_of_parts(parts: Iterable[ChainPart]) -> Grade | None:
         return None
     widths = {name: (part.nominal_mm, part.tolerance_mm) for name, part in made.items()}
     return Grade(" and ".join(sorted(ladder, key=ladder.__getitem__)), min(ladder.values()), widths)
-
-
-def _shared(chain: Chain) -> SharedTolerance | None:
-    links = [link for link in chain.link if link.coefficient != 0]
-    free = [link for link in chain.free if link.coefficient != 0]
-    if not free or not all(link.is_dimension for link in links):
-        return None
-    names = {link.name for link in free}
-    taken = [abs(part.coefficient) * part.tolerance_mm for part in stated_parts(links) if part.name not in names]
-    parts = tuple(Part(link.name, link.coefficient, link.nominal, chain.allocate.method) for link in free)
-    return SharedTolerance(parts, tuple(taken), chain.allocate.mode != "worst_case")
 
 
 def _of_scene(groups: Mapping[str, ClearanceParts], key: str, name: str, value: float) -> SharedTolerance | None:
