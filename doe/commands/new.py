@@ -103,7 +103,7 @@ def new(
         study = Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
         check_goals(study)
         check_study(study)
-        hand_out(text, as_json, out, force, "doe study")
+        hand_out(text, as_json, out, force, "doe study", [path, *([duty] if duty else [])])
 
 
 def limits_of(texts: Sequence[str]) -> Limits:

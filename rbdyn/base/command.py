@@ -73,16 +73,21 @@ def print_json(record: dict[str, Any]) -> None:
     print(json.dumps(record, indent=1, allow_nan=False))
 
 
-def hand_out(text: str, as_json: bool, path: Path | None, force: bool, following: str) -> None:
+def hand_out(
+    text: str, as_json: bool, path: Path | None, force: bool, following: str, reads: Sequence[Path] = ()
+) -> None:
     """Print a TOML file, or its JSON; with a ``path`` write it there whole instead, and print what is ``following``.
 
-    Raises InputError where a file is there already, unless ``force``, and for a path where no file can be.
+    Raises InputError where a file is there already, unless ``force``, for one that the command ``reads``, and for a path where no
+    file can be.
     """
     if path is not None:
         from rbdyn.result import whole_file
 
         if path.is_file() and not force:
             raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])
+        if any(path.exists() and path.samefile(read) for read in reads):
+            raise InputError([f"--out {path}: is a file that this command reads; name another file"])
         with whole_file(path) as new:
             new.write_text(f"{text}\n", encoding="utf-8")
     if as_json:

@@ -105,6 +105,8 @@ def test_command_line_a_new_file(command, tmp_path):
     assert tomllib.loads(path.read_text(encoding="utf-8"))["bearing"]["kind"] == "cylindrical_roller"
     assert doe("new", path, "--out", study).stdout == f"written to {study}; next: doe study '{study}'\n"
     assert doe("new", path, "--out", study).returncode == 2
+    read = doe("new", path, "--out", path, "--force")
+    assert read.returncode == 2 and "is a file that this command reads" in read.stderr
     assert tomllib.loads(study.read_text(encoding="utf-8"))["scene"]["file"] == "scenes/my.toml"
     assert len(json.loads(doe("design", study, "--json").stdout)["runs"]) == 20
     over = command("new", "6208", "--out", path, "--force", "--json")
