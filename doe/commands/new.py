@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.command import Json, flag, guarded, plain_number, print_json, valued
+from rbdyn.base.command import ForceFile, Json, OutFile, flag, guarded, hand_out, plain_number, valued
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
@@ -78,9 +79,11 @@ def new(
             "--duty",
         ),
     ] = None,
+    out: OutFile = None,
+    force: ForceFile = False,
     as_json: Json = False,
 ) -> None:
-    """Write a commented study of a scene's clearances on standard output."""
+    """Write a commented study of a scene's clearances."""
     with guarded(as_json):
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
@@ -97,15 +100,13 @@ def new(
         sections |= {"responses": _responses(bounds), "duty": _duty(duty, scene)}
         for name, section in sections.items():
             template = template.replace(f"{{{name}}}", section)
-        text = fill_template(template, {"quoted": json.dumps(str(path))})
-        data = tomllib.loads(text)
-        study = Study(Path("study.toml"), validated(StudyFile, data, f"study of {path}"))
+        # A study finds its scene from its own folder.
+        base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
+        text = fill_template(template, {"quoted": json.dumps(str(base))})
+        study = Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
         check_goals(study)
         check_study(study)
-        if as_json:
-            print_json(data)
-        else:
-            print(text)
+        hand_out(text, as_json, out, force, "doe study", [path, *([duty] if duty else [])])
 
 
 def limits_of(texts: Sequence[str]) -> Limits:

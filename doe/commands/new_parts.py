@@ -10,7 +10,9 @@ from rbdyn.properties.tolerances import grade_tolerances
 # Half widths of rollers of one diameter [mm], the usual one first.
 ROLLER_HALF_WIDTHS = (0.001, 0.0005)
 
-LEFT_OUT = "Without this line: as wide as [tolerances] allows"
+# Of a study that derives its tolerances, whose chains are made to these.
+DERIVED = "would state it. Without: as [tolerances] derives, else as the factor states"
+MARK = "estimated = true # until a drawing states it: parts and reports mark it\n"
 
 
 class Manufacture(NamedTuple):
@@ -74,10 +76,15 @@ def tolerances_text() -> str:
 def chain_text(group: ClearanceParts, manufacture: Manufacture, derived: bool) -> str:
     """A [[chain]] of a study: its links resolve to the clearance of the scene.
 
-    ``derived``: the study derives the widest tolerances, which hold where the half width is left out.
+    ``derived``: the study derives the widest tolerances, to which the parts are made; so the chain states none itself.
     """
-    rule = f"{manufacture.rule}. {LEFT_OUT}" if derived else manufacture.rule
-    head = _template("chain").format(**group._asdict(), half_width=manufacture.half_width, rule=rule)
+    rule, stated = (DERIVED, "# ") if derived else (manufacture.rule, "")
+    head = _template("chain").format(**group._asdict(), half_width=manufacture.half_width, rule=rule, stated=stated)
     below = {"half_width": manufacture.rollers, "half_width_below": -manufacture.rollers}
-    links = [_template("roller" if part.graded else "part").format(**part._asdict(), **below) for part in group.parts]
+    links = [
+        _template("roller" if part.graded else "part").format(
+            **part._asdict(), **below, mark=MARK if part.estimated else ""
+        )
+        for part in group.parts
+    ]
     return "".join([head, *links])

@@ -34,6 +34,7 @@ Origin = Literal["stated", "allocated", "temperature"]
 SLACK = 1e-9  # mm: rounding tolerated at a limit
 DIGITS = 12  # decimals of an allocated size in mm
 DRAWING_DECIMALS = 3  # least decimals of a size in mm
+ESTIMATED = "\u2248"  # before a size that is an estimate
 
 
 # All assemblies stay in memory and are sorted for quantiles: a hundred million take 2 GB.
@@ -128,6 +129,8 @@ class Link(Strict):
     """Mean of the manufactured parts, as a deviation from the nominal; by default the middle of the tolerance."""
     capability: Positive = 1.0
     """T/(6 sigma) of a normal or truncated normal part."""
+    estimated: bool = False
+    """Whether the nominal is an estimate, which drawings, tables and reports mark until a drawing states it."""
     fixed: bool = False
     """Whether the allocation keeps the stated tolerance of this link. It matters where all links have deviations; if some
     have none, stated deviations always stay."""
@@ -247,7 +250,7 @@ class Part:
     """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal.
 
     ``origin``: stated deviations, allocated ones, or the growth of another part by temperature. ``fit``: code that states them.
-    ``iso_class``: class of ISO 286 within the limits of an allocated seat.
+    ``iso_class``: class of ISO 286 within the limits of an allocated seat. ``estimated``: whether the nominal is an estimate.
     """
 
     name: str
@@ -263,6 +266,7 @@ class Part:
     origin: Origin = "stated"
     fit: str | None = None
     iso_class: str | None = None
+    estimated: bool = False
 
     @property
     def tolerance_mm(self) -> float:
@@ -281,8 +285,9 @@ class Part:
 
     @property
     def text(self) -> str:
-        """Size on a drawing, such as '9.290 0/-0.005'; stated by a code '27 k5 (+0.011/+0.002)'."""
-        return size_text(self.nominal_mm, self.upper_mm, self.lower_mm, self.fit)
+        """Size on a drawing, such as '9.290 0/-0.005'; stated by a code '27 k5 (+0.011/+0.002)'; an estimate begins with '≈'."""
+        mark = f"{ESTIMATED} " if self.estimated else ""
+        return mark + size_text(self.nominal_mm, self.upper_mm, self.lower_mm, self.fit)
 
 
 def size_text(nominal_mm: float, upper_mm: float, lower_mm: float, fit: str | None = None) -> str:
@@ -358,5 +363,16 @@ def _part(
     mean = (upper + lower) / 2 if mean is None else mean
     law, capability = link.distribution, link.capability
     return Part(
-        link.name, link.coefficient, nominal, upper, lower, law, mean, grade, capability, origin=origin, fit=fit
+        link.name,
+        link.coefficient,
+        nominal,
+        upper,
+        lower,
+        law,
+        mean,
+        grade,
+        capability,
+        origin=origin,
+        fit=fit,
+        estimated=link.estimated,
     )

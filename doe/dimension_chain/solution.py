@@ -44,11 +44,14 @@ QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
 MATCHED = "ok: matched in"
 # Figures of an allocated part.
 ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
+# What says where its sizes come from.
+SOURCES = ("fit", "origin", "iso_class", "estimated")
 
 
 def _size(part: Part) -> dict[str, Any]:
-    """JSON of a part: its figures, the code that states them, where they come from, a class of ISO 286 within a seat, its grade in words, and its drawing size."""
-    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin", "iso_class")}
+    """JSON of a part: its figures, the code that states them, where they come from, a class of ISO 286 within a seat, whether it is an estimate, its
+    grade in words, and its drawing size."""
+    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, *SOURCES)}
     return figures | {"grade_words": grade_words(part), "text": part.text}
 
 

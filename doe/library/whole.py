@@ -100,6 +100,7 @@ class StudyAnswer(Answer):
 
     def _factors(self) -> Rows:
         baseline, tolerances = self.record["confirmation"]["baseline"]["factors"], self.record.get("tolerances", {})
+        tolerances = tolerances | self.record["made"]
         return [
             {
                 "factor": name,

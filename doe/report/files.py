@@ -162,6 +162,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "whirl_sentence": outcome.whirl_sentence,
         "rivals_sentences": outcome.rivals_sentences,
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
+        "made": outcome.made,
         "missed_chains": outcome.missed_chains,
         "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
         "notes": list(outcome.notes),

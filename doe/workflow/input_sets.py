@@ -36,7 +36,7 @@ from rbdyn.base.words import shown
 from rbdyn.result import read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.key_columns import key_values, unknown_keys
-from rbdyn.scene.uncertain import Law, Sampled, Uncertain
+from rbdyn.scene.uncertain import MARKING, Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put, value_of, with_values
 
 HOLES = 0.05  # share of input sets that may be impossible or fail
@@ -278,7 +278,8 @@ def case_of(
     keys = {unknown_input.key for unknown_input in inputs}
     inputs_without_set = inputs_of(case.ran, plain, uncertain, fixed, columns)
     by_set = [unknown_input.key for unknown_input in inputs_without_set if unknown_input.key not in keys]
-    idle_keys = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
+    active = keys | fixed.keys() | {*by_set, *MARKING}
+    idle_keys = [key for key in uncertain.estimated if key not in active]
     doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
     constant = {*by_set, *fixed, *keys}
     exact = [entry.key for entry in documented_of(case.ran) if not entry.on_request and entry.key not in constant]

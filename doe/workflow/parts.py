@@ -3,23 +3,27 @@
 A clearance is the sum of coefficient times nominal of its parts: radial, outer less inner raceway less two rollers; guide, land and
 cage; pocket, its width less the roller. All are diametral and of the loose bearing. Rollers are graded by size: one diameter in a bearing.
 
-A tolerance of a clearance is shared by its parts: its grade is the widest that all of them may have together. A dimension
-chain of the study names the parts; without one they are those of the scene. Any other length is a part by itself.
+A dimension chain of the study allocates a tolerance to its parts, which have their grades from there. Without one the parts are
+those of the scene, and their grade is the widest that all of them may have together. Any other length is a part by itself.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from doe.dimension_chain import Chain, chain_from, grade_tolerances
-from doe.dimension_chain.links import stated_parts
+from doe.dimension_chain.allocation import Allocation
+from doe.dimension_chain.closing import NoValueError
+from doe.dimension_chain.drawing import grade_words
+from doe.dimension_chain.links import Part as ChainPart
 from doe.study_file import Study
 from doe.study_file.sections import StudyChain, chain_table
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.tolerances import STANDARD_TOLERANCES
 from rbdyn.scene import Scene
+from rbdyn.scene.uncertain import MARKING
 
 # Usual grades: of ground raceways, of turned and milled cages and their lands.
 RACEWAY_GRADE, CAGE_GRADE = "IT5", "IT7"
@@ -31,17 +35,17 @@ GRADES = list(STANDARD_TOLERANCES)
 FINER = f"finer than {GRADES[0]}"
 # ISO 286 begins its coarse grades at this size [mm]; smaller lengths are no sizes of a part.
 SMALLEST_SIZE = 1.0
-# Half width [mm] of a chain whose links are read but not solved.
-ANY_WIDTH = 1.0
 
 
 class Part(NamedTuple):
-    """A part: its name, what the clearance changes by per unit of it, its nominal [mm], where that comes from; rollers are graded."""
+    """A part: its name, what the clearance changes by per unit of it, its nominal [mm], where that comes from, and whether that is
+    an estimate; rollers are graded."""
 
     name: str
     coefficient: float
     nominal: float
     source: str = ""
+    estimated: bool = False
 
     @property
     def graded(self) -> bool:
@@ -70,16 +74,19 @@ def clearance_parts(scene: Scene) -> dict[str, ClearanceParts]:
     bearing, cage = scene.bearing, scene.cage
     pitch, roller, radial = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, bearing.radial_clearance_mm
     around = "pitch diameter {} roller {} half of the clearance"
+    estimates = set() if scene.uncertain is None else {*scene.uncertain.estimated}
+    unsure = bool(estimates & {*MARKING})
+    of_roller = MARKING[0] in estimates
     # The outer raceway is at the resolution of a drawing, and the inner one closes to the clearance.
     outer = round(pitch + roller + 0.5 * radial, MICROMETRES)
     raceways = (
-        Part("outer_raceway", 1.0, outer, around.format("+", "+")),
-        Part("inner_raceway", -1.0, _size(outer - 2.0 * roller - radial), around.format("-", "-")),
-        Part("rollers", -2.0, roller),
+        Part("outer_raceway", 1.0, outer, around.format("+", "+"), unsure),
+        Part("inner_raceway", -1.0, _size(outer - 2.0 * roller - radial), around.format("-", "-"), unsure),
+        Part("rollers", -2.0, roller, estimated=of_roller),
     )
     pocket = (
-        Part("pocket_width", 1.0, _size(roller + cage.pocket_clearance_mm), "roller + clearance"),
-        Part("roller_diameter", -1.0, roller),
+        Part("pocket_width", 1.0, _size(roller + cage.pocket_clearance_mm), "roller + clearance", of_roller),
+        Part("roller_diameter", -1.0, roller, estimated=of_roller),
     )
     groups = [
         ClearanceParts(
@@ -106,14 +113,14 @@ def _guide(scene: Scene) -> Iterator[ClearanceParts]:
     if scene.cage.guidance == "outer":
         words = "land of the outer ring less outside diameter of the cage"
         parts = (
-            Part("guide_land", 1.0, _size(land), source.format("+")),
-            Part("cage_outside", -1.0, _size(land - clearance), "land - clearance"),
+            Part("guide_land", 1.0, _size(land), source.format("+"), not on_drawing),
+            Part("cage_outside", -1.0, _size(land - clearance), "land - clearance", not on_drawing),
         )
     else:
         words = "bore of the cage less land of the inner ring"
         parts = (
-            Part("cage_bore", 1.0, _size(land + clearance), "land + clearance"),
-            Part("guide_land", -1.0, _size(land), source.format("-")),
+            Part("cage_bore", 1.0, _size(land + clearance), "land + clearance", not on_drawing),
+            Part("guide_land", -1.0, _size(land), source.format("-"), not on_drawing),
         )
     adjust = next(part.name for part in parts if part.name != "guide_land")
     yield ClearanceParts("guide", "guide_clearance_mm", words, CAGE_GRADE, parts, adjust)
@@ -156,22 +163,17 @@ class Grade(NamedTuple):
 
 @dataclass(frozen=True)
 class SharedTolerance:
-    """``parts`` that share a tolerance, and the widths [mm] ``taken`` by bought or graded parts.
-
-    ``squares``: widths add by the root sum square, as the chain asks; else by the worst case.
-    """
+    """``parts`` that share a tolerance in the worst case, and the widths [mm] ``taken`` by graded parts."""
 
     parts: tuple[Part, ...]
     taken: tuple[float, ...] = ()
-    squares: bool = False
 
     def grade(self, width: float) -> Grade:
         """The widest grade of the parts that fits a width [mm]. Raises MethodError for a size outside the tables."""
         tables = {part.name: list(grade_tolerances(part.nominal).values()) for part in self.parts}
 
         def whole(place: int) -> float:
-            terms = [abs(part.coefficient) * tables[part.name][place] for part in self.parts]
-            return math.hypot(*terms, *self.taken) if self.squares else sum((*terms, *self.taken))
+            return sum((*(abs(part.coefficient) * tables[part.name][place] for part in self.parts), *self.taken))
 
         fitting = [place for place in range(len(GRADES)) if whole(place) <= width * (1.0 + 1e-9)]
         if not fitting:
@@ -185,7 +187,12 @@ def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> d
     groups, grades = clearance_parts(scene), {}
     closing = {chain.factor: chain for chain in reversed(study.file.chain)}
     for factor, value, half in zip(study.file.factor, point.tolist(), half_widths.tolist(), strict=True):
-        shared = _of_chain(study, closing.get(factor.name), value) or _of_scene(groups, factor.key, factor.name, value)
+        chain = _chain_at(study, closing.get(factor.name), value, half) if half > 0.0 else None
+        if chain is not None and not chain.is_stated:
+            if (grade := _allocated_grade(chain)) is not None:
+                grades[factor.name] = grade
+            continue
+        shared = _of_scene(groups, factor.key, factor.name, value)
         if shared is None or math.isnan(half):
             continue
         try:
@@ -196,27 +203,37 @@ def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> d
     return grades
 
 
-def _of_chain(study: Study, chain: StudyChain | None, value: float) -> SharedTolerance | None:
-    """Parts of a chain at a value [mm]; None without a chain, or where functions of its links count too."""
+def _chain_at(study: Study, chain: StudyChain | None, value: float, half_width: float) -> Chain | None:
+    """A chain at a value and a half width [mm], whatever it states itself; None without a chain."""
     if chain is None:
         return None
+    free = chain.model_copy(update={"half_width_mm": None})
     try:
-        links = chain_from(chain_table(chain, study.path.parent, value, ANY_WIDTH), chain.name)
+        return chain_from(chain_table(free, study.path.parent, value, half_width), chain.name)
     except InputError:
         # The solution of the chain names its faults.
         return None
-    return _shared(links)
 
 
-def _shared(chain: Chain) -> SharedTolerance | None:
-    links = [link for link in chain.link if link.coefficient != 0]
-    free = [link for link in chain.free if link.coefficient != 0]
-    if not free or not all(link.is_dimension for link in links):
+def _allocated_grade(chain: Chain) -> Grade | None:
+    """Grades of the parts that the chain allocates, so that a tolerance has those of the parts to make; None without a solution."""
+    try:
+        parts = Allocation(chain).allocated()
+    except (InputError, MethodError, NoValueError):
         return None
-    names = {link.name for link in free}
-    taken = [abs(part.coefficient) * part.tolerance_mm for part in stated_parts(links) if part.name not in names]
-    parts = tuple(Part(link.name, link.coefficient, link.nominal, chain.allocate.method) for link in free)
-    return SharedTolerance(parts, tuple(taken), chain.allocate.mode != "worst_case")
+    return Grade(FINER, -1, {}) if parts is None else grade_of_parts(parts)
+
+
+def grade_of_parts(parts: Iterable[ChainPart]) -> Grade | None:
+    """Grades of the allocated parts as their table states them, "IT3 and IT4"; its place is that of the finest."""
+    made = {part.name: part for part in parts if part.origin == "allocated"}
+    words = {name: grade_words(part) for name, part in made.items()}
+    # What is finer than a grade lies below it.
+    ladder = {word: GRADES.index(word.split()[-1]) - word.startswith("finer") for word in words.values() if word}
+    if not ladder or not all(words.values()):
+        return None
+    widths = {name: (part.nominal_mm, part.tolerance_mm) for name, part in made.items()}
+    return Grade(" and ".join(sorted(ladder, key=ladder.__getitem__)), min(ladder.values()), widths)
 
 
 def _of_scene(groups: Mapping[str, ClearanceParts], key: str, name: str, value: float) -> SharedTolerance | None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,8 @@ from doe.workflow.confirmation import (
     whirl_sentence,
 )
 from doe.workflow.duty import DutyAnswer, duty_answer
-from doe.workflow.front import check_goals, find_front, with_survival
+from doe.workflow.front import check_goals, find_front, known_tolerances, with_survival
+from doe.workflow.parts import grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
@@ -182,7 +184,8 @@ def solve_chains(
 def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain:
     chain = study.file.chain[number]
     factor = study.factors.index(chain.factor)
-    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else None
+    # Where no tolerance follows, parts are made to the one that the study states.
+    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else known_tolerances(study).get(chain.factor)
     source = f"{study.path}: chain {chain.name}"
     try:
         table = chain_table(chain, study.path.parent, float(point[factor]), half_width)
@@ -275,6 +278,20 @@ class StudyResult:
             )
             for point in self.study.shares
         }
+
+    @property
+    def made(self) -> dict[str, dict[str, Any]]:
+        """By factor the half width that its parts are made to, and their grades: of the narrowest chain that closes on it."""
+        made: dict[str, dict[str, Any]] = {}
+        for chain in self.study.file.chain:
+            result = self.chains.get(chain.name)
+            if result is None or result.refused:
+                continue
+            half_width = 0.5 * (result.limits_mm[1] - result.limits_mm[0])
+            if chain.factor not in made or half_width < made[chain.factor]["half_width"]:
+                grade = grade_of_parts(result.parts)
+                made[chain.factor] = {"half_width": half_width, "grade": grade and grade.name, "chain": chain.name}
+        return made
 
     @property
     def limits(self) -> list[Limit]:

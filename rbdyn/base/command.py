@@ -4,8 +4,10 @@ import errno
 import json
 import os
 import re
+import shlex
 import string
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -69,6 +71,29 @@ def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
 def print_json(record: dict[str, Any]) -> None:
     """One JSON object on standard output."""
     print(json.dumps(record, indent=1, allow_nan=False))
+
+
+def hand_out(
+    text: str, as_json: bool, path: Path | None, force: bool, following: str, reads: Sequence[Path] = ()
+) -> None:
+    """Print a TOML file, or its JSON; with a ``path`` write it there whole instead, and print what is ``following``.
+
+    Raises InputError where a file is there already, unless ``force``, for one that the command ``reads``, and for a path where no
+    file can be.
+    """
+    if path is not None:
+        from rbdyn.result import whole_file
+
+        if path.is_file() and not force:
+            raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])
+        if any(path.exists() and path.samefile(read) for read in reads):
+            raise InputError([f"--out {path}: is a file that this command reads; name another file"])
+        with whole_file(path) as new:
+            new.write_text(f"{text}\n", encoding="utf-8")
+    if as_json:
+        print_json(tomllib.loads(text))
+    else:
+        print(text if path is None else f"written to {path}; next: {following} {shlex.quote(str(path))}")
 
 
 def hand_over(
@@ -234,6 +259,8 @@ Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.
 Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
+OutFile = Annotated[Path | None, valued("FILE", "Write it to this file.", "standard output", "--out")]
+ForceFile = Annotated[bool, flag("--force", says="Write over the file of --out.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from rbdyn.base.command import Json, guarded, print_json, valued
+from rbdyn.base.command import ForceFile, Json, OutFile, guarded, hand_out, valued
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 
 if TYPE_CHECKING:
@@ -40,10 +40,19 @@ Speed = Annotated[Text, valued("RPM", "Speed of the inner ring.", "half the refe
 Load = Annotated[Text, valued("N", "Radial load.", "0.1 C")]
 Preload = Annotated[Text, valued("N", "Axial preload of a ball bearing.", "what loads half of the balls")]
 Oil = Annotated[str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')]
-Temperature = Annotated[str, typer.Option(metavar="C", help="Temperature of the oil.")]
+Temperature = Annotated[
+    Text, valued("C", "Temperature of the oil.", f"{TEMPERATURE_C:g}, or by the heat balance of --ambient")
+]
+OilFlow = Annotated[
+    Text, valued("L_MIN", "Oil flow in L/min; a heat balance computes the temperatures.", "no flow", "--oil-flow")
+]
+OilInlet = Annotated[Text, valued("C", "Temperature of the oil that flows in.", "no flow", "--oil-inlet")]
+Ambient = Annotated[
+    Text, valued("C", "Temperature around housing and shaft; writes the heat balance.", "20 with --oil-flow")
+]
 Clearance = Annotated[Text, valued("CLASS|MM", "C2, CN, C3, C4 or C5, or diametral in mm.", "of DESIGNATION, else CN")]
 Lubrication = Annotated[
-    Text, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath, or grease where --oil is one")
+    Text, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath; grease if --oil is one, jet with --oil-flow")
 ]
 Guidance = Annotated[
     Text, valued("PART", "What guides the cage: outer, inner or roller.", "of DESIGNATION, else outer")
@@ -71,7 +80,10 @@ def new(
     load: Load = None,
     preload: Preload = None,
     oil: Oil = OIL,
-    temperature: Temperature = f"{TEMPERATURE_C:g}",
+    temperature: Temperature = None,
+    oil_flow: OilFlow = None,
+    oil_inlet: OilInlet = None,
+    ambient: Ambient = None,
     clearance: Clearance = None,
     lubrication: Lubrication = None,
     guidance: Guidance = None,
@@ -81,13 +93,16 @@ def new(
     width: Width = None,
     shaft: Shaft = None,
     housing: Housing = None,
+    out: OutFile = None,
+    force: ForceFile = False,
     as_json: Json = False,
 ) -> None:
-    """Write a commented scene of a catalogue bearing, or of one's own, its interior estimated, on standard output."""
+    """Write a commented scene of a catalogue bearing, or of one's own, its interior estimated."""
     texts = {
         "--rollers": rollers, "--roller": roller, "--balls": balls, "--ball": ball, "--pitch": pitch,
         "--contact-angle": contact_angle, "--conformity": conformity, "--speed": speed, "--load": load,
-        "--preload": preload, "--oil": oil, "--temperature": temperature, "--clearance": clearance,
+        "--preload": preload, "--oil": oil, "--temperature": temperature, "--oil-flow": oil_flow,
+        "--oil-inlet": oil_inlet, "--ambient": ambient, "--clearance": clearance,
         "--lubrication": lubrication, "--guidance": guidance, "--cage-material": cage_material, "--bore": bore,
         "--outside": outside, "--width": width, "--shaft": shaft, "--housing": housing,
     }  # fmt: skip
@@ -95,10 +110,8 @@ def new(
         from rbdyn.cli.new_options import Typed
 
         text = scene_text(" ".join(designation), Typed(texts))
-        if as_json:
-            print_json(tomllib.loads(text))
-        else:
-            print(text)
+        runs = "rbdyn simulate" if 'kind = "cylindrical_roller"' in text else "rbdyn ball"
+        hand_out(text, as_json, out, force, runs)
 
 
 def scene_text(words: str, typed: "Typed") -> str:
@@ -110,6 +123,7 @@ def scene_text(words: str, typed: "Typed") -> str:
     from rbdyn.properties.catalogue import ROLLERS
     from rbdyn.properties.oils import oil_named
     from rbdyn.scene import Scene
+    from rbdyn.scene.notes import heat_notes
 
     typed.read_numbers()
     typed.read("--oil", oil_named)
@@ -121,14 +135,17 @@ def scene_text(words: str, typed: "Typed") -> str:
     fill = new_scene.roller_values if rollers else new_scene.ball_values
     name = OWN if own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
     cause = f"--clearance {point.clearance}" if own else name
-    values = _or_fault(cause, lambda: fill(subject, point)) | _mounting(subject.sizes, typed, point.temperature)
+    values = _or_fault(cause, lambda: fill(subject, point)) | _mounting(subject, typed, point)
     template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
     text = fill_template(template.read_text(encoding="utf-8"), values)
     # What is wrong with an estimate comes from the sizes that were given.
     sizes = " ".join(typed.listing(*SIZES))
     source = f"{sizes}: estimated inside" if sizes and not own else OWN if own else f"DESIGNATION {subject.name}"
     try:
-        notes = getattr(Scene.from_dict(tomllib.loads(text), source), "unit_notes", ())
+        scene = Scene.from_dict(tomllib.loads(text), source)
+        notes = [*getattr(scene, "unit_notes", ())]
+        if scene.thermal and scene.lubricant and scene.mounting and scene.mounting.width:
+            notes += heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width)
         refuse(f"{source}: {note}" for note in notes)
     except InputError as error:
         raise InputError([typed_fault(typed, fault) for fault in error.faults]) from None
@@ -144,36 +161,44 @@ def _or_fault(name: str, attempt: Callable[[], Value]) -> Value:
 
 
 def _operating_point(subject: "Subject", typed: "Typed") -> "OperatingPoint":
-    from rbdyn.cli.new_options import clearance_of, supply_of
+    from rbdyn.cli.new_options import clearance_of, heat_of, supply_of
     from rbdyn.cli.new_scene import OperatingPoint
     from rbdyn.properties.oils import oil_named
 
-    oil, temperature = typed.read("--oil", oil_named), typed.number("--temperature")
-    assert oil is not None and temperature is not None
+    oil, heat, temperature = typed.read("--oil", oil_named), heat_of(typed), typed.number("--temperature")
+    refuse(typed.faults)
+    assert oil is not None
+    if temperature is None and heat is None:
+        temperature = TEMPERATURE_C
     clearance = typed.read("--clearance", clearance_of)
     clearance = subject.clearance or CLEARANCE if clearance is None else clearance
     speed, load, preload = (typed.number(option) for option in ("--speed", "--load", "--preload"))
-    return OperatingPoint(speed, load, preload, oil, temperature, clearance, supply_of(typed))
+    stated = typed["--lubrication"] is not None or oil.grease
+    return OperatingPoint(speed, load, preload, oil, temperature, clearance, supply_of(typed), stated, heat)
 
 
-def _mounting(sizes: "Envelope", typed: "Typed", temperature: float) -> dict[str, Any]:
-    """Values of [mounting], none of them without a class. Raises InputError for a class or a size that is not listed."""
+def _mounting(subject: "Subject", typed: "Typed", point: "OperatingPoint") -> dict[str, Any]:
+    """Values of [mounting], none of them without a class or a heat balance. Raises InputError for a class or a size that is not listed."""
+    from rbdyn.cli.new_options import HEAT
     from rbdyn.cli.new_scene import mounting_values
     from rbdyn.properties.tolerances import housing_interference, shaft_interference
 
-    typed.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone))
-    typed.read("--housing", lambda zone: housing_interference(sizes.outside, zone))
+    sizes, rings = subject.sizes, subject.rings
+    typed.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone, rings.ring_class))
+    typed.read("--housing", lambda zone: housing_interference(sizes.outside, zone, rings.ring_class))
     refuse(typed.faults)
-    classes = typed["--shaft"], typed["--housing"]
-    where = " ".join(typed.listing("--shaft", "--housing"))
-    name = f"{where}: the usual seat of the other ring, of {sizes.bore:g} x {sizes.outside:g} mm"
-    return _or_fault(name, lambda: mounting_values(sizes, *classes, temperature))
+    shaft, housing = typed["--shaft"], typed["--housing"]
+    if shaft is None and housing is None and point.heat is None:
+        return {}
+    where = " ".join(typed.listing("--shaft", "--housing", *HEAT))
+    name = f"{where}: a usual seat of the rings, of {sizes.bore:g} x {sizes.outside:g} mm"
+    return _or_fault(name, lambda: mounting_values(sizes, rings, shaft, housing, point.temperature))
 
 
 def _catalogue_bearing(words: str, typed: "Typed") -> "Subject":
     """The bearing of a designation. Raises InputError with all faults at once."""
     from rbdyn.cli.new_drawing import OF_DRAWINGS, OWN
-    from rbdyn.cli.new_options import cage_material_of, clearance_of, guidance_of, kind_faults
+    from rbdyn.cli.new_options import HEAT, cage_material_of, clearance_of, guidance_of, kind_faults
     from rbdyn.cli.new_scene import catalogue_subject
     from rbdyn.properties.catalogue import ROLLERS, read_designation
 
@@ -191,7 +216,8 @@ def _catalogue_bearing(words: str, typed: "Typed") -> "Subject":
     _note_contradictions(named, typed, clearance)
     refuse(typed.faults)
     sizes = _or_fault(f"DESIGNATION {name}", lambda: _envelope(named, typed))
-    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, sizes, *cage))
+    mounted = bool(typed.listing("--shaft", "--housing", *HEAT))
+    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, sizes, *cage, mounted))
 
 
 def _note_contradictions(named: "Designation", typed: "Typed", clearance: str | float | None) -> None:
@@ -199,6 +225,13 @@ def _note_contradictions(named: "Designation", typed: "Typed", clearance: str | 
     from rbdyn.properties.catalogue import ANGULAR
 
     of_suffix, cage = named.value_of("clearance"), named.value_of("cage")
+    if named.value_of("bore") is not None:
+        if not isinstance(clearance, float):
+            typed.note(
+                f"DESIGNATION {named.name}: a tapered bore is driven up its seat; add --clearance in mm, as it is then"
+            )
+        if typed["--shaft"] is not None:
+            typed.fault("--shaft", "a tapered bore has no such seat; leave it out")
     angular = "an angular contact bearing has a contact angle instead; leave it out"
     if named.kind == ANGULAR and clearance is not None:
         typed.fault("--clearance", angular)

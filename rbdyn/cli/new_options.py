@@ -3,10 +3,13 @@
 import math
 import re
 from collections.abc import Callable, Mapping
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from rbdyn.base.command import comma_fault, plain_number
 from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line
+
+if TYPE_CHECKING:
+    from rbdyn.cli.new_scene import Heat
 
 Value = TypeVar("Value")
 # Limits of a number that is typed, and its unit.
@@ -15,6 +18,9 @@ LIMITS = {
     "--load": (0.0, 1e7, "N"),
     "--preload": (-1e8, 1e8, "N"),
     "--temperature": (-60.0, 220.0, "C"),
+    "--oil-flow": (1e-4, 1e3, "L/min"),
+    "--oil-inlet": (-60.0, 220.0, "C"),
+    "--ambient": (-60.0, 220.0, "C"),
     "--bore": (1.0, 2000.0, "mm"),
     "--outside": (2.0, 4000.0, "mm"),
     "--width": (0.5, 1000.0, "mm"),
@@ -33,6 +39,9 @@ OPTIONS_OF_KEYS = {
     "operation.radial_load_N": "--load",
     "operation.preload_N": "--preload",
     "lubricant.temperature_C": "--temperature",
+    "lubricant.oil_flow_l_min": "--oil-flow",
+    "lubricant.oil_inlet_temperature_C": "--oil-inlet",
+    "thermal.ambient_C": "--ambient",
     "bearing.radial_clearance_mm": "--clearance",
     "mounting.inner_interference_um": "--shaft",
     "mounting.outer_interference_um": "--housing",
@@ -49,6 +58,8 @@ ESTIMATED_KEYS = {
 }
 # Options of one kind of bearing, whatever names it.
 OF_ROLLERS, OF_BALLS = ("--guidance", "--cage-material", "--lubrication"), ("--preload",)
+# Options that write [thermal].
+HEAT = "--oil-flow", "--oil-inlet", "--ambient"
 SLOWEST_RPM = 0.1
 # A fault of a key of the scene: source, key, value, what is wrong.
 KEYED = re.compile(r"[^=]*: ([\w.]+) = [^:]*: (.*)")
@@ -199,7 +210,7 @@ def supply_of(typed: Typed) -> str:
     from rbdyn.scene.lubricant import SUPPLIES
 
     oil, text = typed.read("--oil", oil_named), typed["--lubrication"]
-    usual = "grease" if oil is not None and oil.grease else "bath"
+    usual = "grease" if oil is not None and oil.grease else "bath" if typed["--oil-flow"] is None else "jet"
     if text is None:
         return usual
     supply, name = text.strip().lower().replace("-", "_"), typed.words("--oil")
@@ -212,9 +223,34 @@ def supply_of(typed: Typed) -> str:
     return supply
 
 
+def heat_of(typed: Typed) -> "Heat | None":
+    """The heat balance that the options ask for, its contradictions noted; None without one of them."""
+    from rbdyn.cli.new_scene import Heat
+
+    if not typed.listing(*HEAT):
+        return None
+    heat = Heat(*(typed.number(option) for option in HEAT))
+    flow, inlet = typed["--oil-flow"], typed["--oil-inlet"]
+    if flow is None and inlet is not None:
+        typed.fault("--oil-inlet", "has no effect without a flow; add --oil-flow in L/min, as 0.4, or leave it out")
+    if flow is not None and inlet is None:
+        typed.fault("--oil-flow", "needs the temperature at which the oil flows in; add --oil-inlet in C, as 60")
+    if typed["--temperature"] is not None:
+        typed.fault("--temperature", f"{' '.join(typed.listing(*HEAT))} computes the temperatures; leave it out")
+    supply = supply_of(typed)
+    if flow is not None and supply == "grease":
+        typed.fault("--oil-flow", "contradicts a grease, which does not flow; leave one out")
+    if flow is None and supply == "jet":
+        typed.fault("--lubrication", "with --ambient it needs --oil-flow in L/min and --oil-inlet in C; add them")
+    return heat
+
+
 def kind_faults(typed: Typed, rollers: bool) -> None:
     """Note options that this kind of bearing has no use for, and a shaft that stands still or an oil that contradicts its supply."""
-    alien, kind = (OF_BALLS, "ball") if rollers else (OF_ROLLERS, "cylindrical roller")
+    alien: tuple[str, ...] = OF_BALLS if rollers else OF_ROLLERS
+    kind = "ball" if rollers else "cylindrical roller"
+    if typed.listing(*HEAT):
+        alien = tuple(option for option in alien if option != "--lubrication")
     for words in typed.listing(*alien):
         typed.note(f"{words}: is one of {kind} bearings; leave it out")
     speed = typed.number("--speed")

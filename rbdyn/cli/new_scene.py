@@ -40,41 +40,65 @@ USUAL_SHAFT, USUAL_HOUSING = "k5", "H7"
 HOUSING_SHARE, INNER_RISE = 1.5, 7.5
 # By how much of the inner ring's rise above its drawing, at 20 C, the shaft stays below it: 0.10 to 0.15 (NSK).
 SHAFT_LAG, DRAWING = 0.125, 20.0
+DRIVEN_UP = Interference(0.0, 0.0, 0.0, 0.0, 0.0)
+# Values of a bearing that is not mounted, and what only a mounted one has.
+LOOSE = ("loose_bore", "loose_outside")
 NONE = dict.fromkeys(
-    ("shaft_by", "housing_by", "mounted_bore", "mounted_outside", "mounted_width", "housing_diameter", "inner_temperature", "shaft_temperature",
-     "outer_temperature", "inner_interference", "inner_fit_by", "outer_interference", "outer_fit_by", "inner_law", "outer_law")
+    ("shaft_by", "rings_by", "housing_by", "mounted_bore", "mounted_outside", "mounted_width", "housing_diameter", "inner_temperature", "shaft_temperature",
+     "outer_temperature", "temperatures_by", "inner_interference", "inner_fit_by", "outer_interference", "outer_fit_by", "inner_law",
+     "outer_law")
 )  # fmt: skip
 
 
-def mounting_values(sizes: Envelope, shaft: str | None, housing: str | None, temperature: float) -> dict[str, Any]:
-    """Values of the templates for the classes of shaft and housing, and the temperature of the oil [C].
+class Rings(NamedTuple):
+    """Rings as bought: class of ISO 492, what the scene says of it, and whether the bore is tapered, so driven up its seat."""
 
-    None of them where neither class is stated. Raises MethodError as ``shaft_interference``.
+    ring_class: str = "Normal"
+    words: str = "bearing of normal tolerances (ISO 492)"
+    tapered: bool = False
+
+
+def mounting_values(
+    sizes: Envelope, rings: Rings, shaft: str | None, housing: str | None, temperature: float | None
+) -> dict[str, Any]:
+    """Values of the templates for the classes of shaft and housing, the usual one where one is None.
+
+    A tapered bore has no interference: its clearance is stated as driven up. ``temperature``: of the oil [C], None where a heat balance computes it and those of the parts. Raises MethodError as
+    ``shaft_interference``.
     """
-    loose: dict[str, Any] = {"loose_bore": sizes.bore, "loose_outside": sizes.outside, "estimated_mounting": ""}
-    if shaft is None and housing is None:
-        return {**NONE, **loose}
-    inner = shaft_interference(sizes.bore, shaft or USUAL_SHAFT)
-    outer = housing_interference(sizes.outside, housing or USUAL_HOUSING)
-    warm = temperature + INNER_RISE
+    inner = DRIVEN_UP if rings.tapered else shaft_interference(sizes.bore, shaft or USUAL_SHAFT, rings.ring_class)
+    outer = housing_interference(sizes.outside, housing or USUAL_HOUSING, rings.ring_class)
+    seat = "tapered shaft" if rings.tapered else f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}"
     return {
-        **dict.fromkeys(loose),
-        "estimated_mounting": ',\n    "mounting.inner_ring_temperature_C"',
-        "shaft_by": f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}",
+        **dict.fromkeys(LOOSE),
+        **_assumed_temperatures(temperature),
+        "shaft_by": seat,
+        "rings_by": rings.words,
         "housing_by": f"housing {housing or f'{USUAL_HOUSING} (not stated, usual)'}",
         "mounted_bore": sizes.bore,
         "mounted_width": sizes.width,
         "mounted_outside": sizes.outside,
         "housing_diameter": round(HOUSING_SHARE * sizes.outside, 1),
-        "outer_temperature": temperature,
-        "inner_temperature": warm,
-        "shaft_temperature": round(warm - SHAFT_LAG * (warm - DRAWING), 1),
         "inner_interference": round(inner.mean, 2) + 0.0,
-        "inner_fit_by": _reason(inner),
+        "inner_fit_by": "in the clearance, which is that of the bearing driven up" if rings.tapered else _reason(inner),
         "inner_law": _law(inner),
         "outer_interference": round(outer.mean, 2) + 0.0,
         "outer_fit_by": _reason(outer),
         "outer_law": _law(outer),
+    }
+
+
+def _assumed_temperatures(oil: float | None) -> dict[str, Any]:
+    """Temperatures of the parts of a bearing whose oil has a temperature [C]; none of them where a heat balance computes them."""
+    if oil is None:
+        return {}
+    warm = oil + INNER_RISE
+    return {
+        "estimated_mounting": ',\n    "mounting.inner_ring_temperature_C"',
+        "temperatures_by": "assumed",
+        "outer_temperature": oil,
+        "inner_temperature": warm,
+        "shaft_temperature": round(warm - SHAFT_LAG * (warm - DRAWING), 1),
     }
 
 
@@ -120,6 +144,8 @@ SUPPLY_WORDS = {
 HALF_LOADED = 1.216
 # Reference speed times pitch diameter of ball bearings, as usual in catalogues, within 20 % [mm/min].
 BALL_SPEEDS = {"deep_groove_ball": 1.0e6, "angular_contact_ball": 6.3e5}
+# Temperature around a bearing by ISO 15312 [C].
+AMBIENT_C = 20.0
 # Of the reference speed and of C, where the user gives nothing.
 USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 
@@ -145,16 +171,30 @@ class CageKind(NamedTuple):
         return f"{self.material_by}: {self.material}; {self.guidance_by}: {guides}"
 
 
+class Heat(NamedTuple):
+    """What cools a bearing: flow [L/min] and inlet temperature [C] of its oil, both None without a flow, and the temperature
+    around it [C], None where it is left to this module."""
+
+    flow: float | None
+    inlet: float | None
+    ambient: float | None
+
+
 class OperatingPoint(NamedTuple):
-    """What the user asks for; None where it is left to this module. ``clearance``: a class of ISO 5753-1, or diametral [mm]."""
+    """What the user asks for; None where it is left to this module. ``clearance``: a class of ISO 5753-1, or diametral [mm].
+
+    ``temperature`` of the oil [C]: None with ``heat``, which computes it. ``supply_stated``: by an option or by a grease.
+    """
 
     speed: float | None
     load: float | None
     preload: float | None
     oil: NamedOil
-    temperature: float
+    temperature: float | None
     clearance: str | float
     supply: str = "bath"
+    supply_stated: bool = True
+    heat: Heat | None = None
 
 
 class Subject(NamedTuple):
@@ -177,6 +217,7 @@ class Subject(NamedTuple):
     cage: CageKind | None = None
     grooves: tuple[float, float] | None = None
     clearance: str | None = None
+    rings: Rings = Rings()
 
     @property
     def width_known(self) -> bool:
@@ -185,11 +226,14 @@ class Subject(NamedTuple):
 
 
 def catalogue_subject(
-    named: Designation, sizes: Envelope, guidance: str | None = None, material: str | None = None
+    named: Designation, sizes: Envelope, guidance: str | None = None, material: str | None = None, mounted: bool = False
 ) -> Subject:
     """A bearing by its designation; guidance and cage material as stated, else of its suffix. Raises MethodError for
     impossible dimensions.
     """
+    stated, listed = named.value_of("tolerance"), named.ring_class
+    alike = "" if stated in (None, listed) else f", diameters as of {listed}"
+    words = Rings().words if listed == "Normal" else f"bearing of class {stated}{alike} (ISO 492)"
     rollers = named.kind == ROLLERS
     return Subject(
         kind=named.kind,
@@ -201,9 +245,10 @@ def catalogue_subject(
         series=named.series,
         # Sizes that are typed are those of no listed bearing.
         designation=named.name if rollers and sizes.reference_speed is not None else None,
-        without_effect=named.without_effect or None,
+        without_effect=named.without_effect(mounted) or None,
         cage=cage_kind(named.value_of("cage"), guidance, material) if rollers else None,
         clearance=named.value_of("clearance"),
+        rings=Rings(listed, words, named.value_of("bore") is not None),
     )
 
 
@@ -272,10 +317,8 @@ def roller_values(subject: Subject, point: OperatingPoint) -> Values:
         **_estimated(subject, inside),
         "capacity_share": by_iso / (listed or by_iso),
         "designation": None if subject.designation is None else json.dumps(subject.designation),
-        "supply": json.dumps(point.supply),
-        "supply_by": SUPPLY_WORDS[point.supply],
         "inlet_distance": None if flooded else INLET_DISTANCE,
-        "oil_fraction": SCARCE_FRACTION if scarce else OIL_FRACTION,
+        "oil_fraction": None if common["oil_flow"] else SCARCE_FRACTION if scarce else OIL_FRACTION,
         "oil_fraction_by": "0.001 to 0.02 where little oil enters" if scarce else "0.005 to 0.1",
     }
 
@@ -284,8 +327,12 @@ def _estimated(subject: Subject, inside: RollerInterior) -> Values:
     """Keys named in [uncertain] where they are estimates: not the bars between rollers that are counted, nor an effective length
     whose documented range is longer than the roller.
     """
+    sources = {"roller_diameter_mm": inside.roller_diameter_by, "pitch_diameter_mm": inside.pitch_diameter_by}
     short = LONGEST_EFFECTIVE * inside.effective_length <= inside.roller_length
     return {
+        "estimated_sizes": "".join(
+            f'"bearing.{key}", ' for key, source in sources.items() if source.startswith("estimated")
+        ),
         "estimated_length": '"bearing.effective_length_mm", ' if short else "",
         "estimated_bar": '"cage.bar_width_mm", ' if subject.boundary is None else "",
     }
@@ -367,7 +414,27 @@ def _common(subject: Subject, point: OperatingPoint, reference: float, capacity:
         "load": load,
         "load_by": "assumed: " if point.load is None else "",
         "load_share": load / capacity,
-        **mounting_values(sizes, None, None, point.temperature),
+        **NONE,
+        **dict(zip(LOOSE, (sizes.bore, sizes.outside), strict=True)),
+        "estimated_mounting": "",
+        **_oil_supply(point, subject.kind),
+    }
+
+
+def _oil_supply(point: OperatingPoint, kind: str) -> Values:
+    """How oil gets to a bearing, and what a heat balance knows of its surroundings; balls need the supply for their heat only."""
+    heat = point.heat or Heat(None, None, None)
+    unknown = [] if heat.flow else ["lubricant.oil_fraction"]
+    unknown += [] if point.heat else ["lubricant.temperature_C"]
+    ambient = AMBIENT_C if heat.ambient is None else heat.ambient
+    return {
+        "supply": json.dumps(point.supply) if kind == ROLLERS or point.heat else None,
+        "supply_by": f"{'' if point.supply_stated else 'assumed: '}{SUPPLY_WORDS[point.supply]}",
+        "oil_flow": heat.flow,
+        "oil_inlet": heat.inlet,
+        "estimated_oil": "".join(f'"{key}", ' for key in unknown),
+        "ambient": ambient if point.heat else None,
+        "ambient_by": "; assumed, as of ISO 15312" if heat.ambient is None else "",
     }
 
 

@@ -350,22 +350,24 @@ def traction_surface(
     """Table of ``coefficient(slip, load)``, refined until its error is below ``tolerance`` of the largest value.
 
     ``coefficient`` takes arrays of slip [m/s] > 0 and load [N] that broadcast, and is positive, linear in the slip
-    near rest. Below ``smallest_load`` and above the largest load and slip the coefficient soon becomes constant. A kink of the
-    coefficient may keep the error above the tolerance, so check it. Raises ValueError for a coefficient that is not positive and
+    near rest. Below ``smallest_load`` and above the largest load and slip the coefficient soon becomes constant. A kink or a step of
+    the coefficient may keep the error above the tolerance, so check it. A node next to a step has a slope far too large, so the
+    best table counts, not the finest. Raises ValueError for a coefficient that is not positive and
     finite, and for loads in the wrong order.
     """
     if not 0.0 < smallest_load < largest_load < math.inf:
         raise ValueError(f"loads from {smallest_load:g} to {largest_load:g} N must be positive and rise")
     scale = _speed_scale(coefficient, largest_load, largest_slip)
-    slips, loads = FEWEST_CELLS, FEWEST_CELLS
+    slips, loads, best = FEWEST_CELLS, FEWEST_CELLS, None
     while True:
         grid = _Grid(coefficient, scale, largest_slip, (smallest_load, largest_load), (slips, loads))
         cells = _polynomials(grid.nodes())
         along, across = (grid.error(cells, *shift) for shift in ((0.5, 0.0), (0.0, 0.5)))
         error = max(along, across, grid.error(cells, 0.5, 0.5))
-        finest = max(slips, loads) >= MOST_CELLS
-        if error < tolerance or finest:
-            return SurfaceFit(grid.surface(cells), error)
+        if best is None or error < best.error:
+            best = SurfaceFit(grid.surface(cells), error)
+        if error < tolerance or max(slips, loads) >= MOST_CELLS:
+            return best
         slips, loads = _refined(slips, along, tolerance), _refined(loads, across, tolerance)
 
 

@@ -25,81 +25,100 @@ rounds too coarsely for their masses.
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rbdyn.base.faults import MethodError
 from rbdyn.properties import table
 
-SHAPE = re.compile(r"(NUP|NU|NJ|NF|N)?[ -]*(\d{2,5})?(.*)", re.IGNORECASE | re.ASCII)
+SHAPE = re.compile(r"(NUP|NU|NJ|NF|N)?((?:HC)?B(?=7)|S(?=7))?[ -]*(\d{2,5})?(.*)", re.IGNORECASE | re.ASCII)
 LONGEST = 100  # characters of a designation
-# Separators of suffixes; a class of clearance or tolerance may also follow another suffix directly, as in ZZC3.
-BETWEEN = re.compile(r"[\s/.,-]+")
-GLUED = re.compile(r"(.+)(C[0-9N]|P[0-9])")
+BETWEEN = re.compile(r"[\s/.,-]+")  # separators of suffixes, which may also follow each other directly, as in ZZC3
 ROLLERS, DEEP, ANGULAR = "cylindrical_roller", "deep_groove_ball", "angular_contact_ball"
 SERIES = {ROLLERS: ("10", "2", "22", "3", "23"), DEEP: ("618", "619", "60", "62", "63"),
           ANGULAR: ("718", "719", "70", "72", "73")}  # fmt: skip
-# Cages of cylindrical roller bearings: guidance and material.
+# Cages of cylindrical roller bearings: guidance and material. Behind M, M1, F, P and PH an A is for the outer ring, a B for the
+# inner one; NSK has W and T, NTN T2, G1 and L1, Timken MA.
+STEMS = {"M": "brass", "M1": "brass", "F": "aisi_4340", "P": "polyamide", "PH": "peek"}
 CAGES = {
-    "MA": ("outer", "brass"), "MAS": ("outer", "brass"), "ML": ("outer", "brass"), "MB": ("inner", "brass"),
-    "M": ("roller", "brass"), "M1": ("roller", "brass"), "J": ("roller", "aisi_4340"), "F": ("roller", "aisi_4340"),
-    "FA": ("outer", "aisi_4340"), "P": ("roller", "polyamide"), "TN": ("roller", "polyamide"),
-    "TN9": ("roller", "polyamide"), "TVP": ("roller", "polyamide"), "TVP2": ("roller", "polyamide"),
-    "PH": ("roller", "peek"), "PHA": ("outer", "peek"),
+    **{f"{stem}{mark}": (guide, name) for stem, name in STEMS.items()
+       for mark, guide in (("", "roller"), ("A", "outer"), ("B", "inner"))},
+    "MAS": ("outer", "brass"), "MPA": ("outer", "brass"), "MP1A": ("outer", "brass"), "ML": ("outer", "brass"), "MR": ("roller", "brass"), "G1": ("roller", "brass"), "L1": ("roller", "brass"),
+    **dict.fromkeys(("J", "W"), ("roller", "aisi_4340")),
+    **dict.fromkeys(("TN", "TN9", "TVP", "TVP2", "TVP3", "T", "T2", "T2X"), ("roller", "polyamide")),
 }  # fmt: skip
-BALL_CAGES = ("M", "MA", "MB", "J", "JP", "F", "Y", "P", "PH", "T", "TN", "TN9", "TNH", "TVP", "TVP2", "TVH", "MP")
-# Contact angles [deg].
-ANGLES = {"AC": 25.0, "A5": 25.0, "A": 30.0, "B": 40.0, "C": 15.0}
+BALL_CAGES = ("M", "MA", "MB", "J", "JP", "F", "Y", "P", "PH", "T", "TN", "TN9", "TNH", "TVP", "TVP2", "TVH", "MP", "TYN", "TR", "T1", "T1X",
+              "T2", "T85", "W")  # fmt: skip
+# Contact angles [deg]; E only behind the prefix B.
+ANGLES = {"AC": 25.0, "A5": 25.0, "A": 30.0, "B": 40.0, "C": 15.0, "E": 25.0}
 # Groups of suffixes without effect in a scene, and the reason.
 WITHOUT_EFFECT = {
     "design": "internal design",
+    "generation": "generation of the design",
     "ball_cage": "cage, which an equilibrium does not need",
     "pairing": "for pairs, while a scene has one bearing",
     "seal": "seals or shields, whose friction is not modelled",
-    "tolerance": "tolerance class, while a scene has nominal sizes",
-    "heat_treatment": "rings stabilised for heat",
-    "snap_ring": "snap ring groove",
+    "heat_treatment": "rings treated or stabilised by heat",
+    "snap_ring": "snap ring groove or notches",
     "lubrication": "holes for oil",
+    "variant": "a maker's variant, whose sizes and clearance may differ",
+    "tolerance": "tolerance class, which counts with --shaft and --housing",
 }
-GROUPS = {"clearance": "clearance class", "cage": "cage", "angle": "contact angle", **WITHOUT_EFFECT}
+GROUPS = {
+    "clearance": "clearance class",
+    "cage": "cage",
+    "angle": "contact angle",
+    "bore": "tapered bore",
+    **WITHOUT_EFFECT,
+}
+# Groups of suffixes of bearings that a scene cannot represent, and the remedy.
+REFUSED = {
+    "range": "is a clearance range of its own; leave it out and write --clearance in mm",
+    "full": "is a bearing without a cage, which is not modelled; leave it out only if there is a cage",
+    "ceramic": "is a bearing with ceramic parts; leave it out and name the material in the table materials",
+    "set": "is a set of bearings; leave it out, for a scene has one bearing",
+    "grease": "is a grease; leave it out and name the grease with --oil",
+}
+# Classes of ISO 492 whose bore and outside diameter others share: those of spindle bearings by makers' tables (SKF, Schaeffler).
+RING_CLASSES = {"PN": "Normal", "P0": "Normal", "P6X": "Normal", "SP": "P5", "P4A": "P4", "P4C": "P4", "P4S": "P4"}
+# Classes that stand apart from what they follow directly; groups of a form that have another name.
+CLASSES = ("clearance", "tolerance")
+ALIASES = {
+    "ball_cage_later": "ball_cage", "pairing_later": "pairing", "pairing_last": "pairing",
+    "heat_later": "heat_treatment", "clearance_later": "clearance", "clearance_number": "clearance",
+}  # fmt: skip
 
 
-def _one_of(words: tuple[str, ...] | dict[str, object]) -> str:
+def _one_of(words: Iterable[str]) -> str:
     return "|".join(sorted(words, key=len, reverse=True))
 
 
 BALL_CAGE = rf"(?P<ball_cage>{_one_of(BALL_CAGES)})?"
-SEAL = r"(?P<seal>2?RS[12HLR]?|[12]RSD|2?RZ|2?Z|ZZ|LL?[BHU]|DDU?|DU|VV)"
-COMMON = (
-    r"(?P<clearance>C[0-9]|CN)",
-    r"(?P<tolerance>P[024-6]|PN|P6X|P4[AS])",
-    r"(?P<tolerance>P[4-6])(?P<clearance_number>[2-5])",
-    r"(?P<heat_treatment>S[0-4N])",
-    r"(?P<snap_ring>NR?)",
-    r"(?P<lubrication>W20|W33X?)",
+LATER_CAGE = BALL_CAGE.replace("ball_cage", "ball_cage_later")
+SEAL = r"(?P<seal>[12]RSD|2?RS[12HLR]?|2?HRS|2?BRS|2?RZ|ZZ|2?Z|LL?[BHU]|DDU?|DU|VV)?"
+SNAP = r"(?P<snap_ring>NR?|N[12])?"
+CERAMIC, GREASE = r"(?P<ceramic>H[CN]\d?)?", r"(?P<grease>V?[LMHW]T\d*|LHT\d*|VT\d+|GJN|GE\d?|L138|L207|5[CK]|2AS)?"
+# Classes of clearance and tolerance in either order, sets and preloads, what follows them.
+RANGE = r"(?P<range>C[1-9N][HLMP]|C[MT]|CC\d?|C\d?NA)?"
+END = (
+    r"(?P<clearance>C[0-9]|CN)?"
+    r"(?:(?P<tolerance>P6X|P4[ASC]|P[024-6]|PN|SP|UP)(?P<clearance_number>(?<=[4-6])[2-5])?)?"
+    r"(?P<set>D[BFT]|T[BFT]T|TBT|QBC|QFC|DG[ABC]|Q?D[BFT]?R?|DUL?)?(?P<clearance_later>C[0-9]|CN)?"
 )
+TAIL = rf"(?P<heat_later>S[0-4N])?(?P<lubrication>W20|W33X?)?(?P<variant>V[A-Z]\d{{2,4}})?{GREASE}"
+PAIRING = r"G[ABCLMN]?|U[AOLMH]|SUL?"
+HEAT = r"(?P<heat_treatment>H[AB]\d|S[0-4N])?"
 FORMS = {
-    ROLLERS: (rf"(?P<design>EC|E)?(?P<cage>{_one_of(dict(CAGES))})?", *COMMON),
-    DEEP: (rf"(?P<design>E)?{BALL_CAGE}", SEAL, *COMMON),
-    ANGULAR: (
-        rf"(?P<angle>{_one_of(dict(ANGLES))})(?P<design>[DEB])?(?P<pairing>C[ABC]|G[ABC]?)?{BALL_CAGE}",
-        rf"{BALL_CAGE}", r"(?P<pairing>G[ABC]?|UL|SUL?)", SEAL, *COMMON,
-    ),
+    ROLLERS: rf"(?P<design>EC|EA|E)?(?P<generation>XL)?(?P<full>CV|V[HP]?)?(?P<bore>K30|K)?{SNAP}(?P<cage>{_one_of(CAGES)})?{CERAMIC}{HEAT}{RANGE}{END}{TAIL}",
+    DEEP: rf"(?P<generation>C|XL)|(?P<design>E)?{BALL_CAGE}{SEAL}{SNAP}{LATER_CAGE}{CERAMIC}{HEAT}{RANGE}{END}{TAIL}",
+    ANGULAR: rf"(?:(?P<angle>AC|A5|[ABC])(?P<design>[DEB]A?)?(?P<pairing>C[ABC]|G[ABC]?)?)?(?P<generation>XL)?{BALL_CAGE}{SEAL}{CERAMIC}"
+    rf"{HEAT}(?P<pairing_later>{PAIRING})?{END}(?P<pairing_last>[LMH]|{PAIRING})?{TAIL}",
 }  # fmt: skip
 KNOWN = {
-    ROLLERS: f"a cage ({', '.join(CAGES)}), EC, C2 to C5, P2 to P6, S0 to S4",
-    DEEP: "a cage (M, J, TN9), seals (2RS, 2Z), C2 to C5, P2 to P6, S0 to S4",
-    ANGULAR: f"an angle ({', '.join(ANGLES)}), seals (2RS), P2 to P6, S0 to S4",
+    ROLLERS: f"a cage ({', '.join(CAGES)}), EC, XL, K, C2 to C5, P4 to P6, S0 to S4",
+    DEEP: "a cage (M, J, TN9), seals (2RS, 2Z), C2 to C5, P4 to P6, S0 to S4",
+    ANGULAR: "an angle (AC, A5, A, B, C), seals (2RS), P4 to P6, S0 to S4",
 }
-# Suffixes of bearings that a scene cannot represent, and the remedy.
-REFUSED = (
-    (r"C[1-9N][HLMP]|C[MT]", "is a clearance range of its own; leave it out and put the clearance into the scene"),
-    (r"K|K30", "is a tapered bore, whose clearances are not listed; leave it out and put the clearance into the scene"),
-    (r"V|CV|VH|VP", "is a bearing without a cage, which is not modelled; leave it out only if there is a cage"),
-    (r"HC\d?|HN\d?", "is a bearing with ceramic parts; leave it out and name the material in the table materials"),
-    (r"D[BFT]|T[BFT]T|TBT|QBC|QFC|Q?D[BFT]?R?", "is a set of bearings; leave it out, for a scene has one bearing"),
-    (r"V?[LMHW]T\d*|LHT\d*|VT\d+|GJN|GE\d?", "is a grease; leave it out and name the grease with --oil"),
-)
 
 
 class Suffix(NamedTuple):
@@ -119,21 +138,28 @@ class Designation(NamedTuple):
     code: str
     words: tuple[str, ...] = ()
     suffixes: tuple[Suffix, ...] = ()
+    prefix: str = ""
 
     @property
     def name(self) -> str:
         """The designation as printed in catalogues."""
-        return " ".join(filter(None, (self.letters, self.series + self.code, *self.words)))
+        return " ".join(filter(None, (self.letters, self.prefix + self.series + self.code, *self.words)))
+
+    @property
+    def ring_class(self) -> str:
+        """Class of ISO 492 of bore and outside diameter, as ``tolerances.ring_limits`` names it where it is listed."""
+        stated = self.value_of("tolerance") or "PN"
+        return RING_CLASSES.get(stated, stated)
 
     @property
     def diameter_series(self) -> str:
         """Diameter series of ISO 15: "8", "9", "0", "2" or "3"."""
         return self.series[-1]
 
-    @property
-    def without_effect(self) -> str:
-        """Suffixes without effect in a scene, with reasons; empty without any."""
+    def without_effect(self, mounted: bool = False) -> str:
+        """Suffixes without effect in a scene, with reasons; empty without any. Tolerance classes have one where it is ``mounted``."""
         idle = [suffix for suffix in self.suffixes if suffix.group in WITHOUT_EFFECT]
+        idle = [suffix for suffix in idle if not (mounted and suffix.group == "tolerance")]
         return "; ".join(f"{suffix.value}, {WITHOUT_EFFECT[suffix.group]}" for suffix in idle)
 
     def value_of(self, group: str) -> str | None:
@@ -149,14 +175,19 @@ def read_designation(text: str) -> Designation:
     """
     plain = " ".join(text.split())
     shape = SHAPE.fullmatch(plain) if len(plain) <= LONGEST else None
-    letters, digits, rest = ((shape.group(k) or "").upper() for k in (1, 2, 3)) if shape else ("", "", "")
+    letters, prefix, digits, rest = ((shape.group(k) or "").upper() for k in (1, 2, 3, 4)) if shape else [""] * 4
     series, code = digits[:-2], digits[-2:]
+    if prefix.startswith("HC"):
+        raise MethodError(f"prefix {prefix} {REFUSED['ceramic']}")
     for kind, series_of_kind in SERIES.items():
         if bool(letters) == (kind == ROLLERS) and series in series_of_kind:
-            words = tuple(part for word in BETWEEN.split(rest) if word for part in _parts(word, kind))
-            suffixes = tuple(suffix for word in words for suffix in _read(word, kind))
+            form = FORMS[kind].replace("[ABC]", "[ABCE]", 1) if prefix == "B" else FORMS[kind]
+            read = [_read(word, kind, form) for word in BETWEEN.split(rest) if word]
+            suffixes = tuple(suffix for _, features in read for suffix in features)
+            suffixes += (Suffix("seal", prefix, prefix),) if prefix == "S" else ()
             _check(suffixes)
-            return Designation(kind, letters, series, code, words, suffixes)
+            words = tuple(part for parts, _ in read for part in parts)
+            return Designation(kind, letters, series, code, words, suffixes, prefix)
     raise MethodError(
         "is no designation known here; write NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210), a deep "
         "groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one of 70, 72, 73, 718, "
@@ -164,34 +195,32 @@ def read_designation(text: str) -> Designation:
     )
 
 
-def _parts(word: str, kind: str) -> list[str]:
-    """A suffix, and classes that follow it without a separator."""
-    rules = (*FORMS[kind], *(pattern for pattern, _ in REFUSED))
-    if (glued := GLUED.fullmatch(word)) is None or any(re.fullmatch(rule, word) for rule in rules):
-        return [word]
-    return [*_parts(glued[1], kind), glued[2]]
-
-
-def _read(word: str, kind: str) -> Iterator[Suffix]:
-    """Features of a suffix for a kind of bearing. Raises MethodError."""
-    for form in FORMS[kind]:
-        if match := re.fullmatch(form, word):
-            for group, value in match.groupdict().items():
-                if value is not None:
-                    numbered = group == "clearance_number"
-                    yield Suffix("clearance" if numbered else group, word, f"C{value}" if numbered else value)
-            return
-    for pattern, reason in REFUSED:
-        if re.fullmatch(pattern, word):
-            raise MethodError(f"suffix {word} {reason}")
-    raise MethodError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
+def _read(word: str, kind: str, form: str) -> tuple[list[str], list[Suffix]]:
+    """The parts of a suffix, classes apart from what they follow, and its features. Raises MethodError."""
+    match = re.fullmatch(form, word)
+    if match is None:
+        raise MethodError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
+    parts, features, joined = list[str](), list[Suffix](), False
+    for name, value in sorted(match.groupdict().items(), key=lambda item: match.start(item[0])):
+        if not value:
+            continue
+        group = ALIASES.get(name, name)
+        if group in REFUSED:
+            raise MethodError(f"suffix {value} {REFUSED[group]}")
+        features.append(Suffix(group, word, f"C{value}" if name == "clearance_number" else value))
+        if name == "clearance_number" or (joined and group not in CLASSES):
+            parts[-1] += value
+        else:
+            parts.append(value)
+        joined = group not in CLASSES
+    return parts, features
 
 
 def _check(suffixes: tuple[Suffix, ...]) -> None:
     """Raises MethodError for two suffixes of one group."""
     first: dict[str, Suffix] = {}
     for suffix in suffixes:
-        if (other := first.setdefault(suffix.group, suffix)) is not suffix:
+        if (other := first.setdefault(suffix.group, suffix)) is not suffix and suffix.group != "pairing":
             feature = GROUPS[suffix.group].partition(",")[0]
             raise MethodError(f"suffixes {other.text} and {suffix.text} both state the {feature}; leave one out")
 

@@ -175,22 +175,36 @@ class Interference(NamedTuple):
     smoothing: float
 
 
-def shaft_interference(bore_mm: float, zone: str) -> Interference:
-    """Interference of an inner ring on a shaft of a class such as "k5". Raises MethodError for an unlisted class or size."""
+def shaft_interference(bore_mm: float, zone: str, ring_class: str = "Normal") -> Interference:
+    """Interference of an inner ring of a class of ISO 492 on a shaft of a class such as "k5".
+
+    Raises MethodError for an unlisted class or size.
+    """
     if not SHAFT.fullmatch(zone):
         raise MethodError(
             'is no tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r, grade 4 to 7'
         )
-    return _interference(fit_limits(bore_mm, zone), ring_limits(bore_mm, "Normal bore"), SHAFT_SMOOTHING)
+    return _interference(fit_limits(bore_mm, zone), _bought_limits(bore_mm, ring_class, "bore"), SHAFT_SMOOTHING)
 
 
-def housing_interference(outside_mm: float, zone: str) -> Interference:
+def housing_interference(outside_mm: float, zone: str, ring_class: str = "Normal") -> Interference:
     """Interference of an outer ring in a housing of a class such as "H7". Raises MethodError as ``shaft_interference``."""
     if not HOUSING.fullmatch(zone):
         raise MethodError(
             'is no tolerance class of a housing such as "H7"; take G, H, J, JS, K, M, N or P, grade 5 to 8'
         )
-    return _interference(ring_limits(outside_mm, "Normal outside"), fit_limits(outside_mm, zone), HOUSING_SMOOTHING)
+    return _interference(
+        _bought_limits(outside_mm, ring_class, "outside"), fit_limits(outside_mm, zone), HOUSING_SMOOTHING
+    )
+
+
+def _bought_limits(nominal_mm: float, ring_class: str, surface: str) -> tuple[float, float]:
+    if ring_class not in CLASSES:
+        raise MethodError(f"rings of class {ring_class} are not listed here; choose one of {', '.join(CLASSES)}")
+    try:
+        return ring_limits(nominal_mm, f"{ring_class} {surface}")
+    except MethodError as error:
+        raise MethodError(f"{surface} of rings of class {ring_class} {error}") from None
 
 
 def _interference(inside: tuple[float, float], around: tuple[float, float], smoothing: float) -> Interference:

@@ -94,7 +94,9 @@ class Scene(SceneFile):
     support: Support | None = None
     """Flexible, damped support of the outer ring; without it the ring is fixed."""
     thermal: Thermal | None = None
-    """Heat balance that computes the temperatures; without it they are those of lubricant and mounting."""
+    """Heat balance that computes the temperatures; without it they are those of lubricant and mounting. Needs
+    [mounting] with bore, outside and housing diameter and the width of the rings, and no temperatures of parts; and lubricant.oil_flow_l_min
+    with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air or grease. rbdyn new --ambient 25 writes it all."""
     materials: Materials = Materials()
     """Material of each part."""
     traction: Traction = Traction()

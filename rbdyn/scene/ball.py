@@ -430,7 +430,9 @@ class BallScene(SceneFile):
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
     thermal: Thermal | None = None
-    """Heat balance that computes the temperatures of a single row; without it they are those of lubricant and mounting."""
+    """Heat balance that computes the temperatures of a single row; without it they are those of lubricant and mounting. Needs
+    [mounting] with bore, outside and housing diameter and the width of the rings, and no temperatures of parts; and lubricant.oil_flow_l_min
+    with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air or grease. rbdyn new --ambient 25 writes it all."""
 
     @model_validator(mode="before")
     @classmethod

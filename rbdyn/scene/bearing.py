@@ -1,11 +1,12 @@
 """Drawing of a roller bearing: bearing, cage with the section and stiffness of its bars, materials."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
 from rbdyn.base.faults import (
@@ -327,9 +328,16 @@ class CustomMaterial(Sparse):
     """Specific heat capacity, uncertain by 15 %. Default: 470, bearing steel; for an elastic modulus below 20 GPa 1500, a polymer."""
 
 
-MaterialName = Literal[
-    "bearing_steel", "m50", "silicon_nitride", "aisi_4340", "bronze", "aluminium_bronze", "brass", "titanium_6al4v",
-    "peek", "phenolic_cotton",
+def _in_any_case(value: Any) -> Any:
+    """A name as it is listed: "PEEK" and "Silicon nitride" as well."""
+    name = re.sub(r"[\s-]+", "_", value.strip().lower()) if isinstance(value, str) else value
+    return name if isinstance(name, str) and name in MATERIALS else value
+
+
+MaterialName = Annotated[
+    Literal["bearing_steel", "m50", "silicon_nitride", "aisi_4340", "bronze", "aluminium_bronze", "brass", "titanium_6al4v",
+            "peek", "phenolic_cotton"],
+    BeforeValidator(_in_any_case),
 ]  # fmt: skip
 
 

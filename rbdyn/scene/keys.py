@@ -77,9 +77,11 @@ def run(kinds: Mapping[str, type[BaseModel]], word: str | None, as_schema: bool,
 
 
 def matching(all_keys: list[Key], word: str | None) -> list[Key]:
-    """Keys with the word in name or description, in any case."""
+    """Keys with the word in name or description, in any case; of each file the table of that name comes first."""
     pattern = (word or "").lower()
-    return [key for key in all_keys if pattern in key.key.lower() or pattern in key.description.lower()]
+    found = [key for key in all_keys if pattern in key.key.lower() or pattern in key.description.lower()]
+    files = list(dict.fromkeys(key.file for key in found))
+    return sorted(found, key=lambda key: (files.index(key.file), not f"{key.key}.".startswith(f"{pattern}.")))
 
 
 def lines(key: Key) -> list[str]:

@@ -47,6 +47,8 @@ RUNS = (
     "numerics.companion=false",
 )
 LEFT_OUT = "left out"
+# Sizes that no input set varies, for all others follow from them; named as estimates they mark the parts made to them.
+MARKING = ("bearing.roller_diameter_mm", "bearing.pitch_diameter_mm")
 # Tables of a scene without any property of the bearing, so without unknown inputs.
 NO_INPUTS = ("numerics", "uncertain", "calibrate")
 # Reasons why ``set`` may not assign a key.
@@ -179,7 +181,8 @@ class Uncertain(Strict):
     """documented: keys at their default, or named in estimated, vary over their documented range where their law is active
     (rbdyn keys lists the ranges); none: only keys with a law here, or named in estimated, vary."""
     estimated: list[str] = []
-    """Keys of the scene whose stated values are estimates. They vary over their documented range, also with defaults = "none"."""
+    """Keys of the scene whose stated values are estimates. They vary over their documented range, also with defaults = "none".
+    bearing.roller_diameter_mm and bearing.pitch_diameter_mm do not vary: named here, they mark the parts that follow from them."""
     points: Annotated[int, Field(ge=16, le=4096)] = 128
     """Initial number of input sets, a power of two. More are added until the spread is accurate enough."""
     seed: Annotated[int, Field(ge=0)] = 1

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, refuse
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
-from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
+from rbdyn.scene.uncertain import LEFT_OUT, MARKING, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
 # Value of a key without an entry that follows from other keys, in its own unit.
 DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
@@ -69,7 +69,7 @@ def inputs_of(
     faults += [
         f'uncertain.estimated: "{key}" has no documented range; write "{key}" = {{law = ...}}'
         for key in uncertain.estimated
-        if key not in documented_keys
+        if key not in documented_keys and key not in MARKING
     ]
     faults += [f"uncertain: {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, keys)]
     refuse(f"{source}: {fault}" for fault in faults)

@@ -223,3 +223,18 @@ def test_keys_of_calibration_and_signals():
     names = {unit for columns in signals.KINDS.values() for column in columns for unit in column.split(" or ")}
     assert set(SignalFile.model_fields) == names
     assert "calibrate" not in json.loads(printed(doe_app, "--schema"))["$defs"]["StudyFile"]["properties"]
+
+
+def test_keys_of_a_table_begin_with_what_it_needs():
+    """Command line: the table that a word names comes before the keys that only mention it."""
+    lines = printed(rbdyn_app, "thermal").splitlines()
+    assert lines[:3] == ["roller bearing", "==============", "thermal: a table, may be left out"]
+    assert "Needs [mounting] with bore" in " ".join(lines[3:8]) and lines[8].startswith("thermal.ambient_C: ")
+
+
+@pytest.mark.parametrize("name", ["PEEK", "peek", " Peek", "Silicon nitride", "aisi-4340"])
+def test_materials_in_any_case(name):
+    """Unit: a scene takes the name of a material in any case, and has it as it is listed."""
+    data = tomllib.loads((EXAMPLES / "cylindrical_roller.toml").read_text(encoding="utf-8"))
+    scene = Scene.from_dict({**data, "materials": {"cage": name}})
+    assert scene.materials.cage == name.strip().lower().replace(" ", "_").replace("-", "_")

@@ -85,6 +85,25 @@ def test_command_line_suffixes_and_grease(command):
     assert ball["bearing"]["radial_clearance_mm"] == 0.024 and "contact_angle_deg" not in ball["bearing"]
 
 
+def test_unit_ring_classes_enter_the_fits():
+    """Unit: a bearing of class P5 is 2 um narrower at 40 and 80 mm than a normal one; a tapered bore brings no interference."""
+
+    def written(*arguments):
+        ran = CliRunner().invoke(app, ["new", *arguments])
+        assert ran.exit_code == 0, ran.output
+        return ran.stdout, tomllib.loads(ran.stdout).get("mounting", {})
+
+    (_, normal), (text, fine) = written("NU2208", "--shaft", "k5"), written("NU2208/P5", "--shaft", "k5")
+    assert normal["inner_interference_um"] - fine["inner_interference_um"] == pytest.approx(2.0)
+    assert fine["outer_interference_um"] - normal["outer_interference_um"] == pytest.approx(2.0)
+    assert "bearing of class P5 (ISO 492)" in text and "Suffixes that change nothing" not in text
+    spindle, ball = written("7014 CD/P4A", "--shaft", "k5")
+    assert "class P4A, diameters as of P4" in spindle and ball["inner_interference_um"] == pytest.approx(10.25)
+    _, tapered = written("N1014-K-M1-SP", "--clearance", "0.01", "--housing", "K6")
+    assert tapered["inner_interference_um"] == 0.0
+    assert "P5, tolerance class, which counts with --shaft" in written("NU2208/P5")[0]
+
+
 def test_unit_fits_write_a_mounting():
     """Unit: classes of shaft and housing give interferences with their spread, warm rings, and clearances that they change."""
 
@@ -170,6 +189,12 @@ def test_command_line_lubrication(command, arguments, expected):
         (("NU210", "--bore", "50"), ["--outside, --width: missing; give all of"]),
         (("NU210", "--bore", "50", "--outside", "40", "--width", "10"), ["--bore 50: not below --outside 40"]),
         (("NU210", "--bore", "50", "--outside", "52", "--width", "10"), ["leaves no room for rings and rollers"]),
+        (("N1014-K-M1-SP",), ["N 1014 K M1 SP: a tapered bore is driven up its seat; add --clearance in mm"]),
+        (("NU210K", "--clearance", "0.01", "--shaft", "k5"), ["--shaft k5: a tapered bore has no such seat"]),
+        (
+            ("NU210P2", "--shaft", "k5"),
+            ["--shaft k5: rings of class P2 are not listed here; choose one of Normal, P6, P5"],
+        ),
         (("NU210 C1",), ["NU210 C1: C1 is no clearance class here; choose one of C2, CN, C3, C4, C5"]),
     ],
 )

@@ -185,7 +185,7 @@ def test_unit_boundary_of_unusual_drawings():
     thin = roller_boundary(RollerDrawing(200, 2.0, 2.0, 300.0), 295.0, None, None)
     assert thin.outside > 302.0
     balls = ball_boundary(BallDrawing(9, 8.0, 40.0, None), 20.0, None, None)
-    assert (balls.outside, balls.width) == (60.0, None) and "+-2 %" in balls.outside_by
+    assert (balls.outside, balls.width) == (60.0, 13.6) and "+-2 %" in balls.outside_by
 
 
 def test_command_line_comments_state_sources(command):
@@ -240,7 +240,7 @@ def test_invariant_a_drawing_gives_a_scene_or_names_an_option(
     pitch = around * diameter
     texts = dict.fromkeys(
         ("--rollers", "--roller", "--balls", "--ball", "--pitch", "--contact-angle", "--conformity", "--speed", "--load",
-         "--preload", "--oil", "--temperature", "--clearance", "--lubrication", "--guidance", "--cage-material", "--bore",
+         "--preload", "--oil", "--temperature", "--oil-flow", "--oil-inlet", "--ambient", "--clearance", "--lubrication", "--guidance", "--cage-material", "--bore",
          "--outside", "--width", "--shaft", "--housing")
     )  # fmt: skip
     texts |= {"--rollers": str(max(3, int(filling * math.pi * around))), "--pitch": f"{pitch:.4g}", "--oil": "VG 68"}
@@ -294,6 +294,6 @@ def test_command_line_own_balls_run_at_once(command, tmp_path, arguments):
 
 
 def test_unit_envelope_of_a_drawing():
-    """Unit: boundary dimensions without sources; balls need no width."""
+    """Unit: boundary dimensions without sources."""
     box = ball_boundary(BallDrawing(9, 8.0, 40.0, 15.0), None, None, 12.0)
     assert box.envelope == Envelope(box.bore, box.outside, 12.0) and box.width_by == "stated"

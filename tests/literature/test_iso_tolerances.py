@@ -37,6 +37,9 @@ def test_published_tolerance_classes(nominal, code, lower, upper):
         (27, "Normal bore", -10), (27, "P6 bore", -8), (27, "P5 bore", -6), (27, "P4 bore", -5),
         (60, "Normal outside", -13), (60, "P6 outside", -11), (60, "P5 outside", -9), (60, "P4 outside", -7),
         (150, "P5 bore", -13), (150, "P5 outside", -11), (151, "P5 outside", -13), (480, "Normal bore", -45),
+        # SKF's table of class P5, and Schaeffler's of spindle bearings, whose diameters are those of P4.
+        (90, "P5 bore", -10), (300, "P5 outside", -18), (450, "P5 bore", -28), (200, "P4 bore", -12), (160, "P4 outside", -10),
+        (240, "P4 outside", -11), (310, "P4 outside", -13), (390, "P4 outside", -15),
     ],
 )  # fmt: skip
 def test_published_ring_classes(nominal, code, lower):
@@ -106,7 +109,7 @@ def test_unlisted_classes_are_refused(nominal, code, words):
 
 @pytest.mark.parametrize(
     ("nominal", "code", "words"),
-    [(27, "P3 bore", "is no ring class"), (27, "P5 raceway", "is no ring class"), (200, "P4 bore", "0 to 180 mm")],
+    [(27, "P3 bore", "is no ring class"), (27, "P5 raceway", "is no ring class"), (260, "P4 bore", "0 to 250 mm")],
 )
 def test_unlisted_ring_classes_are_refused(nominal, code, words):
     with pytest.raises(ValueError, match=words):

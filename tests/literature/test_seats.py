@@ -55,6 +55,14 @@ def test_literature_housings_of_catalogues(outside, zone, lower, upper):
     assert fit.sd == pytest.approx(math.hypot(15.0, upper - lower) / 6.0)
 
 
+@pytest.mark.parametrize(("ring_class", "bore", "outside"), [("P6", 10.0, 11.0), ("P5", 8.0, 9.0), ("P4", 6.0, 7.0)])
+def test_literature_seats_of_finer_rings(ring_class, bore, outside):
+    """Literature: a 40 x 80 mm ring of class P6, P5 or P4 has a narrower bore and outside diameter (ISO 492) in the fit of k5 and H7."""
+    inner, outer = shaft_interference(40, "k5", ring_class), housing_interference(80, "H7", ring_class)
+    assert (inner.low + 1.75, inner.high + 1.75) == pytest.approx((2.0, 13.0 + bore))
+    assert (outer.low, outer.high) == pytest.approx((-30.0 - outside, 0.0))
+
+
 def test_unit_smoothing_takes_from_tight_fits_alone():
     """Unit: a ground shaft loses 1.75 um and a machined housing 6 um, a slack fit nothing, and none becomes loose by it."""
     assert shaft_interference(50, "k5") == pytest.approx(
@@ -77,6 +85,13 @@ def test_unit_smoothing_takes_from_tight_fits_alone():
         (shaft_interference, 50, "K5", 'such as "k5"'),
         (shaft_interference, 50, "j4", "j has the grades"),
         (shaft_interference, 600, "k5", "tables of ISO 286"),
+        (lambda bore, zone: shaft_interference(bore, zone, "P2"), 50, "k5", "rings of class P2 are not listed here"),
+        (
+            lambda bore, zone: shaft_interference(bore, zone, "P4"),
+            260,
+            "k5",
+            "bore of rings of class P4 is listed here from 0",
+        ),
         (housing_interference, 90, "h7", 'such as "H7"'),
         (housing_interference, 90, "S7", 'such as "H7"'),
         (housing_interference, 90, "J5", "J has the grades"),

@@ -27,7 +27,6 @@ UNKNOWN = (
     "SECRET",
     "C1",
     "C9",
-    "K",
     "V",
     "HC5",
     "DB",

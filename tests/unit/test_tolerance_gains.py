@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from chains import chain
 from conftest import EXAMPLE
 from pareto_cases import TOLERANCES, edited_study
 
+from doe.dimension_chain import solve
+from doe.report.sections.answer import first_screen
+from doe.report.sections.chain import chain_tables
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.front import draws_of
-from doe.workflow.parts import FINER, Part, SharedTolerance, grades_of
+from doe.workflow.parts import FINER, Part, SharedTolerance, clearance_parts, grade_of_parts, grades_of
 from doe.workflow.runs import Runs, design_of
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
+from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
+from rbdyn.scene.unknown import inputs_of
 
 # Impact falls by 20 % at guide -0.5, whirl by 10 % at pocket -0.5, loss by 0.6 % at radial -0.5 (coded): each by one factor.
 SLOPES = np.array([[0.0, 40.0, 0.0], [0.0, 0.0, 0.2], [1.2, 0.0, 0.0]])
 LEVELS = np.array([100.0, 1.0, 100.0])
 PICK = np.array([-0.5, -0.5, -0.5])
+RADIAL = "bearing.radial_clearance_mm"
 IMPACT, WHIRL, LOSS = "impact_force_N", "whirl_deviation_ratio", "power_loss_W"
 
 
@@ -151,15 +158,13 @@ def test_literature_grades_of_iso_286(size, width, grade):
 
 
 def test_unit_parts_share_a_tolerance():
-    """Unit: land and cage of 50 mm have IT6, 16 um each, of 32 um; a bought part takes its own first; squares add to more."""
+    """Unit: land and cage of 50 mm have IT6, 16 um each, of 32 um; a graded part takes its own first."""
     pair = (Part("land", 1.0, 50.0, "drawing"), Part("cage", -1.0, 49.8, "drawing"))
     assert SharedTolerance(pair).grade(0.032).as_dict() == {
         "grade": "IT6",
         "parts": {"land": {"nominal_mm": 50.0, "width_mm": 0.016}, "cage": {"nominal_mm": 49.8, "width_mm": 0.016}},
     }
     assert SharedTolerance(pair, (0.004,)).grade(0.032).name == "IT5"
-    assert SharedTolerance(pair, squares=True).grade(0.032).name == "IT6"
-    assert SharedTolerance(pair, squares=True).grade(0.036).name == "IT7"
 
 
 def test_unit_parts_are_those_of_the_chain_or_the_scene(tmp_path):
@@ -211,3 +216,72 @@ def test_unit_a_response_without_a_goal_has_no_gain(tmp_path):
         InputError, match=r"tolerances.gains = 'power_loss_W': goal = \"none\" has no gain; name one of impact"
     ):
         edited_study(tmp_path, watched, ("keep = 0.5", 'keep = 0.5\ngains = ["power_loss_W"]'))
+
+
+def test_unit_a_tolerance_has_the_grades_of_the_parts_to_make():
+    """Unit: slack goes to one of two raceways, whose grade then differs; the card and the table of parts state the same."""
+    sides = {"position": "symmetric"}
+    links = chain(
+        [(1.0, 85.0, sides), (-1.0, 75.0, sides)], (9.993, 10.007), method="iso286", grades=True, spend_slack=True
+    )
+    solved = solve(links)
+    grade = grade_of_parts(solved.parts)
+    # IT3 takes 6 + 5 um of 14, IT4 10 + 8: the smaller raceway may have the wider grade.
+    assert [part.grade for part in solved.parts] == ["IT3", "IT4"]
+    assert (grade.name, grade.place) == ("IT3 and IT4", 4) and grade.finer_than(4) and not grade.finer_than(3)
+    record = {
+        "asked": {
+            "factors": [{"letter": "A", "name": "radial_clearance_mm", "key": RADIAL, "centre": 10.0, "step": 0.1}]
+        },
+        "pick": {"radial_clearance_mm": 10.0},
+        "chains": {"radial": solved.as_dict()},
+        "made": {"radial_clearance_mm": {"half_width": 0.007, "grade": grade.name, "chain": "radial"}},
+        "tolerances": {"radial_clearance_mm": {"half_width": 0.0073, "grade": "IT3"}},
+        "duty": {
+            "points": [
+                {
+                    "name": name,
+                    "share": 0.5,
+                    "operating_clearances_mm": {"radial_clearance_mm": {"baseline": play, "pick": play - 1.0}},
+                }
+                for name, play in (("cruise", 9.95), ("take-off", 9.75))
+            ]
+        },
+        "operating_clearances_mm": {"radial_clearance_mm": {"baseline": 9.95, "pick": 8.95}},
+    }
+    screen = text(first_screen(record))
+    card = next(line for line in screen.splitlines() if line.strip().startswith("radial clearance"))
+    assert "± 0.0070 " in card and card.rstrip().endswith("IT3 and IT4") and " 8.750 " in card
+    assert "They are the least over the duty: at take-off." in screen
+
+
+def test_unit_estimates_of_a_scene_mark_its_parts():
+    """Unit: a land that no drawing states, and a pitch diameter named as an estimate, mark the parts that follow from them."""
+    tables = Scene.load(EXAMPLE)._tables
+    plain = clearance_parts(Scene.from_dict(tables))
+    marked = {name: [part.name for part in group.parts if part.estimated] for name, group in plain.items()}
+    assert marked == {
+        "radial_clearance_mm": [],
+        "guide_clearance_mm": ["guide_land", "cage_outside"],
+        "pocket_clearance_mm": [],
+    }
+    stated = {**tables, "cage": {**tables["cage"], "land_diameter_mm": 49.5}}
+    unsure = {**stated, "uncertain": {"estimated": ["bearing.pitch_diameter_mm"]}}
+    by_factor = clearance_parts(Scene.from_dict(unsure))
+    assert not any(part.estimated for part in by_factor["guide_clearance_mm"].parts)
+    assert [part.estimated for part in by_factor["radial_clearance_mm"].parts] == [True, True, False]
+    assert {"bearing.pitch_diameter_mm"}.isdisjoint(
+        one.key for one in inputs_of(Scene.from_dict(unsure), unsure, Scene.from_dict(unsure).uncertain)
+    )
+
+
+def test_unit_an_estimate_is_marked_on_drawing_table_and_report():
+    """Unit: of a link that says so, its size on the drawing begins with a mark, the CSV has it, and a sentence asks for the size."""
+    sides = {"position": "symmetric"}
+    solved = solve(chain([(1.0, 61.333, sides | {"estimated": True}), (-1.0, 61.0, sides)], (0.303, 0.363)))
+    first, second = solved.parts
+    assert first.text.startswith("≈ 61.333 ") and not second.text.startswith("≈")
+    rows = chain_tables({"guide": solved})["part_dimensions.csv"]
+    assert [row["estimated"] for row in rows] == [True, False]
+    shown = text(first_screen({"chains": {"guide": solved.as_dict()}}))
+    assert f"≈ estimated: {first.name} 61.333 mm; state it before the part is drawn." in shown

@@ -322,3 +322,13 @@ def test_oracle_smallest_traction(a, b, c, d):
     smallest = smallest_traction(a, b, c, d)
     assert smallest <= scanned + 1e-12
     assert smallest == pytest.approx(scanned, abs=1e-4)
+
+
+def test_unit_a_step_at_a_node_of_the_finest_table():
+    """Unit: a step of 0.4 % over the load costs half of that, also where a node's difference quotient straddles it."""
+    ends = math.sqrt(SMALLEST), math.sqrt(LARGEST)
+    step = (ends[0] + 97 / 192 * (ends[1] - ends[0])) ** 2
+    fit = traction_surface(
+        lambda slip, load: 0.05 * np.tanh(slip) * (1.0 + 4e-3 * (load > step)), LARGEST, SMALLEST, FASTEST
+    )
+    assert 1e-3 < fit.error < 4e-3

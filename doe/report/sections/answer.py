@@ -9,8 +9,8 @@ from string import ascii_uppercase
 from typing import Any
 
 from doe.clearance import TEMPERATURES
-from doe.report.sections.chain import grade_cell, refusal_blocks, yield_words
-from doe.report.sections.duty import at_points
+from doe.report.sections.chain import estimates_note, grade_cell, refusal_blocks, yield_words
+from doe.report.sections.duty import at_points, in_operation, least_words
 from doe.report.sections.record import (
     LIMITS,
     SENSES,
@@ -166,15 +166,21 @@ def _edge(summary: Record) -> str:
 def _parts_to_make(summary: Record) -> list[Block]:
     """Parts of every dimension chain, and what a refused one takes and needs; all else is in a section of its own."""
     chains = part(summary, "chains") or {}
+    parts = {name: sizes(chain, "parts") or sizes(chain) for name, chain in chains.items()}
     rows = [
         (label(name), label(chain_name), dimension(size), grade_cell(size), moved(size))
-        for chain_name, chain in chains.items()
-        for name, size in (sizes(chain, "parts") or sizes(chain)).items()
+        for chain_name, of_chain in parts.items()
+        for name, size in of_chain.items()
     ]
     header = ("part", "chain", "dimension [mm]", "grade", "moved [mm]")
     shares = (f"{label(name)}: {words}" for name, chain in chains.items() if (words := yield_words(chain)))
     table = Table("Parts to make", header, rows, "; ".join(shares), text_columns=(1, 3))
-    return [table, *(block for name, chain in chains.items() for block in refusal_blocks(name, chain))]
+    estimates = estimates_note({name: size for of_chain in parts.values() for name, size in of_chain.items()})
+    return [
+        table,
+        Paragraph(estimates, "warning"),
+        *(block for name, chain in chains.items() for block in refusal_blocks(name, chain)),
+    ]
 
 
 def _clearances(summary: Record) -> list[Block]:
@@ -185,6 +191,7 @@ def _clearances(summary: Record) -> list[Block]:
     meaning = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
     if meaning and part(summary, "operating_clearances_mm"):
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
+        meaning += least_words(summary)
     sentence = part(summary, "tolerances_sentence")
     return [
         Tiles("Chosen clearances", "pick", tiles),
@@ -242,24 +249,27 @@ def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
-    running = part(summary, "operating_clearances_mm", factor.name) or {}
     before = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors") or {}
     tolerance = tolerance_of(summary, factor)
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
         "baseline": factor.text(before.get(factor.name)),
-        "in operation": factor.text(running.get("pick")),
-        "baseline in operation": factor.text(running.get("baseline")),
+        "in operation": factor.text(in_operation(summary, factor, "pick")[0]),
+        "baseline in operation": factor.text(in_operation(summary, factor, "baseline")[0]),
     }
     entries = [entry for entry in further.items() if entry[1]]
-    grade = part(summary, "tolerances", factor.name, "grade")
+    grade = part(summary, "made", factor.name, "grade") or part(summary, "tolerances", factor.name, "grade")
     remarks = [("grade of the parts", grade)] if grade else []
     return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, entries, remarks)
 
 
 def tolerance_of(summary: Record, factor: Factor) -> float | None:
-    """Half-width of the tolerance of a factor: the widened one of the pick, else the one that the study states."""
-    return part(summary, "tolerances", factor.name, "half_width") or factor.tolerance
+    """Half-width of the tolerance of a factor: that its parts are made to, else the widened one of the pick, else as stated."""
+    return (
+        part(summary, "made", factor.name, "half_width")
+        or part(summary, "tolerances", factor.name, "half_width")
+        or factor.tolerance
+    )
 
 
 def gains_statement(summary: Record) -> str:

@@ -6,7 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from doe.dimension_chain import ChainResult
-from doe.dimension_chain.solution import ALLOCATED
+from doe.dimension_chain.links import ESTIMATED, size_text
+from doe.dimension_chain.solution import ALLOCATED, SOURCES
 from doe.report.sections.record import Record, dimension, moved, part, record_table, sizes
 from doe.report.still import COLOURS, FONT, Still, name_marks
 from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
@@ -92,7 +93,18 @@ def _sizes_table(title: str, rows: Mapping[str, Record]) -> Table:
         for name, row in rows.items()
     ]
     header = ("part", "size [mm]", "grade", "nominal moved [mm]", "deviations")
-    return Table(title, header, cells, text_columns=(2, 4)).without_empty_columns()
+    return Table(title, header, cells, estimates_note(rows), text_columns=(2, 4)).without_empty_columns()
+
+
+def estimates_note(rows: Mapping[str, Record]) -> str:
+    """'≈ estimated: guide land 61.333 mm; state it before the part is drawn.' of parts to make; empty without an estimate."""
+    names = [
+        f"{label(name)} {size_text(row['nominal_mm'], 0.0, 0.0).split()[0]} mm"
+        for name, row in rows.items()
+        if row.get("estimated")
+    ]
+    state = "it before the part is drawn" if len(names) == 1 else "them before the parts are drawn"
+    return f"{ESTIMATED} estimated: {', '.join(names)}; state {state}." if names else ""
 
 
 def grade_cell(row: Record) -> str:
@@ -305,11 +317,7 @@ def chain_tables(results: Mapping[str, ChainResult]) -> dict[str, list[dict[str,
     """Rows of part_dimensions.csv, the parts of all chains, and of contributions.csv, their shares in the scatter."""
     return {
         "part_dimensions.csv": [
-            {
-                "chain": name,
-                "part": part.name,
-                **{key: getattr(part, key) for key in (*ALLOCATED, "fit", "origin", "iso_class")},
-            }
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in (*ALLOCATED, *SOURCES)}}
             for name, chain in results.items()
             for part in chain.parts
             if part.origin != "temperature"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from doe.report.sections.record import (
     LIMITS,
     SIGNS_NOTE,
+    Factor,
     Record,
     change,
     factors,
@@ -316,3 +317,27 @@ def duty_rows(summary: Record) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def in_operation(summary: Record, factor: Factor, end: str) -> tuple[float | None, str]:
+    """Clearance in operation of the "pick" or the "baseline", over a duty the least, and the name of its point; without a duty none."""
+    points = {
+        point["name"]: part(point, OPERATING, factor.name, end) for point in part(summary, "duty", "points") or []
+    }
+    plays = {name: float(play) for name, play in points.items() if play is not None}
+    if not plays:
+        return part(summary, OPERATING, factor.name, end), ""
+    least = min(plays, key=plays.__getitem__)
+    return plays[least], least
+
+
+def least_words(summary: Record) -> str:
+    """' They are the least over the duty: at take-off.', with the factors at each point where these differ."""
+    at: dict[str, list[str]] = {}
+    for factor in factors(summary):
+        if point := in_operation(summary, factor, "pick")[1]:
+            at.setdefault(point, []).append(factor.words)
+    if not at:
+        return ""
+    where = [point if len(at) == 1 else f"{', '.join(names)} at {point}" for point, names in at.items()]
+    return f" They are the least over the duty: {'at ' if len(at) == 1 else ''}{'; '.join(where)}."
