@@ -98,10 +98,13 @@ def simulate(
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
         folder.claim(scene)
+        from rbdyn.dynamics.ensemble import plan_of, threads_of
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with command.progress_bar("simulating", quiet or as_json, workers) as progress:
-            result = run_scene(loaded, workers, progress, target=aim, notice=command.notice(quiet))
+        if (say := command.notice(quiet)) is not None and aim is None:
+            say(plan_of(loaded, threads_of(workers)))
+        with command.progress_bar("simulating", quiet or as_json) as progress:
+            result = run_scene(loaded, workers, progress, target=aim, notice=say)
         from rbdyn.cli import simulation_output
         from rbdyn.scene.thermal import simulated_scene
 
@@ -145,6 +148,7 @@ def accuracy(
         loaded = Scene.load(scene, assignments or [])
         name = studies.study_name(study, loaded)
         folder.claim(scene)
+        command.notice(quiet)
         with command.progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress)
         files = folder.write(partial(studies.write, report)) if out else []
@@ -214,7 +218,7 @@ def slip_map(
         marked = _map_duty(loaded, duty, *axes)
         folder.claim(scene)
         points = out / MAP_POINTS if out else None
-        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
+        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json) as progress:
             mapped = run_map(loaded, *axes, workers, progress, points, command.notice(quiet))
         swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
         inputs = [scene] if duty is None else [scene, duty]

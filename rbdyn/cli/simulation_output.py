@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
-from rbdyn.base.forecast import span
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends
 from rbdyn.result import SimulationResult
@@ -46,7 +45,7 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     result.save(folder / "result.json")
     save_table(result.table().reset_index(), folder / "figures.csv", "%.8g")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
-    motion = history(scene, turns, notice=None)  # the simulation has stated its pace
+    motion = history(scene, turns, notice=None)
     save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
@@ -95,16 +94,9 @@ def _run_sentence(result: SimulationResult) -> str:
     return (
         f"race loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
         f"balance closes to {100.0 * result.power_balance['relative_gap']:.2g} %; {counted(result.replicates, 'replicate')}, seed "
-        f"{result.seed}; {result.cost['wall_s']:.2f} s{_prediction(result.cost)}, {result.cost['compile_s']:.1f} s to "
+        f"{result.seed}; {result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to "
         "load or compile"
     )
-
-
-def _prediction(cost: dict[str, float]) -> str:
-    """Wall time as stated during the runs; empty where none was."""
-    if "predicted_most_s" not in cost:
-        return ""
-    return f" (predicted: {span(cost['predicted_least_s'], cost['predicted_most_s'])})"
 
 
 def _race_sentence(race: str, contact: dict[str, float]) -> str:

@@ -294,6 +294,7 @@ class EntryCache:
         try:
             return self.rebuild(context, *_payload(path.read_bytes(), self._key(signature, magic)))
         except FileNotFoundError:
+            _state_compiling()
             return None
         except Exception:  # a pickle may raise any
             _remove(path)
@@ -321,6 +322,12 @@ class EntryCache:
 
     def _key(self, signature: Any, magic: tuple[Any, ...]) -> tuple[Any, ...]:
         return self.name, self.stamp, signature, magic, WAY, VERSIONS
+
+
+@functools.cache
+def _state_compiling() -> None:
+    """State once in a process that something is compiled."""
+    logging.getLogger("rbdyn.compiled").info("Compiling ... (once; kept for later runs)")
 
 
 @functools.cache

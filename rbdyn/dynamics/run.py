@@ -148,7 +148,7 @@ class Run:
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
                 turned = float(self.carry.clock[NOW]) / self.scene.turn_s
-                self.pace.look(self.ticket, self.spent_s, turned, self.steps, budget)
+                self.pace.look(self.ticket, self.spent_s, turned)
             if status is Status.FINISHED:
                 return
             if status is not Status.STEP_BUDGET or self.steps >= budget:
