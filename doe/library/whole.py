@@ -16,7 +16,7 @@ from rbdyn.base.words import improvement, quantity
 
 # Patterns of the names of all files of a study.
 STUDY_FILES = (
-    "report.html", "report.md", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
+    "report.html", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
     "runs.csv", "front.csv", "confirmation.csv", "part_dimensions.csv", "duty_points.csv", "unknown_inputs.csv", "decides.csv",
     "beside_reference.csv", "surface_*.png", "pareto_front.png", "robust_front.png", "adaptive_search.png", "duty_gains.png",
     "cage_orbit.png", "pocket_forces.png",

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from doe.report.sections.record import Factor, Record, half_width, part
@@ -50,6 +51,14 @@ PARALLEL: dict[str, Any] = {
 }  # fmt: skip
 
 
+# Most pictures of pairs of responses: those of six goals.
+MOST_PAIRS = 15
+
+
+# Width of a picture with parallel axes for each of them [pt].
+AXIS_WIDTH = 96.0
+
+
 # Look of a limit of a response.
 LIMIT: dict[str, Any] = {"color": COLOURS["vermilion"], "linewidth": 1.6, "dashes": (4.4, 1.9)}
 
@@ -80,6 +89,16 @@ class Coordinate:
         """Where the value of a point is between the ends, 0 to 1."""
         low, high = self.ends
         return float((point[self.kind][self.name] - low) / (high - low))
+
+
+def drawn_pairs(goals: Sequence[str]) -> list[tuple[int, int]]:
+    """Places of the pairs of responses that are drawn, of goals; where there are fewer than two, limited ones follow.
+
+    A goal of "none" is that of a response that only has limits. There are never more than MOST_PAIRS.
+    """
+    aims = [place for place, goal in enumerate(goals) if goal != "none"]
+    limited = [place for place, goal in enumerate(goals) if goal == "none"]
+    return list(combinations(aims if len(aims) > 1 else [*aims, *limited], 2))[:MOST_PAIRS]
 
 
 def pair_still(
@@ -222,7 +241,8 @@ def parallel_still(
     axes = [Coordinate(kind, name, place, span((p[kind][name] for p in points), 0.02)) for kind, place, name in keys]
     words = f"Parallel coordinates of {len(points) - len(marks)} points of the front"
     both = {name: marks[name] for name in ("baseline", "pick") if name in marks}
-    still = Still(words, partial(_parallel, axes, sets, both), **PARALLEL)
+    look = PARALLEL | {"width": max(PARALLEL["width"], AXIS_WIDTH * len(axes))}
+    still = Still(words, partial(_parallel, axes, sets, both), **look)
     return replace(still, data={"front": _data("parallel", axes, still)})
 
 
