@@ -18,6 +18,7 @@ from pydantic import TypeAdapter
 from doe.running.store import Failure, Point, RunResult, Sound, Store
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.pace import NOTABLE_S, Notice, estimate
+from rbdyn.base.words import counted
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,12 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     return sorted(agendas, key=lambda pair: pair[0].begin)
 
 
+# Shortest time [s] that clocks tell apart.
+SHORTEST_S = 1e-6
+# Largest crowd: runs that take longer wait for something else than a processor.
+MOST_CROWD = 10.0
+
+
 @dataclass
 class AgendaKeeper:
     """Keeper of the agenda of a live process: it notes every change in the store at ``path``, once stages are planned.
@@ -219,6 +226,7 @@ class AgendaKeeper:
     _shorter_by: Sequence[str] = ()
     _steps_s: float = 0.0
     _estimated: bool = False
+    _why: str = ""
     _lock: threading.RLock = field(default_factory=threading.RLock)
     _began: float = field(default_factory=time.monotonic)
 
@@ -271,7 +279,10 @@ class AgendaKeeper:
         self._note()
 
     def counting(self, works: Mapping[str, float], progress: Progress) -> Progress:
-        """The same progress of runs with ``works`` by key, which also counts them in the stage under way."""
+        """The same progress of runs with ``works`` by key, which also counts them in the stage under way.
+
+        The time of more runs than planned is estimated anew.
+        """
         agenda, place = self.agenda, self.agenda.place
         if not agenda.stages:
             return progress
@@ -279,6 +290,8 @@ class AgendaKeeper:
         new_works = {key: work for key, work in works.items() if key not in stage_works}
         earlier_runs, repeats = stage.finished_runs, len(works) - len(new_works)
         stage_works.update(new_works)
+        if len(stage_works) > stage.runs:
+            self._estimated, self._why = False, f"{stage.name} goes on to {counted(len(stage_works), 'run')}: "
         stage.runs, stage.work = max(stage.runs, len(stage_works)), max(stage.work, sum(stage_works.values()))
         stage.announced_runs = len(stage_works)
 
@@ -302,18 +315,25 @@ class AgendaKeeper:
                 if outcome.result is not None and not self._estimated:
                     seconds = outcome.seconds - outcome.result.get("cost", {}).get("compile_s", 0.0)
                     running = len(self._store.running()) + 1 if cluster and self._store is not None else threads
-                    self._estimate(shared * max(seconds, 0.0) / works[point.key] / running)
+                    spent = shared * max(seconds, 0.0)
+                    crowd = spent / max(outcome.result.get("cost", {}).get("cpu_s", spent), SHORTEST_S)
+                    self._estimate(spent / works[point.key] / running, min(max(crowd, 1.0), MOST_CROWD))
 
             engine(points, replace(ledger, give=end))
 
         return run
 
-    def _estimate(self, pace_s: float) -> None:
-        """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence."""
+    def _estimate(self, pace_s: float, crowd: float) -> None:
+        """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence.
+
+        ``crowd``: wall time over processor time of a run; on a busy machine steps that are no runs take longer, too.
+        """
         self._estimated = True
-        rest_s = pace_s * sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :]) + self._steps_s
+        rest_s = (
+            pace_s * sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :]) + crowd * self._steps_s
+        )
         if self.notice is not None and rest_s >= NOTABLE_S:
-            self.notice(estimate(rest_s, self._shorter_by))
+            self.notice(f"{self._why}{estimate(rest_s, self._shorter_by)}")
 
     def finish(self, files: Sequence[str]) -> None:
         """Note that all files of the answer are written."""

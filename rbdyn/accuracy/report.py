@@ -13,6 +13,7 @@ from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.pace import NOTABLE_S, estimate
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted
+from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import LOOK_S, Reporter
 from rbdyn.result import versions, write_json
 
@@ -46,19 +47,23 @@ class Progress:
 
     def __init__(self, report: Reporter, works: Sequence[float]) -> None:
         self.report, self.total, self.count = report, len(works), 0
-        self.works, self.started, self.estimated = works, time.perf_counter(), False
+        self.works, self.started, self.estimated = works, self._now(), False
         LOGGER.info(counted(self.total, "step"))
 
     def step(self, *part: int) -> None:
         """Count one more step; the counts of a ``part`` itself do not matter."""
         self.count += 1
-        spent_s = time.perf_counter() - self.started
+        spent_s = self._now() - self.started
         rest_s = spent_s * sum(self.works[self.count :]) / sum(self.works[: self.count])
         if not self.estimated and spent_s >= LOOK_S and rest_s >= NOTABLE_S:
             self.estimated = True
             LOGGER.info(estimate(rest_s, KEYS))
         if self.report is not None:
             self.report(self.count, self.total)
+
+    def _now(self) -> float:
+        """A clock [s] that stands still while something is compiled."""
+        return time.perf_counter() - COMPILING.seconds
 
     def over(self, items: Iterable[T]) -> Iterator[T]:
         """The items; each counts as a step when the next one is requested."""

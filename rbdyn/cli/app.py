@@ -26,7 +26,14 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
-SIMULATION_FILES = ("result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png")
+SIMULATION_FILES = (
+    "result.json",
+    "figures.csv",
+    "history.csv",
+    "roller_loads.png",
+    "cage_orbit.png",
+    "pocket_forces.png",
+)
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"
@@ -111,7 +118,7 @@ def simulate(
         loaded = simulated_scene(result)
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
-        blocks = partial(simulation_output.blocks, result)
+        blocks = partial(simulation_output.blocks, result, out)
         written = write_with_report(folder, identity, blocks, partial(simulation_output.write, loaded, result))
         detail = Detail.of(quiet, verbose)
         command.hand_over(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.links import size_text
-from doe.report.page import markdown_report
+from doe.report.page import html_report
 from doe.report.sections.chain import chain_blocks
 from rbdyn.base.terminal import text
 
@@ -122,7 +122,7 @@ def test_unit_rounding_inwards_uses_no_more_than_the_limits():
     result = solve(chain([(1, 9.2257), (-1, 9.0)], (0.2163, 0.2257), resolution_mm=STEP), samples=10)
     assert [part.text for part in result.allocation] == ["9.225 0/-0.004", "9.000 +0.004/0"]
     assert result.worst_case_mm == pytest.approx((0.217, 0.225))
-    report = markdown_report({"chains": {"pocket": result.as_dict()}})
+    report = html_report({"chains": {"pocket": result.as_dict()}})
     assert "9.225 0/-0.004" in report and "0047" not in report
 
 
