@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, with_error
+from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
 from rbdyn.dynamics.figure_names import POWERS
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -25,10 +25,10 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
     from rbdyn.compiled.kernel import compiler_notes
 
     figures = _figures(result)
+    costs = [(label(key), shown(float(value))) for key, value in result.cost.items()]
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
         _table(figures),
-        Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *_temperatures(result),
@@ -36,16 +36,18 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
         *_clearances(result),
         Paragraph(_life_sentence(result)),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
-        *_further(result),
+        *_losses(result),
         *notes(result.notes),
         *notes(compiler_notes(), Detail.ALL),
         _inputs(result),
+        Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
+        Table("Cost", ("", ""), costs, detail=Detail.ALL),
         Paragraph("" if folder is None else f"next: rbdyn show {folder} --animate"),
     ]
 
 
 def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, figures.csv, history.csv and pictures; returns the names of the files."""
+    """Write result.json, figures.csv, history.csv and pictures of loads and motion; returns the names of the files."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
@@ -55,9 +57,9 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     motion = history(scene, turns, notice=None)
     save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
+    plots.roller_loads(motion, folder / "roller_loads.png")
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    plots.roller_loads(motion, folder / "roller_loads.png")
     return ["result.json", "figures.csv", "history.csv", "roller_loads.png", "cage_orbit.png", "pocket_forces.png"]
 
 
@@ -135,7 +137,10 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     rows = [
         (
             PARTS[node],
-            figure.value_text,
+            # Where the inputs leave kelvins open, hundredths say nothing.
+            value_alone(figure.value, 0.5 * (ranges[node][-1] - ranges[node][0]))
+            if node in ranges
+            else figure.value_text,
             range_ends(ranges[node]) if node in ranges else "",
             "" if figure.statistical_error is None else _error(figure.statistical_error),
             "" if figure.numerical_error is None else _error(figure.numerical_error),
@@ -157,11 +162,17 @@ def _temperatures(result: SimulationResult) -> list[Block]:
 
 def _clearances(result: SimulationResult) -> list[Block]:
     """Each clearance from the drawing to operation, in a line; without a mounting only in a report."""
+    whole = result.clearance_um
+    plays = {"clearance": whole, "guide clearance": whole.get("guide"), "pocket clearance": whole.get("pocket")}
     sentences = []
-    for name, where in (("", "radial"), ("guide ", "guide"), ("pocket ", "pocket")):
-        if (play := result.clearance_um.get(where)) is not None:
-            parts = ", ".join(f"{part} {value:+.1f} µm" for part, value in play.items() if isinstance(value, float))
-            sentences.append(f"{name}clearance: {parts}")
+    for name, play in plays.items():
+        parts = [
+            f"{part.replace('_', ' ')} {value:+z.1f} µm"
+            for part, value in (play or {}).items()
+            if isinstance(value, float) and (value or part in ("drawn", "operating"))
+        ]
+        if parts:
+            sentences.append(f"{name}: {', '.join(parts)}")
     detail = Detail.LEAST if result.scene.get("mounting") else Detail.ALL
     return [Paragraph(sentence, detail=detail) for sentence in sentences]
 
@@ -205,8 +216,8 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
     )
 
 
-def _further(result: SimulationResult) -> list[Block]:
-    """Full detail: the transient, the losses one by one, the cost."""
+def _losses(result: SimulationResult) -> list[Block]:
+    """Full detail: the transient, and the losses by size with their sum."""
     parts = result.part_figures or {}
     errors = {loss: parts[name].stated_error for name, loss in POWERS.items() if name in parts}
     terms = sorted(((power, term) for term, power in result.power_terms_W.items() if power), reverse=True)
@@ -225,12 +236,6 @@ def _further(result: SimulationResult) -> list[Block]:
     return [
         Paragraph("" if turns is None else f"transient: {counted(turns, 'shaft turn')}", detail=Detail.ALL),
         Table(f"Power lost; the balance closes to {gap:.2g} W", ("term", "W", "share"), losses, detail=Detail.ALL),
-        Table(
-            "Cost",
-            ("", ""),
-            [(label(key), shown(float(value))) for key, value in result.cost.items()],
-            detail=Detail.ALL,
-        ),
     ]
 
 
