@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from doe.report import still
 from doe.report.sections.duty import gain_stills
-from doe.report.sections.front_pictures import drawn_pairs
+from doe.report.sections.front_pictures import drawn_pairs, near
 from doe.report.sections.record import Record, response_label
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
@@ -115,7 +115,8 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
             for x, simulated, face in ((prediction, "on the surfaces", color), (point.values, "simulated", "none")):
                 axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
         for draw, response in ((axis.axvline, i), (axis.axhline, j)):
-            for bound in _bounds(study, surfaces[response].name):
+            shown = [outcome.baseline.values[response], outcome.pick.values[response], *clouds[0][1][:, response]]
+            for bound in near(_bounds(study, surfaces[response].name), shown):
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label="limit")
         axis.set_xlabel(_label(study, surfaces[i].name))
         axis.set_ylabel(_label(study, surfaces[j].name))

@@ -70,7 +70,7 @@ def test_a_whole_study_has_the_same_figures_as_its_sections():
     assert set(of_terminal(tree[0])) <= set(answer)
     assert set(answer) <= {*of_terminal(tree[0]), *of_terminal(tree[-1])}
     assert set(answer) <= set(numbers(terminal.text(blocks(record()))))
-    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in body.replace("\xa0", " ")
+    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in body.replace("&nbsp;", " ")
 
 
 def test_no_key_stands_in_what_people_read():

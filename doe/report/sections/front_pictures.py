@@ -101,6 +101,13 @@ def drawn_pairs(goals: Sequence[str]) -> list[tuple[int, int]]:
     return list(combinations(aims if len(aims) > 1 else [*aims, *limited], 2))[:MOST_PAIRS]
 
 
+def near(bounds: Iterable[float], values: Iterable[float]) -> list[float]:
+    """Limits no farther from the values than these are from each other; a farther one would leave no room for the front."""
+    finite = [value for value in values if math.isfinite(value)] or [0.0]
+    low, high = min(finite), max(finite)
+    return [bound for bound in bounds if 2.0 * low - high <= bound <= 2.0 * high - low]
+
+
 def pair_still(
     one: tuple[int, str],
     two: tuple[int, str],
@@ -109,17 +116,18 @@ def pair_still(
     confirmed: Mapping[str, Record],
     limits: Mapping[str, Sequence[float]],
 ) -> Still:
-    """The fronts over two responses, given as place and name, with their limits and with what simulation confirmed."""
+    """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
     simulated = {
         name: pair for name, point in confirmed.items() if (pair := _simulated(point, one[1], two[1])) is not None
     }
     points = [*marks.values(), *(point for front in sets for point in front.points)]
-    axes = []
+    axes, drawn = [], dict[str, list[float]]()
     for along, (place, name) in enumerate((one, two)):
         values = [point["responses"][name] for point in points] + [pair[0][along] for pair in simulated.values()]
-        axes.append(Coordinate("responses", name, place, span([*values, *limits.get(name, ())])))
+        drawn[name] = near(limits.get(name, ()), values)
+        axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
     words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
-    still = Still(words, partial(_pair, axes, sets, marks, simulated, limits))
+    still = Still(words, partial(_pair, axes, sets, marks, simulated, drawn))
     return replace(still, data={"front": _data("pair", axes, still)})
 
 
