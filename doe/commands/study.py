@@ -23,6 +23,7 @@ from doe.running.runner import count_of
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
 from rbdyn.base.command import FAILED, Force, Json, Workers, folder_option, guarded, hand_over, notice, print_json
 from rbdyn.base.faults import InputError
+from rbdyn.base.pace import duration
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted
 
@@ -109,7 +110,7 @@ def status_blocks(record: Mapping[str, Any]) -> list[Block]:
     store = record["store"]
     other = ", ".join(f"{number} {state}" for state, number in record["other"].items() if number)
     rows = [
-        (run["label"], run["host"], str(run["pid"]), run["since"], _duration(run["for_s"])) for run in record["running"]
+        (run["label"], run["host"], str(run["pid"]), run["since"], duration(run["for_s"])) for run in record["running"]
     ]
     causes = [f"Failed: {', '.join(group['labels'])}: {group['cause']}" for group in record["failures"]]
     return [
@@ -156,13 +157,4 @@ def _step(step: Mapping[str, Any]) -> str:
 def _runs_left(record: Mapping[str, Any]) -> str:
     """The time that runs took, and the runs that are left."""
     left = count_of((record["runs_left"][0], record["runs_left"][1]))
-    return f"Time spent {_duration(record['spent_s'])} of one thread" + (
-        "" if left == "0" else f"; runs to come {left}"
-    )
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+    return f"Time spent {duration(record['spent_s'])} of one thread" + ("" if left == "0" else f"; runs to come {left}")
