@@ -23,7 +23,6 @@ from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, read_toml, refuse
-from rbdyn.base.forecast import Measured
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.result import TEMPERATURES, SimulationResult
@@ -37,12 +36,9 @@ if TYPE_CHECKING:
 
 
 # Receiver of the key of a run under way, its finished share and the time [s] of that; None without a receiver.
-Hear = Callable[[str, float, float], None] | None
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
 WHOLE = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
-# Short states of a heat balance at least: two of the search, and two for the gain of its loop.
-SHORT_STATES = 4
 # Offsets of seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
 INPUT_SEEDS = 3_000_000
@@ -294,16 +290,13 @@ class Simulations:
         points, scenes = points_of(runs, labels, factors), every_scene(runs)
         if self.scheduler is None:
             by_key = dict(zip((point.key for point in points), scenes, strict=True))
-            engine: Engine = partial(
-                _in_threads, by_key, self.workers, None if self.agenda is None else self.agenda.hear
-            )
+            engine: Engine = partial(_in_threads, by_key, self.workers)
         else:
             texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
             engine = partial(_on_cluster, texts, self.scheduler)
         if self.agenda is not None:
             works = {point.key: work_of(scene) for point, scene in zip(points, scenes, strict=True)}
-            growth = max((scene.numerics.extend_limit for scene in scenes if scene.extends), default=1.0)
-            engine = self.agenda.timed(engine, works, growth, self.scheduler is not None)
+            engine = self.agenda.timed(engine, works, self.scheduler is not None)
             progress = self.agenda.counting(works, progress)
         outcomes = run_points(points, self.store, engine, progress, sound, self.retry)
         results = [_result(point, outcomes[point.key]) for point in points]
@@ -324,14 +317,14 @@ def every_scene(runs: Sequence[Run]) -> list[Scene]:
 
 def work_of(scene: Scene) -> float:
     """Least shaft turns of a run of a scene, with those of its companions and of the short states of a heat balance."""
-    numerics = scene.numerics
-    work = (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
+    from rbdyn.dynamics.ensemble import in_turn
+
+    work = in_turn(scene)
     if scene.thermal is None:
         return work
-    from rbdyn.dynamics.temperatures import short
+    from rbdyn.dynamics.temperatures import short_turns
 
-    few = short(scene).numerics
-    return work + SHORT_STATES * few.replicates * (few.warm_up_turns + few.turns)
+    return work + short_turns(scene)[0]
 
 
 def _first_state(scene: Scene) -> Scene:
@@ -339,37 +332,6 @@ def _first_state(scene: Scene) -> Scene:
     if scene.thermal is None:
         return scene
     return at_temperatures(scene, Temperatures(*[scene.lubricant.temperature_C] * len(Temperatures._fields)))
-
-
-# Shaft turns of a probe at most, the part between two looks at the clock, and the time [s] after which it ends.
-PROBE_TURNS, PROBE_PART, PROBE_S = 4.0, 0.25, 0.5
-
-
-def probe(scene: Scene) -> Measured:
-    """Pace of a scene's runs by its first shaft turns, which are run for it and not kept.
-
-    A heat balance is at the temperatures at which it begins; unknown if the bearing is impossible there. Raises RunError.
-    """
-    from rbdyn.dynamics.ensemble import Stop
-    from rbdyn.dynamics.parameters.model import roller_bearing
-    from rbdyn.dynamics.run import Run, prepare
-
-    try:
-        scene = _first_state(scene)
-    except InputError:
-        return Measured()
-    bearing = roller_bearing(scene)
-    prepare(scene, bearing)
-    run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
-    turns, started = 0.0, time.perf_counter()
-    while turns < PROBE_TURNS and time.perf_counter() - started < PROBE_S:
-        turns += PROBE_PART
-        if scene.pulse_samples_per_turn:
-            run.walls(
-                turns - PROBE_PART, scene.pulse_samples_per_turn, round(PROBE_PART * scene.pulse_samples_per_turn)
-            )
-        run.to(turns)
-    return Measured().plus(turns, time.perf_counter() - started)
 
 
 def points_of(
@@ -402,13 +364,8 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
     return SimulationResult.from_dict(outcome)
 
 
-def _in_threads(
-    scenes: Mapping[str, Scene], workers: int | None, hear: Hear, points: Sequence[Point], ledger: Ledger
-) -> None:
-    """Engine of this process: the thread of a point notes its begin and stores its outcome.
-
-    ``hear`` gets the finished share of each point under way.
-    """
+def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], ledger: Ledger) -> None:
+    """Engine of this process: the thread of a point notes its begin and stores its outcome."""
     from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
@@ -417,7 +374,7 @@ def _in_threads(
 
     def run(point: Point, inside: int) -> RunOutcome:
         ledger.begin(point)
-        outcome = attempt(scenes[point.key], stop, inside, None if hear is None else partial(_heard, hear, point.key))
+        outcome = attempt(scenes[point.key], stop, inside)
         ledger.keep(point, outcome)
         return outcome
 
@@ -454,30 +411,17 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     )
 
 
-def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, count: int, total: int) -> None:
-    hear(key, count / total, seconds)
-
-
-def attempt(
-    scene: Scene, stop: "Stop | None" = None, workers: int = 1, heard: Callable[[float, int, int], None] | None = None
-) -> RunOutcome:
+def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> RunOutcome:
     """Simulate a scene in ``workers`` threads; any fault of it is the cause of a failure, and so is a bearing without steady
     temperatures or too hot.
-
-    ``heard(seconds, done, total)`` is called at the end of each replicate.
     """
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
 
     start_s = time.perf_counter()
     result, cause = None, None
-
-    def progress(count: int, total: int) -> None:
-        if heard is not None:
-            heard(time.perf_counter() - start_s, count, total)
-
     try:
-        outcome = simulate(scene, workers, progress, stop, notice=None)
+        outcome = simulate(scene, workers, None, stop, notice=None)
         cause = heat_fault(outcome)
         result = None if cause else outcome.as_dict()
     except (CancelledError, MemoryError, OSError):

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
-from rbdyn.base.forecast import Notice, named, part_of
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, merged
+from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import Brief, Figure, counted, quantity
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, full_status

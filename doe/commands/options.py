@@ -10,7 +10,7 @@ import typer
 from rbdyn.base.command import checkpoint_message, flag, folder_option, progress_bar, valued
 
 if TYPE_CHECKING:
-    from doe.running.runner import Agenda, Progress
+    from doe.running.runner import Progress
 
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
@@ -51,8 +51,8 @@ def keeping_runs(out: Path | None) -> Iterator[None]:
 
 
 @contextmanager
-def bars(quiet: bool, workers: int | None) -> "Iterator[Callable[[str, int, int], None]]":
-    """``progress(stage, done, total)`` on a terminal, one bar at a time for which it has room; ``workers`` run at once."""
+def bars(quiet: bool) -> "Iterator[Callable[[str, int, int], None]]":
+    """``progress(stage, done, total)`` on a terminal, one bar at a time for which it has room."""
     with ExitStack() as stack:
         stage, last = "", 0
         bar: Progress | None = None
@@ -61,16 +61,8 @@ def bars(quiet: bool, workers: int | None) -> "Iterator[Callable[[str, int, int]
             nonlocal stage, last, bar
             if bar is None or title != stage or done < last:
                 stack.close()
-                bar = stack.enter_context(progress_bar(title, quiet, workers))
+                bar = stack.enter_context(progress_bar(title, quiet))
             stage, last = title, done
             bar(done, total)
 
         yield progress
-
-
-def print_predicted(agenda: "Agenda | None", as_json: bool) -> None:
-    """Print the time of a command compared with the prediction, if there was one."""
-    from rbdyn.base.forecast import duration, span
-
-    if agenda is not None and not as_json and agenda.prediction_s is not None and agenda.took_s is not None:
-        print(f"The whole command took {duration(agenda.took_s)}; predicted were {span(*agenda.prediction_s)}")

@@ -69,7 +69,7 @@ def fit(
     with guarded(as_json), keeping_runs(out):
         from doe.library.steps import fit
 
-        with bars(quiet or as_json, workers) as progress:
+        with bars(quiet or as_json) as progress:
             answer = fit(
                 path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress, force
             )
@@ -104,7 +104,7 @@ def front(
     with guarded(as_json), keeping_runs(out):
         from doe.library.steps import front
 
-        with bars(quiet or as_json, workers) as progress:
+        with bars(quiet or as_json) as progress:
             answer = front(path, data, out, point, workers, scheduler, retry, progress, force)
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)

@@ -18,12 +18,12 @@ from doe.commands.options import (
     Verbose,
     bars,
     keeping_runs,
-    print_predicted,
 )
+from doe.running.runner import count_of
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
 from rbdyn.base.command import FAILED, Force, Json, Workers, folder_option, guarded, hand_over, notice, print_json
 from rbdyn.base.faults import InputError
-from rbdyn.base.forecast import duration, span
+from rbdyn.base.pace import duration
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted
 
@@ -49,7 +49,7 @@ def study(
     with guarded(as_json), keeping_runs(folder):
         from doe.library.whole import study
 
-        with bars(quiet or as_json, workers) as progress:
+        with bars(quiet or as_json) as progress:
             answer = study(path, folder, adaptive, robust, workers, scheduler, retry, progress, notice(quiet), force)
         record = answer.as_dict()
         if not as_json:
@@ -66,7 +66,6 @@ def _print(answer: "StudyAnswer", detail: Detail) -> None:
         return
     cost = answer["cost"]
     print(f"{cost['total_s']:.1f} s, of which design runs {cost['design_s']:.1f} s")
-    print_predicted(answer.agenda, as_json=False)
     print(f"written to {answer.folder}: {files}")
 
 
@@ -96,7 +95,7 @@ def status(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Show where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
+    """Show where a study stands: its stage, runs done, failed by cause, running and to come."""
     with guarded(as_json):
         from doe.workflow.status import status_of
 
@@ -111,7 +110,7 @@ def status_blocks(record: Mapping[str, Any]) -> list[Block]:
     store = record["store"]
     other = ", ".join(f"{number} {state}" for state, number in record["other"].items() if number)
     rows = [
-        (run["label"], run["host"], str(run["pid"]), run["since"], _duration(run["for_s"])) for run in record["running"]
+        (run["label"], run["host"], str(run["pid"]), run["since"], duration(run["for_s"])) for run in record["running"]
     ]
     causes = [f"Failed: {', '.join(group['labels'])}: {group['cause']}" for group in record["failures"]]
     return [
@@ -119,8 +118,7 @@ def status_blocks(record: Mapping[str, Any]) -> list[Block]:
         Paragraph(f"Read from {store}" if Path(store).exists() else f"Nothing has run yet in {store}", "small"),
         Paragraph(_steps(record)),
         Paragraph(f"Stopped by: {record['stopped_by']}" if record["stopped_by"] else ""),
-        Paragraph(_time(record)),
-        Paragraph(_prediction(record)),
+        Paragraph(_runs_left(record)),
         Paragraph(f"Other runs: {other}" if other else "", detail=Detail.USUAL),
         Table("Running", ("", "host", "process", "since", "for"), rows, detail=Detail.USUAL),
         Bullets(causes, detail=Detail.USUAL),
@@ -133,7 +131,9 @@ def _counts(record: Mapping[str, Any]) -> str:
     if stage:
         state = f"running, in stage {stage}" if state == "running" else f"{state}, ended in stage {stage}"
     runs = "design points" if any(step["name"] == "design runs" for step in record["stages"]) else "runs"
-    counts = ", ".join(f"{points[outcome]} {outcome}" for outcome in ("done", "failed", "running", "missing"))
+    counts = (
+        ", ".join(f"{points[key]} {key}" for key in ("done", "failed", "running")) + f", {points['missing']} to come"
+    )
     return f"{record['study']}: {state}; of {points['total']} {runs} {counts}"
 
 
@@ -151,34 +151,10 @@ def _step(step: Mapping[str, Any]) -> str:
     if not most:
         return name if step["state"] == "to come" else f"{name} running"
     fewest = max(runs, count)
-    return f"{name} {count} of {fewest} to {most}" if most > fewest else f"{name} {count} of {fewest}"
+    return f"{name} {count} of {count_of((fewest, most))}"
 
 
-def _time(record: Mapping[str, Any]) -> str:
-    """The time that runs took, the runs that are left, and the time that these take."""
-    left_s, (fewest, most) = record["left_s"], record["runs_left"]
-    parts = [f"Time spent {_duration(record['spent_s'])} of one thread"]
-    if most > 0:
-        parts.append(f"runs left {fewest} to {most}" if fewest < most else f"runs left {most}")
-    if left_s is None:
-        parts.append("time left not known yet")
-    elif left_s:
-        parts.append(f"time left {_duration(left_s)} ({span(*record['left_range_s'])})")
-    else:
-        parts.append(f"time left {_duration(left_s)}")
-    return "; ".join(parts)
-
-
-def _prediction(record: Mapping[str, Any]) -> str:
-    """What was predicted for the last command, and what it took; empty without a prediction."""
-    if record["predicted_s"] is None:
-        return ""
-    prediction = f"Predicted for the last command from its start: {span(*record['predicted_s'])}"
-    return prediction if record["took_s"] is None else f"{prediction}; it took {duration(record['took_s'])}"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+def _runs_left(record: Mapping[str, Any]) -> str:
+    """The time that runs took, and the runs that are left."""
+    left = count_of((record["runs_left"][0], record["runs_left"][1]))
+    return f"Time spent {duration(record['spent_s'])} of one thread" + ("" if left == "0" else f"; runs to come {left}")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Quiet, Retry, Scheduler, bars, keeping_runs, print_predicted
+from doe.commands.options import Quiet, Retry, Scheduler, bars, keeping_runs
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import Force, Json, Set, Workers, folder_option, guarded, hand_over, notice, valued
 from rbdyn.base.terminal import show
@@ -48,7 +48,7 @@ def uncertainty(
         from doe.library.unknown import uncertainty
         from rbdyn.dynamics.target import target_of
 
-        with bars(quiet or as_json, workers) as progress:
+        with bars(quiet or as_json) as progress:
             answer = uncertainty(
                 path,
                 points,
@@ -91,7 +91,7 @@ def calibrate(
     with guarded(as_json), keeping_runs(folder):
         from doe.library.unknown import calibrate
 
-        with bars(quiet or as_json, workers) as progress:
+        with bars(quiet or as_json) as progress:
             answer = calibrate(
                 path,
                 data,
@@ -109,7 +109,6 @@ def calibrate(
 
 
 def _hand_over(answer: "Answer", as_json: bool, quiet: bool) -> None:
-    """Print the answer with the names of its files, and its time compared with the prediction."""
+    """Print the answer with the names of its files."""
     detail = Detail.of(quiet)
     hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
-    print_predicted(answer.agenda, as_json)

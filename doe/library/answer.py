@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from doe.running.runner import Agenda
 from rbdyn.base import html, terminal
 from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, says
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
@@ -30,14 +29,12 @@ class Answer(Mapping[str, Any]):
     - ``tables``: tables of numbers by name; ``table(name)``: one of them as a pandas DataFrame, by default the first
     - ``print(answer)``: the text of the command; a notebook shows the same tree of blocks, later chapters folded
     - ``folder`` and ``files``: where the function wrote its files, None and none without ``out``
-    - ``agenda``: stages and times of the runs, None where none were planned
     - ``identity``: bearing, operating point, date and input files; None where the blocks begin with them
     """
 
     record: Mapping[str, Any]
     folder: Path | None = None
     files: tuple[str, ...] = ()
-    agenda: Agenda | None = None
     identity: Identity | None = field(default=None, kw_only=True)
 
     def blocks(self) -> list[Block]:

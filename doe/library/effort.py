@@ -11,7 +11,7 @@ from doe.running.store import StoppedError, Store, at_work
 from doe.workflow.runs import STORE
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line, path_of, refuse
 from rbdyn.base.folder import OutputFolder, output_folder
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.base.page import REPORT_FILES, with_report
 from rbdyn.result import write_json
 
@@ -28,7 +28,7 @@ Follow = Callable[[str, int, int], None] | None
 class Effort(NamedTuple):
     """How to run: ``workers`` threads (None: all processors) or the cluster of a ``scheduler``'s address.
 
-    ``retry``: repeat runs that failed before. ``follow`` hears of runs that end, ``notice`` of a long time to come.
+    ``retry``: repeat runs that failed before. ``follow`` hears of runs that end, ``notice`` of their number and time.
     """
 
     workers: int | None = None

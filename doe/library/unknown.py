@@ -12,7 +12,7 @@ from doe.library.effort import Effort, Follow, path_given, registered, texts_giv
 from rbdyn.base.blocks import Block
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
 from rbdyn.base.folder import output_folder
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.base.words import counted, quantity, shown
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def uncertainty(
     - ``target``: standard error of the ends of a range, as a fraction of its width
     - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
-    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs, then with their time
     - ``figures``: further outputs, such as ``["outer_max_pressure_MPa"]``
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
@@ -115,19 +115,19 @@ def uncertainty(
         inputs, runs = content_digest(path), runs_digest(path, assignments)
         output.claim(path)
         with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
-            agenda.plan(uncertainty_stages(path, assignments, points))
+            agenda.plan(uncertainty_stages(path, assignments, points), ("--points", *SHORTER), STEPS_S)
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_uncertainty(path, assignments, simulations, points, accuracy, outputs)
             agenda.enter(ANSWER)
             identity = scene_identity("doe uncertainty", path, assignments)
-            answer = UncertaintyAnswer(
-                uncertainty_record(result), folder, (), agenda.agenda, identity=identity, uncertainty=result
-            )
+            answer = UncertaintyAnswer(uncertainty_record(result), folder, (), identity=identity, uncertainty=result)
             files = write_with_report(output, identity, answer.blocks, partial(write_uncertainty, result))
             agenda.finish(files)
     return replace(answer, files=tuple(files))
 
 
+# What makes the runs of a scene shorter, and the typical time [s] of what is no run.
+SHORTER, STEPS_S = ("numerics.turns", "numerics.replicates"), 5.0
 UNCERTAINTY_FILES = ("uncertainty.json", "input_sets.csv", "ranges.csv", "shares.csv", "uncertainty.png")
 FEWEST_SETS, MOST_SETS = 16, 512
 
@@ -216,7 +216,7 @@ def calibrate(
     - ``out``: folder of the files and the store of runs, by default SCENE_calibration; a finished answer is read from there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
       and the answer
-    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs, then with their time
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
@@ -224,14 +224,7 @@ def calibrate(
     from doe.report.identity import scene_identity
     from doe.report.sections.calibration import FILES, RECORD, cost_of, files_of, record_of, stored, write
     from doe.running.runner import ANSWER
-    from doe.workflow.calibration import (
-        calibration_stages,
-        design_of,
-        find_calibration,
-        pace,
-        question_of,
-        read_question,
-    )
+    from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
@@ -248,18 +241,14 @@ def calibrate(
         output.claim(path)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
-            agenda.plan(calibration_stages(question))
-            predicted = None if scheduler else agenda.state_first(pace(question))
-            if notice is not None:
-                if predicted is None:
-                    notice(f"{agenda.agenda.runs_left[0]} to {counted(agenda.agenda.runs_left[1], 'run')} remain")
-                if doubt := design_of(question).doubt:
-                    notice(doubt)
+            agenda.plan(calibration_stages(question), ("the conditions of the table", *SHORTER), STEPS_S)
+            if notice is not None and (doubt := design_of(question).doubt):
+                notice(doubt)
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_calibration(question, simulations)
                 turns, took_s = simulations.turns, agenda.elapsed_s
             agenda.enter(ANSWER)
-            record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s, predicted)}
+            record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s)}
             output.write(lambda stage: write(result, record, stage, scene), last=RECORD)
             agenda.finish(files_of(record))
-    return CalibrationAnswer(record, folder, tuple(files_of(record)), agenda.agenda, identity=scene)
+    return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)

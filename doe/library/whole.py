@@ -11,12 +11,12 @@ from doe.library.effort import Effort, Follow, path_given, registered
 from doe.library.steps import fit_rows, part_rows, point_row
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.base.words import improvement, quantity
 
 # Patterns of the names of all files of a study.
 STUDY_FILES = (
-    "report.html", "report.md", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
+    "report.html", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
     "runs.csv", "front.csv", "confirmation.csv", "part_dimensions.csv", "duty_points.csv", "unknown_inputs.csv", "decides.csv",
     "beside_reference.csv", "surface_*.png", "pareto_front.png", "robust_front.png", "adaptive_search.png", "duty_gains.png",
     "cage_orbit.png", "pocket_forces.png",
@@ -140,7 +140,7 @@ def study(
     - ``adaptive``: also search the front in few runs, chosen by emulators; the pick is then on it
     - ``robust``: judge the pick over the unknown inputs of the scene; also done if any are declared
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
-    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called early with the time to come
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs, with their time,
       and with what no run can change
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
@@ -171,4 +171,4 @@ def study(
             outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
             record = output.write(partial(write, outcome), last="summary.json")
             agenda.finish(record["files"])
-    return StudyAnswer(record, folder, tuple(record["files"]), agenda.agenda)
+    return StudyAnswer(record, folder, tuple(record["files"]))

@@ -1,6 +1,6 @@
 """What a person sees of a study.
 
 - ``sections``: what is said of each subject, as JSON and as ``rbdyn.base.blocks``
-- ``page``: all sections as one HTML page, with its scripts and style in ``html``, and as Markdown
+- ``page``: all sections as one HTML page, with its scripts and style in ``html``
 - ``files``: all that a study writes; ``pictures``: its PNG files; ``still``: pictures for pages and files
 """

@@ -10,7 +10,7 @@ import numpy as np
 from doe import clearance
 from doe.duty import main_scene
 from doe.report.identity import study_identity
-from doe.report.page import html_report, markdown_report, notes, reference
+from doe.report.page import html_report, notes, reference
 from doe.report.sections.answer import (
     asked_record,
     changes,
@@ -99,11 +99,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         plots.duty_gains(record, folder / pictures[-1])
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
-    texts = {
-        "report.html": html_report(record, clearance.motion_record(motions)),
-        "report.md": markdown_report(record, pictures),
-        "answer.txt": answer_text(record),
-    }
+    texts = {"report.html": html_report(record, clearance.motion_record(motions)), "answer.txt": answer_text(record)}
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     write_workbook(folder / WORKBOOK, [folder / name for name in tables], Identity.from_dict(record["identity"]))

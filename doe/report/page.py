@@ -1,4 +1,4 @@
-"""A whole study as one HTML page that can be mailed, and the same answer and tables as Markdown.
+"""A whole study as one HTML page that can be mailed.
 
 The page fetches nothing, and all but the interactive pictures can be read without scripts and on paper. ``sections`` lists its
 chapters in the order in which they are read; what a record lacks is left out. The scripts and the controls are
@@ -31,7 +31,6 @@ from doe.report.sections.record import (
     response_label,
     responses,
 )
-from rbdyn.base import markdown
 from rbdyn.base.blocks import Block, Bullets, Note, Section, Table, Widget
 from rbdyn.base.identity import Identity
 from rbdyn.base.page import identity_section, page
@@ -67,12 +66,6 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
     return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS, "\n".join(scripts))
-
-
-def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
-    """Markdown of the record of ``doe study --json``; ``pictures`` are files next to it."""
-    record = drop_undefined(dict(summary))
-    return markdown.page(title(record), sections(record), pictures)
 
 
 def title(summary: Record) -> str:
@@ -280,8 +273,8 @@ def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
 
 
 CHAPTERS = (
-    identity,
     answer.answer,
+    identity,
     duty.duty,
     answer.settings,
     design.design,

@@ -1,7 +1,6 @@
 """Pictures of a study as PNG files: response surfaces, the search, the Pareto front, and the robust front."""
 
-from collections.abc import Iterator
-from itertools import combinations
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -14,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from doe.report import still
 from doe.report.sections.duty import gain_stills
+from doe.report.sections.front_pictures import drawn_pairs, near
 from doe.report.sections.record import Record, response_label
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
@@ -93,7 +93,7 @@ def duty_gains(record: Record, path: Path) -> None:
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
-    """Every pair of responses: the fronts, and baseline and pick both on the surfaces and simulated."""
+    """Pairs of goals: the fronts, and baseline and pick both on the surfaces and simulated."""
     study, surfaces = outcome.study, outcome.surfaces
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
     if outcome.front.tolerance_aware is not None:
@@ -102,7 +102,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
         search = outcome.adaptive.search
         clouds.append(("front predicted by emulators", search.predictions[search.representatives], "tab:olive"))
         clouds.append(("its points, simulated anew", outcome.adaptive.front.values, "tab:green"))
-    for axis, (i, j) in _pairs(len(surfaces), path, 6):
+    for axis, (i, j) in _pairs(drawn_pairs([response.goal for response in study.file.response]), path):
         for words, values, color in clouds:
             axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
         for words, point, marker, color in (
@@ -114,17 +114,17 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
             size = 13 if marker == "*" else 6
             for x, simulated, face in ((prediction, "on the surfaces", color), (point.values, "simulated", "none")):
                 axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
-        for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
-            for bound in _bounds(study, surfaces[response].name):
-                words = f"limit {_label(study, surfaces[response].name)} {bound:g}" if number == 0 else ""
-                draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
+        for draw, response in ((axis.axvline, i), (axis.axhline, j)):
+            shown = [outcome.baseline.values[response], outcome.pick.values[response], *clouds[0][1][:, response]]
+            for bound in near(_bounds(study, surfaces[response].name), shown):
+                draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label="limit")
         axis.set_xlabel(_label(study, surfaces[i].name))
         axis.set_ylabel(_label(study, surfaces[j].name))
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
     """Every pair of gains that hold over the unknown inputs: predicted along the front, and simulated."""
-    for axis, (i, j) in _pairs(len(responses), path, 2):
+    for axis, (i, j) in _pairs(drawn_pairs(["min"] * len(responses)), path):
         gains = 100.0 * front.gains
         axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="predicted by emulators")
         for (name, point), marker in zip(front.confirmed.items(), "*o^v", strict=False):
@@ -138,16 +138,19 @@ def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
         axis.set_ylabel(f"gain in {quantity(responses[j])[0]} [%]")
 
 
-def _pairs(count: int, path: Path, columns: int) -> Iterator[tuple[Axes, tuple[int, int]]]:
-    """Axes for every pair of so many responses to draw on, saved with one legend of so many ``columns`` in the end."""
-    pairs = list(combinations(range(count), 2))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
-    yield from zip(axes[0], pairs, strict=True)
-    for axis in axes[0]:
+def _pairs(pairs: Sequence[tuple[int, int]], path: Path) -> Iterator[tuple[Axes, tuple[int, int]]]:
+    """Axes for every pair of responses to draw on, COLUMNS in a row, saved with one legend in the end."""
+    columns = min(COLUMNS, max(len(pairs), 1))
+    rows = max(-(-len(pairs) // columns), 1)
+    figure, axes = plt.subplots(rows, columns, figsize=(5.0 * columns, 4.4 * rows), squeeze=False)
+    for axis in axes.flat[len(pairs) :]:
+        axis.set_axis_off()
+    yield from zip(axes.flat, pairs, strict=False)
+    for axis in axes.flat[: len(pairs)]:
         axis.grid(alpha=0.3)
     figure.tight_layout()
-    # Below the figure, where no point lies.
-    first = axes[0][0].get_legend_handles_labels()
-    figure.legend(*first, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=columns, fontsize=8)
+    # Below the figure, where no point lies; every mark once.
+    marks = {words: mark for axis in axes.flat for mark, words in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(marks.values(), marks, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=2 * columns, fontsize=8)
     figure.savefig(path, dpi=130, bbox_inches="tight")
     plt.close(figure)

@@ -1,6 +1,6 @@
 """Runs and their store; knows no bearing.
 
 - ``store``: finished runs and failures on disk, the lock of a store, and which study runs where
-- ``runner``: points on an engine, the agenda of a command with its stages, and the forecast of what is left
+- ``runner``: points on an engine, the agenda of a command with its stages, and the time of its runs
 - ``cluster``: the engine of a dask cluster
 """

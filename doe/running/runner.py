@@ -1,11 +1,10 @@
-"""Runs of points, and the agenda of a command: its stages, what its runs took, and what is left.
+"""Runs of points, and the agenda of a command: its stages, and how many of their runs are left.
 
 Results in the store are read; the other points run on an engine, and each is stored as it ends. A live process keeps its
-agenda as a note in the store, and states early how long the command will take.
+agenda as a note in the store. It states the number of runs before they start, and after the first how long the rest takes.
 """
 
 import json
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,7 +17,8 @@ from pydantic import TypeAdapter
 
 from doe.running.store import Failure, Point, RunResult, Sound, Store
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.forecast import Forecast, Measured, Notice
+from rbdyn.base.pace import NOTABLE_S, Notice, estimate
+from rbdyn.base.words import counted
 
 
 @dataclass(frozen=True)
@@ -95,18 +95,16 @@ def run_points(
 
 # Kind of the notes of agendas in a store.
 NOTE = "agenda "
-# The last stage of every command, and the typical wall time [s] of its files.
-ANSWER, ANSWER_S = "answer", 8.0
+# The last stage of every command.
+ANSWER = "answer"
 
 
 @dataclass
 class Stage:
-    """A stage of a command: its expected ``runs``, their ``work`` (shaft turns), and the finished part of both.
+    """A stage of a command: its expected ``runs``, their ``work`` (shaft turns), and how many have finished.
 
-    ``titles``: beginnings of the titles of its progress. ``besides_s``: wall time [s] apart from its runs. ``fewest``,
-    ``most``: runs at least and at most, None for ``runs``. ``announced_runs``: runs asked for so far. ``stored_runs``: runs
-    by an earlier process. ``since``: when it began [s since the epoch]. ``seconds``: time [s] of ``measured_work`` in this
-    process.
+    ``titles``: beginnings of the titles of its progress. ``fewest``, ``most``: runs at least and at most, None for ``runs``.
+    ``announced_runs``: runs asked for so far. ``stored_runs``: runs by an earlier process.
     """
 
     name: str
@@ -114,11 +112,6 @@ class Stage:
     runs: int = 0
     work: float = 0.0
     finished_runs: int = 0
-    finished_work: float = 0.0
-    besides_s: float = 0.0
-    since: float | None = None
-    seconds: float = 0.0
-    measured_work: float = 0.0
     fewest: int | None = None
     most: int | None = None
     announced_runs: int = 0
@@ -132,29 +125,30 @@ class Stage:
         return cls(name, titles or (name,), runs, runs * work, fewest=fewest, most=most)
 
     @property
-    def work_per_run(self) -> float:
-        """Work of a run."""
-        return self.work / self.runs if self.runs else 0.0
+    def past_runs(self) -> int:
+        """Finished runs, by this process or an earlier one."""
+        return max(self.finished_runs, self.stored_runs)
+
+    @property
+    def work_left(self) -> float:
+        """Expected work of the runs left."""
+        return self.work * (1.0 - self.past_runs / self.runs) if self.runs > self.past_runs else 0.0
 
     @property
     def runs_left(self) -> tuple[int, int]:
         """Runs left, at least and at most."""
         ends = self.runs if self.fewest is None else self.fewest, max(self.runs, self.most or 0)
-        low, high = (max(end, self.announced_runs) - max(self.finished_runs, self.stored_runs) for end in ends)
+        low, high = (max(end, self.announced_runs) - self.past_runs for end in ends)
         return max(low, 0), max(high, 0)
 
 
 @dataclass
 class Agenda:
-    """The stages of a command, which of them is under way, and what its runs took.
+    """The stages of a command, and which of them is under way.
 
     ``command``: its name. ``options`` and ``inputs`` (a digest) identify the answer, ``question`` (a digest) also its runs.
-    ``place``: the stage under way. ``measured``: times of runs on one thread. ``crowd``: wall time over processor time, 1 on
-    an idle machine.
-
-    ``prediction_s``: least and largest wall time [s] of the command from ``begin`` on, None before the prediction;
-    ``took_s``: its wall time at the end. ``files``: names of the answer's files, once written. ``fault``: what ended the
-    command.
+    ``place``: the stage under way, once ``entered``. ``files``: names of the answer's files, once written. ``fault``: what
+    ended the command.
     """
 
     command: str
@@ -164,11 +158,8 @@ class Agenda:
     stages: list[Stage]
     begin: float = 0.0
     place: int = 0
+    entered: bool = False
     question: str = ""
-    measured: Measured = field(default_factory=Measured)
-    crowd: float = 1.0
-    prediction_s: tuple[float, float] | None = None
-    took_s: float | None = None
     files: list[str] | None = None
     fault: str = ""
 
@@ -183,7 +174,7 @@ class Agenda:
     @property
     def stage(self) -> Stage | None:
         """The stage under way; None before the first."""
-        return self.stages[self.place] if self.begin and self.stages and self.stages[self.place].since else None
+        return self.stages[self.place] if self.entered and self.stages else None
 
     @property
     def runs_left(self) -> tuple[int, int]:
@@ -191,12 +182,17 @@ class Agenda:
         ranges = [stage.runs_left for stage in self.stages[self.place :]]
         return sum(low for low, _ in ranges), sum(high for _, high in ranges)
 
-    def stages_left(self) -> list[tuple[Stage, float]]:
-        """The stage under way and those to come, each with the work left of it."""
-        return [
-            (stage, stage.work - max(stage.finished_work, stage.stored_runs * stage.work_per_run))
-            for stage in self.stages[self.place :]
-        ]
+    @property
+    def plan(self) -> str:
+        """'22 to 25 runs (design runs 20, confirmation 2 to 5), 2 at once': the runs to come."""
+        parts = [(stage.name, count_of(stage.runs_left)) for stage in self.stages if stage.runs_left[1]]
+        listed = f" ({', '.join(f'{name} {count}' for name, count in parts)})" if parts[1:] else ""
+        return f"{count_of(self.runs_left)} {'run' if self.runs_left == (1, 1) else 'runs'}{listed}, {self.threads} at once"
+
+
+def count_of(ends: tuple[int, int]) -> str:
+    """'2 to 5': a number of runs at least and at most, one where they are equal."""
+    return f"{ends[0]} to {ends[1]}" if ends[0] < ends[1] else f"{ends[1]}"
 
 
 def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
@@ -209,32 +205,8 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     return sorted(agendas, key=lambda pair: pair[0].begin)
 
 
-# Scatter of the time of a unit of work between points, whose clearances and inputs decide how long figures drift.
-SCATTER = 0.35
-# Least and largest time of a stage apart from its runs, over the typical one.
-BESIDES = (0.5, 2.0)
-
-
-def forecast_of(agenda: Agenda, at_once: float, measured: Measured, growth: float = 1.0) -> Forecast | None:
-    """Forecast of what is left of an agenda with ``at_once`` runs at once; None if runs are left and none was measured.
-
-    ``growth``: factor by which runs that have not ended may become longer than measured.
-    """
-    stages = agenda.stages[agenda.place :]
-    runs = agenda.runs_left
-    turns = tuple(sum(stage.runs_left[end] * stage.work_per_run for stage in stages) for end in (0, 1))
-    if measured.pace is None and runs[1]:
-        return None
-    pace, factors = measured.pace or 0.0, measured.factors(max(runs[0], 1), SCATTER)
-    besides_s = agenda.crowd * sum(stage.besides_s for stage in stages)
-    ran_s = [pace * work * factor / at_once for work, factor in zip(turns, factors, strict=True)]
-    low, high = (ran + besides_s * share for ran, share in zip(ran_s, BESIDES, strict=True))
-    longest_s = high + (growth - 1.0) * ran_s[1] if growth > 1.0 else 0.0
-    return Forecast(runs, (turns[0], turns[1]), (low, high), round(at_once), longest_s, steps=True)
-
-
-# The prediction is stated after this many ended runs, or after this time [s] by the runs under way.
-ENOUGH, LOOK_S = 2, 5.0
+# Shortest time [s] that clocks tell apart.
+SHORTEST_S = 1e-6
 # Largest crowd: runs that take longer wait for something else than a processor.
 MOST_CROWD = 10.0
 
@@ -243,7 +215,7 @@ MOST_CROWD = 10.0
 class AgendaKeeper:
     """Keeper of the agenda of a live process: it notes every change in the store at ``path``, once stages are planned.
 
-    ``notice``: receiver of the sentence with the prediction.
+    ``notice``: receiver of the plan, and of the estimate of its time after the first run.
     """
 
     path: Path
@@ -251,14 +223,10 @@ class AgendaKeeper:
     notice: Notice = None
     _store: Store | None = None
     _keys: dict[int, dict[str, float]] = field(default_factory=dict)
-    _under_way: dict[str, tuple[float, float]] = field(default_factory=dict)
-    _works: Mapping[str, float] = field(default_factory=dict)
-    _stated_s: float = 0.0
-    _growth: float = 1.0
-    _cluster: bool = False
-    # Wall and processor time [s] at which the engine began, and how many processors it has work for; None between engines.
-    _engine_since: tuple[float, float, int] | None = None
-    _shared: float = 1.0
+    _shorter_by: Sequence[str] = ()
+    _steps_s: float = 0.0
+    _estimated: bool = False
+    _why: str = ""
     _lock: threading.RLock = field(default_factory=threading.RLock)
     _began: float = field(default_factory=time.monotonic)
 
@@ -267,42 +235,26 @@ class AgendaKeeper:
         """Wall time [s] of the command so far, whatever the clock was set to meanwhile."""
         return time.monotonic() - self._began
 
-    def plan(self, stages: Sequence[Stage]) -> None:
-        """Plan the stages, after all checks and before anything runs. Raises as ``Store``.
+    def plan(self, stages: Sequence[Stage], shorter_by: Sequence[str] = (), steps_s: float = 0.0) -> None:
+        """Plan the stages, after all checks and before anything runs, and state their runs. Raises as ``Store``.
 
-        The agenda replaces those of ended processes. It inherits their pace, and for the same question the number of runs
-        of each stage.
+        ``shorter_by``: what makes the plan smaller; ``steps_s``: typical time [s] of what is no run. The agenda replaces those
+        of ended processes. It takes over the number of runs of each stage of the same question.
         """
-        self.agenda.stages = list(stages)
+        self.agenda.stages, self._shorter_by, self._steps_s = list(stages), shorter_by, steps_s
         if self._store is None:
             self._store = Store(self.path)
             if earlier := agendas_of(self._store):
                 self._take_over(earlier[-1][0])
             self._store.sign(NOTE)
         self._note()
-
-    def state_first(self, measured: Measured) -> Forecast | None:
-        """State what is left before anything runs, by ``measured`` turns of its kind or the pace of an earlier command.
-
-        Returns the forecast, with the time from the start of the command on; None where no pace is known.
-        """
-        with self._lock:
-            pace = self.agenda.measured if self.agenda.measured.number else measured
-            forecast = forecast_of(self.agenda, float(self.agenda.threads), pace) if self.agenda.stages else None
-            if forecast is None or not forecast.runs[1]:
-                return forecast
-            self.agenda.prediction_s = forecast.whole_s(self.elapsed_s)
-            self._stated_s = self.agenda.prediction_s[1]
-            self._note()
-        if self.notice is not None:
-            self.notice(forecast.sentence)
-        return forecast._replace(seconds=self.agenda.prediction_s)
+        if self.notice is not None and self.agenda.runs_left[1]:
+            self.notice(self.agenda.plan)
 
     def _take_over(self, earlier: Agenda) -> None:
-        self.agenda.measured, self.agenda.crowd = earlier.measured, earlier.crowd
         if earlier.question != self.agenda.question:
             return
-        runs_made = {stage.name: max(stage.finished_runs, stage.stored_runs) for stage in earlier.stages}
+        runs_made = {stage.name: stage.past_runs for stage in earlier.stages}
         for stage in self.agenda.stages:
             stage.stored_runs = runs_made.get(stage.name, 0)
 
@@ -323,116 +275,69 @@ class AgendaKeeper:
         self._enter([stage.name for stage in self.agenda.stages].index(name))
 
     def _enter(self, place: int) -> None:
-        stage = self.agenda.stages[place]
-        self.agenda.place, stage.since = place, stage.since or time.time()
+        self.agenda.place, self.agenda.entered = place, True
         self._note()
 
     def counting(self, works: Mapping[str, float], progress: Progress) -> Progress:
-        """The same progress of runs with ``works`` by key, which also counts them in the stage under way."""
+        """The same progress of runs with ``works`` by key, which also counts them in the stage under way.
+
+        The time of more runs than planned is estimated anew.
+        """
         agenda, place = self.agenda, self.agenda.place
         if not agenda.stages:
             return progress
         stage, stage_works = agenda.stages[place], self._keys.setdefault(place, {})
         new_works = {key: work for key, work in works.items() if key not in stage_works}
-        earlier_runs, earlier_work, repeats = stage.finished_runs, stage.finished_work, len(works) - len(new_works)
+        earlier_runs, repeats = stage.finished_runs, len(works) - len(new_works)
         stage_works.update(new_works)
+        if len(stage_works) > stage.runs:
+            self._estimated, self._why = False, f"{stage.name} goes on to {counted(len(stage_works), 'run')}: "
         stage.runs, stage.work = max(stage.runs, len(stage_works)), max(stage.work, sum(stage_works.values()))
         stage.announced_runs = len(stage_works)
 
         def count(number: int, total: int) -> None:
-            new_runs = max(number - repeats, 0)
-            stage.finished_runs = earlier_runs + new_runs
-            stage.finished_work = earlier_work + (
-                sum(new_works.values()) * new_runs / len(new_works) if new_works else 0.0
-            )
+            stage.finished_runs = earlier_runs + max(number - repeats, 0)
             self._note()
-            if agenda.measured.number >= ENOUGH:
-                self._state(agenda.measured)
             progress(number, total)
 
         return count
 
-    def timed(self, engine: Engine, works: Mapping[str, float], growth: float = 1.0, cluster: bool = False) -> Engine:
-        """The same engine, of threads or of a ``cluster``, which also measures its runs.
-
-        ``growth``: factor by which runs may become longer than planned.
-        """
-        agenda, place = self.agenda, self.agenda.place
-        self._works, self._growth, self._cluster = works, growth, cluster
+    def timed(self, engine: Engine, works: Mapping[str, float], cluster: bool = False) -> Engine:
+        """The same engine, of threads or of a ``cluster``; after its first run the time of all that follow is estimated."""
+        threads = self.agenda.threads
 
         def run(points: Sequence[Point], ledger: Ledger) -> None:
             # Threads without a point of their own share those of the others.
-            shared = self._shared = 1.0 if cluster else max(agenda.threads / len(points), 1.0)
-            busy = min(agenda.threads, len(points), os.cpu_count() or 1)
-            self._engine_since = time.perf_counter(), time.process_time(), busy
+            shared = 1.0 if cluster else max(threads / len(points), 1.0)
 
             def end(point: Point, outcome: RunOutcome) -> None:
-                with self._lock:
-                    self._under_way.pop(point.key, None)
-                    if outcome.result is not None:
-                        seconds = shared * outcome.seconds
-                        agenda.measured = agenda.measured.plus(works[point.key], seconds)
-                        if agenda.stages:
-                            agenda.stages[place].measured_work += works[point.key]
-                            agenda.stages[place].seconds += seconds
                 ledger.give(point, outcome)
+                if outcome.result is not None and not self._estimated:
+                    seconds = outcome.seconds - outcome.result.get("cost", {}).get("compile_s", 0.0)
+                    running = len(self._store.running()) + 1 if cluster and self._store is not None else threads
+                    spent = shared * max(seconds, 0.0)
+                    crowd = spent / max(outcome.result.get("cost", {}).get("cpu_s", spent), SHORTEST_S)
+                    self._estimate(spent / works[point.key] / running, min(max(crowd, 1.0), MOST_CROWD))
 
             engine(points, replace(ledger, give=end))
-            with self._lock:
-                self._look_about()
-                self._engine_since = None
 
         return run
 
-    def hear(self, key: str, share: float, seconds: float) -> None:
-        """Note that a run under way has made a ``share`` of its work in ``seconds``; called in any thread."""
-        with self._lock:
-            self._under_way[key] = share * self._works[key], self._shared * seconds
-            start = self._engine_since
-            if self.agenda.prediction_s or start is None or time.perf_counter() - start[0] < LOOK_S:
-                return
-            measured, growth = self.agenda.measured, 1.0
-            if not measured.number:
-                growth = self._growth
-                for work, spent in self._under_way.values():
-                    measured = measured.plus(work, spent)
-            self._state(measured, growth)
+    def _estimate(self, pace_s: float, crowd: float) -> None:
+        """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence.
 
-    def _state(self, measured: Measured, growth: float = 1.0) -> None:
-        """State the prediction once, and again if the command takes longer than the stated maximum."""
-        with self._lock:
-            self._look_about()
-            forecast = forecast_of(self.agenda, self._at_once, measured, growth) if self.agenda.stages else None
-            if forecast is None or not forecast.notable:
-                return
-            whole_s = forecast.whole_s(self.elapsed_s)
-            if whole_s[0] <= self._stated_s:
-                return
-            self._stated_s = whole_s[1]
-            self.agenda.prediction_s = self.agenda.prediction_s or whole_s
-            self._note()
-        if self.notice is not None:
-            self.notice(forecast.sentence)
-
-    def _look_about(self) -> None:
-        """Measure by the runs under way how busy the machine is with other work."""
-        if self._engine_since is None or self._cluster:
-            return
-        wall, processor, busy = self._engine_since
-        spent, used = time.perf_counter() - wall, time.process_time() - processor
-        if spent >= 1.0 and used > 0.0:
-            self.agenda.crowd = min(max(spent * busy / used, 1.0), MOST_CROWD)
-
-    @property
-    def _at_once(self) -> float:
-        """Number of runs at once: threads, or the current runs of a cluster."""
-        if not self._cluster or self._store is None:
-            return float(self.agenda.threads)
-        return float(max(len(self._store.running()), 1))
+        ``crowd``: wall time over processor time of a run; on a busy machine steps that are no runs take longer, too.
+        """
+        self._estimated = True
+        rest_s = (
+            pace_s * sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :]) + crowd * self._steps_s
+        )
+        if self.notice is not None and rest_s >= NOTABLE_S:
+            self.notice(f"{self._why}{estimate(rest_s, self._shorter_by)}")
 
     def finish(self, files: Sequence[str]) -> None:
         """Note that all files of the answer are written."""
-        self.agenda.files, self.agenda.took_s = list(files), self.elapsed_s
+        self.agenda.files = list(files)
         self._note()
 
     def fail(self, fault: str) -> None:

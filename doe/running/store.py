@@ -240,16 +240,11 @@ class CurrentRun:
 
 @dataclass(frozen=True)
 class EndedRun:
-    """An ended run: its status, "done" or "failed", its duration [s], and when it began and ended [s since the epoch].
-
-    ``seconds`` and ``started`` are None for a result without a measured duration.
-    """
+    """An ended run: its status, "done" or "failed", and its duration [s], None for a result without one."""
 
     key: str
     status: str
     seconds: float | None
-    started: float | None
-    ended: float
 
 
 Record = dict[str, Any]
@@ -408,10 +403,11 @@ class Store(Database):
 
     def ended(self) -> list[EndedRun]:
         """All runs that have ended, oldest first."""
-        seconds, started = (f"iif(typeof({name}) = 'real', {name}, NULL)" for name in ("seconds", "started"))
-        query = f"SELECT key, status, {seconds}, {started}, ended FROM runs WHERE status != 'claimed'"
         with self._lock, self._faults():
-            rows = self._connection.execute(f"{query} AND typeof(ended) = 'real' ORDER BY ended")
+            rows = self._connection.execute(
+                "SELECT key, status, iif(typeof(seconds) = 'real', seconds, NULL) FROM runs "
+                "WHERE status != 'claimed' AND typeof(ended) = 'real' ORDER BY ended"
+            )
             return [EndedRun(*row) for row in rows]
 
     def close(self) -> None:

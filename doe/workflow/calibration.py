@@ -16,7 +16,7 @@ from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.running.runner import ANSWER, ANSWER_S, Stage
+from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
@@ -54,7 +54,6 @@ from doe.workflow.input_sets import (
 from doe.workflow.rig import MOST_CONDITIONS, PULSE_OUTPUTS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
-from rbdyn.base.forecast import Measured as Paces
 from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import counted, quantity
 from rbdyn.result import SimulationResult
@@ -564,17 +563,8 @@ def _stages(case: Case, rig: Rig, targets: Sequence[Input], work: float) -> list
         Stage.of("waves", waves * sets, work, "wave", fewest=sets),
         # If emulators miss the posterior, it is simulated once more.
         Stage.of("posterior", TRIED * conditions, work, most=2 * TRIED * conditions),
-        Stage(ANSWER, besides_s=ANSWER_S),
+        Stage(ANSWER),
     ]
-
-
-def pace(question: Question) -> Paces:
-    """Pace of the runs by a probe at the first condition, of an input set as the scene says; none of a run that fails."""
-    case = cases_of(question.case, question.rig)[0]
-    try:
-        return clearance.probe(Scene.from_dict(case.data, case.source, case.uncertain.assignments))
-    except RunError:
-        return Paces()
 
 
 def _screening_runs(case: Case) -> int:

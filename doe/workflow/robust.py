@@ -578,10 +578,6 @@ def _value(case: Case, unknown_input: Input, quantile: float | None) -> Any:
     return value if unknown_input.law.times is None else value * case.unit(unknown_input)
 
 
-# Typical wall time [s] of the emulators of a robust judgement.
-ROBUST_S = 10.0
-
-
 def robust_stage(study: Study) -> Stage:
     """The stage of a robust judgement: input sets of both designs, further replicates, the front and its simulations."""
     settings, case = study.file.robust, case_of_study(study)
@@ -592,5 +588,4 @@ def robust_stage(study: Study) -> Stage:
         runs += settings.points + POINTS * CONFIRMED + 2 * new_sets
     titles = "input sets", "runs of the robust front"
     points = points_in(case.duty)
-    stage = Stage.of("robust", points * runs, work_of_set(case), *titles, fewest=points * fewest)
-    return replace(stage, besides_s=ROBUST_S)
+    return Stage.of("robust", points * runs, work_of_set(case), *titles, fewest=points * fewest)

@@ -1,4 +1,4 @@
-"""The stages of a study, its record if it is finished, and the status of a command: counts of runs and the time left.
+"""The stages of a study, its record if it is finished, and the status of a command: counts of runs.
 
 For a plain study it loads no numerical library but numpy.
 """
@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any, get_args
 from doe import clearance
 from doe.clearance import every_scene, points_of, work_of
 from doe.duty import Run, main_scene, scenes_of
-from doe.running.runner import ANSWER, ANSWER_S, Agenda, Stage, agendas_of, forecast_of
+from doe.running.runner import ANSWER, Agenda, Stage, agendas_of
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file import Study
 from doe.study_file.sections import Front
@@ -27,12 +27,8 @@ from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.base.tables.workbook import split_path
 from rbdyn.result import read_json, versions
 
-# Typical wall times [s] of the surfaces with their front, and of the pick's tolerances with the chains.
-FRONT_S, TOLERANCES_S = 6.0, 1.0
-# Typical wall time [s] of the surfaces and the front of one point of a duty alone.
-OWN_PICK_S = 2.0
-# Typical wall time [s] of the emulators for a batch of an adaptive search.
-BATCH_S = 0.6
+# Typical wall time [s] of surfaces, front, pictures and report.
+STEPS_S = 12.0
 DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
 
 
@@ -46,7 +42,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         for levels in (study.every_level if adaptive else [study.levels])
         for key, work in design_works(study.with_levels(levels))
     }
-    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
+    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT)]
     if adaptive:
         from doe.adaptive.search import FRESH
 
@@ -56,8 +52,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         runs = max(settings.budget - sum(len(levels.coded) for levels in design), 0)
         # The shortest search stops after one batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
-        stage = _stage_of("adaptive front", runs, search, fewest=fewest)
-        stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
+        stages.append(_stage_of("adaptive front", runs, search, fewest=fewest))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
@@ -73,8 +68,18 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
 
         stages.append(robust_stage(study))
     if study.file.tolerances is not None or study.file.chain:
-        stages.append(Stage(TOLERANCES, besides_s=TOLERANCES_S))
-    return [*stages, Stage(ANSWER, besides_s=ANSWER_S + OWN_PICK_S * len(study.shares))]
+        stages.append(Stage(TOLERANCES))
+    return [*stages, Stage(ANSWER)]
+
+
+def shorter_by(study: Study, adaptive: bool, robust: bool) -> list[str]:
+    """What makes a study smaller."""
+    return [
+        *([] if study.file.duty is None or not study.shares else ["the [[duty]] points"]),
+        *(["adaptive.budget"] if adaptive else []),
+        *(["robust.points"] if robust else []),
+        "numerics.turns or numerics.replicates (scene.set)",
+    ]
 
 
 def _stage_of(name: str, runs: int, run: Run, *titles: str, fewest: int, most: int | None = None) -> Stage:
@@ -149,8 +154,6 @@ def _content(path: Path) -> bytes:
 FORMAT = "doe.status/1"
 # Default folders of the commands on a scene.
 SCENE_FOLDERS = ("{}_uncertainty", "{}_calibration")
-# Shortest time left [s] of an unfinished command; time left of an overdue part as a share of its time so far.
-LEAST_S, OVERDUE = 1.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -190,20 +193,18 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     ordered = ordered_runs(study)
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     content = Content.of(folder, points)
-    works, agenda = dict(design_works(study)), content.agenda
+    agenda = content.agenda
     stated_options = agenda.options if agenda else {}
     options = {name: stated_options.get(name, False) for name in ("adaptive", "robust")}
     answered = bool(finished_record(folder, inputs_digest(study, **options))) if agenda else _has_answer(study, folder)
     if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
         # The study as it is now has no agenda.
-        new_agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
-        agenda = replace(new_agenda, measured=agenda.measured, crowd=agenda.crowd) if agenda else new_agenda
-    _count_design(agenda.stages, works, content.outcomes)
-    if not agenda.measured.number:
-        rows = [(works[run.key], run.seconds) for run in content.ended if run.seconds is not None and run.key in works]
-        for work, seconds in rows:
-            agenda.measured = agenda.measured.plus(work, seconds)
-    keys = set(works)
+        agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
+    for stage in agenda.stages:
+        if stage.name == DESIGN:
+            # Whichever process ran them.
+            stage.finished_runs = max(stage.finished_runs, len(content.outcomes))
+    keys = {key for key, _ in design_works(study)}
     failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
     running = [run for run in content.running if run.key in keys]
     counts = {
@@ -282,14 +283,6 @@ def _has_answer(study: Study, folder: Path) -> bool:
     return any(finished_record(folder, inputs_digest(study, adaptive, robust)) for adaptive, robust in combinations)
 
 
-def _count_design(stages: Sequence[Stage], works: Mapping[str, float], outcomes: Mapping[str, RunResult]) -> None:
-    """Count the design runs in the store, whichever process ran them."""
-    for stage in stages:
-        if stage.name == DESIGN:
-            stage.finished_runs = max(stage.finished_runs, len(outcomes))
-            stage.finished_work = max(stage.finished_work, sum(works[key] for key in outcomes))
-
-
 def _record(
     path: Path,
     folder: Path,
@@ -303,10 +296,7 @@ def _record(
     # A live process has nothing left to run once its answer is written.
     alive = any(live_agenda.files is None for live_agenda in content.alive) or bool(content.running and not answered)
     answered = answered and not alive
-    stage, left_s = agenda.stage, 0.0 if answered else _left_s(agenda, content)
-    forecast = None if answered else forecast_of(agenda, _threads(agenda, content), agenda.measured)
-    low, high = (0.0, 0.0) if forecast is None else forecast.seconds
-    runs = (0, 0) if answered else agenda.runs_left
+    stage, runs = agenda.stage, (0, 0) if answered else agenda.runs_left
     return {
         "format": FORMAT,
         "status": "running" if alive else "finished" if answered else "unfinished",
@@ -321,11 +311,7 @@ def _record(
         "running": [_running(run) for run in content.running],
         "other": dict(other_counts),
         "spent_s": sum(run.seconds or 0.0 for run in content.ended),
-        "left_s": left_s,
-        "left_range_s": None if left_s is None else [min(left_s, low), max(left_s, high)],
         "runs_left": list(runs),
-        "predicted_s": None if agenda.prediction_s is None else list(agenda.prediction_s),
-        "took_s": agenda.took_s,
     }
 
 
@@ -334,7 +320,7 @@ def _stage(agenda: Agenda, place: int, answered: bool) -> dict[str, Any]:
     stage = agenda.stages[place]
     past = answered or place < agenda.place
     state = "done" if past else "to come" if agenda.stage is None or place > agenda.place else "running"
-    count = stage.finished_runs if past else max(stage.finished_runs, stage.stored_runs)
+    count = stage.finished_runs if past else stage.past_runs
     most = count if past else count + stage.runs_left[1]
     return {"name": stage.name, "state": state, "done": count, "runs": stage.runs, "most": most}
 
@@ -343,49 +329,5 @@ def _running(run: CurrentRun) -> dict[str, Any]:
     return {
         **{key: getattr(run, key) for key in ("label", "run", "host", "pid")},
         "since": datetime.fromtimestamp(run.since, UTC).isoformat(timespec="seconds"),
-        "for_s": _for_s(run, time.time()),
+        "for_s": max(0.0, time.time() - run.since),  # the clock may have gone back
     }
-
-
-def _for_s(run: CurrentRun, now: float) -> float:
-    return max(0.0, now - run.since)
-
-
-def _left_s(agenda: Agenda, content: Content) -> float | None:
-    """Wall time [s] of the stages left, by the measured pace of runs; None without a measurement.
-
-    A live process goes on with as many runs at once as so far in its stage, any other with its threads.
-    """
-    mean_pace = agenda.measured.pace
-    if mean_pace is None:
-        return None
-    now, left_s, threads = time.time(), 0.0, _threads(agenda, content)
-    for place, (stage, work) in enumerate(agenda.stages_left()):
-        begun = stage.since is not None and place == 0
-        measured = begun and stage.measured_work > 0.0
-        pace = stage.seconds / stage.measured_work if measured else mean_pace
-        seconds, at_once = pace * max(work, 0.0), float(threads)
-        if begun and content.alive and stage.since is not None:
-            at_once = _at_once(stage.since, content, now) or at_once
-            seconds -= sum(min(_for_s(run, now), pace * work / len(content.running)) for run in content.running)
-            spent_s = max(now - stage.since, 0.0)  # the clock may have gone back
-            besides_s = max(stage.besides_s - spent_s, OVERDUE * spent_s if stage.besides_s else 0.0)
-        else:
-            besides_s = stage.besides_s
-        left_s += max(seconds, 0.0) / at_once + besides_s
-    return max(left_s, LEAST_S)
-
-
-def _threads(agenda: Agenda, content: Content) -> int:
-    """Threads of the live processes, or else of the last one."""
-    return max(sum(live_agenda.threads for live_agenda in content.alive), 1) if content.alive else agenda.threads
-
-
-def _at_once(since: float, content: Content, now: float) -> float | None:
-    """Mean number of runs at once since a moment [s since the epoch]; None while fewer than two have ended."""
-    rows = [run for run in content.ended if run.seconds and run.started is not None and run.started >= since]
-    begin = min((run.started for run in rows if run.started is not None), default=now)
-    if len(rows) < 2 or now <= begin:
-        return None
-    busy = sum(run.seconds or 0.0 for run in rows) + sum(min(_for_s(run, now), now - begin) for run in content.running)
-    return max(busy / (now - begin), 0.1)

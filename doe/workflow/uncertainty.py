@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from doe.clearance import TEMPERATURES, Simulations, quantity_of, responses_of, work_of
-from doe.running.runner import ANSWER, ANSWER_S, Stage
+from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown.propagation import (
@@ -245,5 +245,5 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     return [
         Stage.of("as the scene says", 1, work_of(case.scene)),
         Stage.of("input sets", count, work_of_set(case), most=MOST_EFFORT * max(count, MOST)),
-        Stage(ANSWER, besides_s=ANSWER_S),
+        Stage(ANSWER),
     ]

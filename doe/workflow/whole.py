@@ -5,7 +5,7 @@ published table.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from doe.dimension_chain.refusal import allocated_reason
 from doe.duty import Duty, scene_at
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
-from doe.running.runner import ANSWER, AgendaKeeper, Progress, Stage
+from doe.running.runner import ANSWER, AgendaKeeper, Progress
 from doe.running.store import Failure, Store
 from doe.study_file import Study
 from doe.study_file.sections import chain_table
@@ -48,7 +48,7 @@ from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
 from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
-from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
+from doe.workflow.status import FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
@@ -360,7 +360,8 @@ def run_study(
     if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
-    clock.plan(study_stages(study, adaptive, robust))
+    if agenda is not None:
+        agenda.plan(study_stages(study, adaptive, robust), shorter_by(study, adaptive, robust), STEPS_S)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
     turns = runs.turns
@@ -467,11 +468,6 @@ class _Clock:
         self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
-
-    def plan(self, stages: Sequence[Stage]) -> None:
-        """Plan the stages to come in the agenda."""
-        if self._agenda is not None:
-            self._agenda.plan(stages)
 
     def lap(self, name: str, next_stage: str = "") -> None:
         """The stage ``name`` ends here, and the ``next_stage`` of the agenda begins."""

@@ -12,6 +12,7 @@ from typing import Any
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import error_alone, value_alone, with_error
+from rbdyn.dynamics.ensemble import in_turn
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
@@ -52,8 +53,9 @@ COLUMNS: Columns = {
 def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -> Report:
     """``rbdyn accuracy SCENE coverage``, ``REPEATS`` repeats unless given. Raises RunError, KeyboardInterrupt."""
     scene, repeats = one_bearing(scene), repeats or REPEATS
-    counted = Progress(progress, repeats + 1)
-    truth = simulate(truth_of(scene))
+    exact = truth_of(scene)
+    counted = Progress(progress, [in_turn(exact), *[in_turn(scene)] * repeats])
+    truth = simulate(exact)
     counted.step()
     seeds = (FIRST_SEED + SEED_STEP * k for k in range(repeats))
     results = [simulate(with_numerics(scene, seed=seed)) for seed in counted.over(seeds)]

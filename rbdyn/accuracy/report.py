@@ -1,6 +1,8 @@
 """Report of a study: one record, tables to print, sheets and pictures to write."""
 
+import logging
 import platform
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -8,11 +10,17 @@ from typing import Any, TypeVar
 
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
+from rbdyn.base.pace import NOTABLE_S, estimate
 from rbdyn.base.records import save_table
-from rbdyn.dynamics.ensemble import Reporter
+from rbdyn.base.words import counted
+from rbdyn.compiled.kernel import COMPILING
+from rbdyn.dynamics.ensemble import LOOK_S, Reporter
 from rbdyn.result import versions, write_json
 
 T = TypeVar("T")
+LOGGER = logging.getLogger("rbdyn.accuracy")
+# Keys of the scene that make a study shorter.
+KEYS = ("numerics.turns", "numerics.replicates")
 # By heading: field of a row and format of its figure, see ``cell``, or a function from a row to its text.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
 
@@ -32,16 +40,30 @@ class Report:
 
 
 class Progress:
-    """Counts steps of a known total."""
+    """Counts steps, whose number is logged before the first and whose time after it.
 
-    def __init__(self, report: Reporter, total: int) -> None:
-        self.report, self.total, self.count = report, total, 0
+    ``works``: of the steps, in any unit.
+    """
+
+    def __init__(self, report: Reporter, works: Sequence[float]) -> None:
+        self.report, self.total, self.count = report, len(works), 0
+        self.works, self.started, self.estimated = works, self._now(), False
+        LOGGER.info(counted(self.total, "step"))
 
     def step(self, *part: int) -> None:
         """Count one more step; the counts of a ``part`` itself do not matter."""
         self.count += 1
+        spent_s = self._now() - self.started
+        rest_s = spent_s * sum(self.works[self.count :]) / sum(self.works[: self.count])
+        if not self.estimated and spent_s >= LOOK_S and rest_s >= NOTABLE_S:
+            self.estimated = True
+            LOGGER.info(estimate(rest_s, KEYS))
         if self.report is not None:
             self.report(self.count, self.total)
+
+    def _now(self) -> float:
+        """A clock [s] that stands still while something is compiled."""
+        return time.perf_counter() - COMPILING.seconds
 
     def over(self, items: Iterable[T]) -> Iterator[T]:
         """The items; each counts as a step when the next one is requested."""

@@ -109,6 +109,8 @@ def undecided(hidden: Iterable[Difference], scene: Scene, margin: float = MARGIN
     )
 
 
+# Power of the tolerance by which the steps of a run shrink.
+STEPS = 0.2
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
 OUTPUTS: dict[str, Callable[[Replicate], float]] = {
     "impact_force_N": lambda run: run.impact_force,
@@ -192,7 +194,8 @@ def statistics_bias(
     bearing = roller_bearing(scene)
     prepare(scene, bearing)
     ordered = sorted(tolerances)
-    counted = Progress(progress, len(ordered) * scene.numerics.replicates)
+    works = [rtol**-STEPS for rtol in ordered for _ in range(scene.numerics.replicates)]
+    counted = Progress(progress, works)
     series: dict[float, list[Replicate]] = {}
     failures: dict[float, str] = {}
     for rtol in ordered:

@@ -4,6 +4,6 @@
 - ``records``: results as JSON, tables and CSV; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
 - ``tables``: tables of a user, text and workbooks
 - ``intervals``: errors of sums and differences, several that hold together
-- ``words``: how values, errors and counts are written; ``blocks``: what is said; ``terminal``, ``markdown``, ``html``: its renderings
-- ``loading``, ``streams``, ``command``: what commands share; ``folder``, ``lock``: where they write; ``forecast``: how long runs take
+- ``words``: how values, errors and counts are written; ``blocks``: what is said; ``terminal``, ``html``: its renderings
+- ``loading``, ``streams``, ``command``: what commands share; ``folder``, ``lock``: where they write; ``pace``: how long runs take
 """

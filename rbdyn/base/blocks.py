@@ -1,4 +1,4 @@
-"""Blocks of a report: one tree that terminal, Markdown and HTML render. Text is plain: a renderer escapes it."""
+"""Blocks of a report: one tree that terminal and HTML render. Text is plain: a renderer escapes it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -61,8 +61,7 @@ class Bullets:
 class Table:
     """A table whose first column names the row; a ``folded`` one opens on demand, a ``sortable`` one sorts by any column.
 
-    ``text_columns``: further columns that hold text rather than numbers. ``file``: table in the same folder with all rows, which
-    a text names in place of a long table.
+    ``text_columns``: further columns that hold text rather than numbers.
     """
 
     caption: str
@@ -73,7 +72,6 @@ class Table:
     text_columns: Sequence[int] = ()
     sortable: bool = False
     detail: Detail = Detail.LEAST
-    file: str = ""
 
     def without_empty_columns(self) -> Self:
         """The same table without its empty columns."""

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import logging
 import os
 import re
 import shlex
@@ -19,7 +20,6 @@ from typer.core import TyperCommand, TyperGroup
 
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
-from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
@@ -28,6 +28,9 @@ from rbdyn.base.terminal import show
 BAD_INPUT = 2
 # Whole numbers that numba and matplotlib read of the environment, with their ends.
 VARIABLES = {"NUMBA_NUM_THREADS": (1, 10_000), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
+
+# The time left looks back so long [s]: in a shorter time a slow run would not end even once.
+LOOK_BACK_S = 86400.0
 
 
 @contextmanager
@@ -124,45 +127,40 @@ def checkpoint_message(path: Path | None) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
-    """Show progress on a terminal, nothing elsewhere; yields ``progress(count, total)``.
-
-    ``workers``: number of runs at once; None for all processors.
-    """
+def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Show progress with the time left on a terminal, nothing elsewhere; yields ``progress(count, total)``."""
     if quiet or not sys.stderr.isatty():
         yield lambda count, total: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
-    from rich.text import Text
-
-    remaining = Remaining(workers or os.cpu_count() or 1)
-
-    class TimeLeft(ProgressColumn):
-        """Time left by ``Remaining``: rich forgets its own estimate where a run takes longer than half a minute."""
-
-        def render(self, task: Task) -> Text:
-            return Text(clock_words(remaining.seconds), style="progress.remaining")
-
-    def progress(count: int, total: int) -> None:
-        remaining.update(count, total)
-        bar.update(task, completed=count, total=total)
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     with Progress(
         TextColumn(title),
         BarColumn(),
         MofNCompleteColumn(),
-        TimeLeft(),
+        TimeRemainingColumn(elapsed_when_finished=True),
         console=Console(file=styled(sys.stderr)),
         transient=True,
+        speed_estimate_period=LOOK_BACK_S,
     ) as bar:
         task = bar.add_task(title, total=None)
-        yield progress
+        yield lambda count, total: bar.update(task, completed=count, total=total)
 
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
-    """Function that prints a note to standard error at once; None for a quiet command."""
+    """Function that prints a note to standard error at once; None for a quiet command. Any other also prints what is logged."""
+    logger = logging.getLogger("rbdyn")
+    logger.setLevel(logging.NOTSET if quiet else logging.INFO)
+    logger.handlers = [] if quiet else [_StandardError()]
     return None if quiet else lambda sentence: print(f"note: {escaped(sentence)}", file=sys.stderr, flush=True)
+
+
+class _StandardError(logging.Handler):
+    """Lines on what is standard error at the time, above a bar of progress."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(record.getMessage(), file=sys.stderr, flush=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

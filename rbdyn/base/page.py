@@ -1,7 +1,7 @@
 """A report as one HTML page that can be mailed: it fetches nothing and can be read without scripts and on paper.
 
 ``page`` fills the skeleton ``page.html`` with the style sheet ``report.css``. ``result_page`` is the page of a command that has a
-result and pictures: the identity first, then the blocks of the terminal.
+result and pictures: the blocks of the terminal first, the table of the identity last.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -13,7 +13,7 @@ from pathlib import Path
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Figures, Section, Table
 from rbdyn.base.folder import OutputFolder
-from rbdyn.base.identity import Identity, identity_table
+from rbdyn.base.identity import Identity, identity_line, identity_table
 from rbdyn.base.vector import vector_copies
 from rbdyn.base.words import filled_page
 from rbdyn.base.workbook import NAME, write_workbook
@@ -86,10 +86,15 @@ def page(
 
 
 def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
-    """Page of a result: its identity, its blocks at every detail with long tables folded, its pictures (SVG by name)."""
+    """Page of a result: its blocks at every detail with long tables folded, its pictures (SVG by name), its identity."""
     blocks = [_folded(block) for block in blocks]
     drawn = [Figures([picture], name) for name, picture in pictures.items()]
-    parts = [identity_section(identity), Section("result", "Result", blocks), Section("pictures", "Pictures", drawn)]
+    line = identity_line(identity)
+    parts = [
+        Section("result", "Result", [line, *blocks]),
+        Section("pictures", "Pictures", drawn),
+        identity_section(identity),
+    ]
     return page(identity.title, identity.title, [part for part in parts if part.blocks])
 
 
@@ -101,7 +106,7 @@ def _folded(block: Block) -> Block:
 
 
 def identity_section(identity: Identity) -> Section:
-    """First section of a page: bearing, operating point, date, version, hashes of the input files."""
+    """Section of a page: bearing, operating point, date, version, hashes of the input files."""
     return Section("identity", "Bearing, operating point, inputs", [replace(identity_table(identity), caption="")])
 
 

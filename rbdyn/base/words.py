@@ -55,7 +55,7 @@ def shown(value: Any, digits: int = 4) -> str:
     if not math.isfinite(value):
         return ""
     text = f"{0.0 if abs(value) < NOISE else value:.{digits}g}"
-    return f"{value:.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
 
 
 def counted(number: float, noun: str) -> str:

@@ -27,7 +27,14 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
-SIMULATION_FILES = ("result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png")
+SIMULATION_FILES = (
+    "result.json",
+    "figures.csv",
+    "history.csv",
+    "roller_loads.png",
+    "cage_orbit.png",
+    "pocket_forces.png",
+)
 DUTY_FILES = ("duty.json", "points.csv")
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
 ACCURACY_FILES = tuple(
@@ -111,17 +118,20 @@ def simulate(
                 _over_duty(loaded, (scene, duty), aim, workers, folder, as_json, Detail.of(quiet, verbose))
             )
         folder.claim(scene)
+        from rbdyn.dynamics.ensemble import plan_of, threads_of
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with command.progress_bar("simulating", quiet or as_json, workers) as progress:
-            result = run_scene(loaded, workers, progress, target=aim, notice=command.notice(quiet))
+        if (say := command.notice(quiet)) is not None and aim is None:
+            say(plan_of(loaded, threads_of(workers)))
+        with command.progress_bar("simulating", quiet or as_json) as progress:
+            result = run_scene(loaded, workers, progress, target=aim, notice=say)
         from rbdyn.cli import simulation_output
         from rbdyn.scene.thermal import simulated_scene
 
         loaded = simulated_scene(result)
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
-        blocks = partial(simulation_output.blocks, result)
+        blocks = partial(simulation_output.blocks, result, out)
         written = write_with_report(folder, identity, blocks, partial(simulation_output.write, loaded, result))
         detail = Detail.of(quiet, verbose)
         command.hand_over(
@@ -149,7 +159,7 @@ def _over_duty(
     from rbdyn.cli.duty import simulated_blocks, write_simulated
     from rbdyn.dynamics.duty_simulation import simulate_duty
 
-    with command.progress_bar("simulating", quiet or as_json, workers) as progress:
+    with command.progress_bar("simulating", quiet or as_json) as progress:
         found = simulate_duty(scene, points, workers, progress, aim, command.notice(quiet))
     places = zip(*((point.inner_speed_rpm, point.radial_load_N) for point in found.points), strict=True)
     swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), places, strict=True))
@@ -189,6 +199,7 @@ def accuracy(
         loaded = Scene.load(scene, assignments or [])
         name = studies.study_name(study, loaded)
         folder.claim(scene)
+        command.notice(quiet)
         with command.progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress)
         files = folder.write(partial(studies.write, report)) if out else []
@@ -258,7 +269,7 @@ def slip_map(
         marked = _map_duty(loaded, duty, *axes)
         folder.claim(scene)
         points = out / MAP_POINTS if out else None
-        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json, workers) as progress:
+        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json) as progress:
             mapped = run_map(loaded, *axes, workers, progress, points, command.notice(quiet))
         swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
         inputs = [scene] if duty is None else [scene, duty]

@@ -18,6 +18,7 @@ from rbdyn.base.command import (
     folder_option,
     guarded,
     hand_over,
+    notice,
     valued,
     verbose_flag,
 )
@@ -79,6 +80,7 @@ def ball(
         from rbdyn.scene import Scene, balls_only
 
         loaded = balls_only(Scene.load(scene, assignments or []))
+        notice(quiet)
         if seed is not None and race_limits is None:
             loaded = _seeded(loaded, seed)
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}

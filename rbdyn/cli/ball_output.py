@@ -108,8 +108,8 @@ def _row_sentences(row: RowReport) -> list[str]:
         sentences.append(f"{race} race: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
     life = row.life
     if life["L10_Mrev"] is not None:
-        hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
-        sentences.append(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
+        hours = f", {shown(life['L10_h'], 3)} h" if life["L10_h"] is not None else ""
+        sentences.append(f"life L10r: {shown(life['L10_Mrev'], 3)} million turns{hours} ({life['method']})")
     return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
 
 

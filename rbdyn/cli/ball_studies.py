@@ -17,7 +17,7 @@ from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show
-from rbdyn.base.words import counted, label, with_error
+from rbdyn.base.words import counted, label, shown, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import remarks, ring_columns, row_columns, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
@@ -278,7 +278,7 @@ def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
         return _limits(record)
     best = [
         Paragraph(
-            f"{title} at {point['value']:.4g}: {point['max_stress_MPa']:.0f} MPa, {point['L10_Mrev']:.4g} million turns"
+            f"{title} at {point['value']:.4g}: {point['max_stress_MPa']:.0f} MPa, {shown(point['L10_Mrev'], 3)} million turns"
         )
         for title, point in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
     ]

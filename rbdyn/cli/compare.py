@@ -59,7 +59,7 @@ def compare(
 
         shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
         both = [f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None]
-        with command.progress_bar("comparing", quiet or as_json, workers) as progress:
+        with command.progress_bar("comparing", quiet or as_json) as progress:
             found = run(a, b, assignments or [], both, workers, progress, command.notice(quiet))
         inputs = [file_of(path) for path in (a, b) if path is not None]
         identity = identity_of("rbdyn compare", found.a.scene, inputs)

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, get_args
 from rbdyn.base.blocks import Block, Detail, Table, notes
 from rbdyn.base.faults import refuse
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, quantity, with_error
+from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 
 if TYPE_CHECKING:
-    from rbdyn.base.forecast import Notice
+    from rbdyn.base.pace import Notice
     from rbdyn.dynamics.motion import History, Largest, Race, Spectrum
 
 FORMAT = "rbdyn.orbit/1"
@@ -223,7 +223,7 @@ def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append((f"largest pressure, slip, their product, {name} race", worst))
     life = record["life"]
     if life["L10_h"] is not None:
-        hours = f"{life['L10_h']:.4g} h, {life['L10_Mrev']:.4g} million turns"
+        hours = f"{shown(life['L10_h'], 3)} h, {shown(life['L10_Mrev'], 3)} million turns"
         rows.append(("reference life L10 of these loads", hours))
     if "lyapunov" in record:
         chaos = record["lyapunov"]

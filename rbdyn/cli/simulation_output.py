@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
-from rbdyn.base.forecast import span
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends
+from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
+from rbdyn.dynamics.figure_names import POWERS
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -17,41 +17,50 @@ if TYPE_CHECKING:
 TRACE_TURNS = 10.0
 
 
-def blocks(result: SimulationResult) -> list[Block]:
-    """Figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
+def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
+    """Figures with their errors, the target, loads and balance, races, clearances, life, friction, losses, cost, notes, inputs.
+
+    ``folder``: where the result is saved, for what to do next.
+    """
     from rbdyn.compiled.kernel import compiler_notes
 
     figures = _figures(result)
+    costs = [(label(key), shown(float(value))) for key, value in result.cost.items()]
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
         _table(figures),
-        Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *_temperatures(result),
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
-        *(_clearances(result.clearance_um) if result.scene.get("mounting") else ()),
+        *_clearances(result),
+        Paragraph(_life_sentence(result)),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
-        *_further(result),
+        *_losses(result),
         *notes(result.notes),
         *notes(compiler_notes(), Detail.ALL),
+        _inputs(result),
+        Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
+        Table("Cost", ("", ""), costs, detail=Detail.ALL),
+        Paragraph("" if folder is None else f"next: rbdyn show {folder} --animate"),
     ]
 
 
 def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, figures.csv, history.csv and pictures; returns the names of the files."""
+    """Write result.json, figures.csv, history.csv and pictures of loads and motion; returns the names of the files."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
     result.save(folder / "result.json")
     save_table(result.table().reset_index(), folder / "figures.csv", "%.8g")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
-    motion = history(scene, turns, notice=None)  # the simulation has stated its pace
+    motion = history(scene, turns, notice=None)
     save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
+    plots.roller_loads(motion, folder / "roller_loads.png")
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    return ["result.json", "figures.csv", "history.csv", "cage_orbit.png", "pocket_forces.png"]
+    return ["result.json", "figures.csv", "history.csv", "roller_loads.png", "cage_orbit.png", "pocket_forces.png"]
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":
@@ -95,16 +104,9 @@ def _run_sentence(result: SimulationResult) -> str:
     return (
         f"race loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
         f"balance closes to {100.0 * result.power_balance['relative_gap']:.2g} %; {counted(result.replicates, 'replicate')}, seed "
-        f"{result.seed}; {result.cost['wall_s']:.2f} s{_prediction(result.cost)}, {result.cost['compile_s']:.1f} s to "
+        f"{result.seed}; {result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to "
         "load or compile"
     )
-
-
-def _prediction(cost: dict[str, float]) -> str:
-    """Wall time as stated during the runs; empty where none was."""
-    if "predicted_most_s" not in cost:
-        return ""
-    return f" (predicted: {span(cost['predicted_least_s'], cost['predicted_most_s'])})"
 
 
 def _race_sentence(race: str, contact: dict[str, float]) -> str:
@@ -135,7 +137,10 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     rows = [
         (
             PARTS[node],
-            figure.value_text,
+            # Where the inputs leave kelvins open, hundredths say nothing.
+            value_alone(figure.value, 0.5 * (ranges[node][-1] - ranges[node][0]))
+            if node in ranges
+            else figure.value_text,
             range_ends(ranges[node]) if node in ranges else "",
             "" if figure.statistical_error is None else _error(figure.statistical_error),
             "" if figure.numerical_error is None else _error(figure.numerical_error),
@@ -155,19 +160,50 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     ]
 
 
-def _clearances(clearance: dict[str, Any]) -> list[Block]:
-    """Parts of each clearance in operation, the radial one with its fits one by one."""
-    plays = {
-        "clearance": clearance,
-        "guide clearance": clearance.get("guide"),
-        "pocket clearance": clearance.get("pocket"),
-    }
+def _clearances(result: SimulationResult) -> list[Block]:
+    """Each clearance from the drawing to operation, in a line; without a mounting only in a report."""
+    whole = result.clearance_um
+    plays = {"clearance": whole, "guide clearance": whole.get("guide"), "pocket clearance": whole.get("pocket")}
     sentences = []
     for name, play in plays.items():
-        if play is not None:
-            parts = {part.replace("_", " "): value for part, value in play.items() if isinstance(value, float)}
-            sentences.append(f"{name}: {', '.join(f'{part} {value:+.1f} µm' for part, value in parts.items())}")
-    return [Paragraph(sentence) for sentence in sentences]
+        parts = [
+            f"{part.replace('_', ' ')} {value:+z.1f} µm"
+            for part, value in (play or {}).items()
+            if isinstance(value, float) and (value or part in ("drawn", "operating"))
+        ]
+        if parts:
+            sentences.append(f"{name}: {', '.join(parts)}")
+    detail = Detail.LEAST if result.scene.get("mounting") else Detail.ALL
+    return [Paragraph(sentence, detail=detail) for sentence in sentences]
+
+
+def _life_sentence(result: SimulationResult) -> str:
+    """Reference life by static loads; empty where it has no end, or the bearing had no steady temperatures."""
+    from rbdyn.dynamics.duty import static_life
+    from rbdyn.scene.thermal import simulated_scene
+
+    if result.status != "ok":
+        return ""
+    scene = simulated_scene(result)
+    life = static_life(scene).as_record(*scene.operation.speeds)
+    if life["L10_h"] is None:
+        return ""
+    return f"life L10r: {shown(life['L10_h'], 2)} h, {shown(life['L10_Mrev'], 2)} million turns (ISO/TS 16281, static loads)"
+
+
+# Tables of a scene that a drawing, a machine and its oil give.
+INPUTS = ("bearing", "cage", "operation", "mounting", "lubricant", "thermal", "materials")
+
+
+def _inputs(result: SimulationResult) -> Table:
+    """What the scene states of bearing, machine and oil; zeros and what is left out are not listed."""
+    rows = [
+        (f"{table}: {label(key)}", shown(value, 5))
+        for table in INPUTS
+        for key, value in (result.scene.get(table) or {}).items()
+        if value not in (None, 0.0, [], {}) and not isinstance(value, dict | list)
+    ]
+    return Table("Inputs", ("key", "value"), rows, text_columns=(1,), detail=Detail.ALL)
 
 
 def _friction_sentence(check: dict[str, float | None]) -> str:
@@ -180,20 +216,26 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
     )
 
 
-def _further(result: SimulationResult) -> list[Block]:
-    """Full detail: the transient, the losses one by one, the cost."""
-    losses = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms_W.items()]
+def _losses(result: SimulationResult) -> list[Block]:
+    """Full detail: the transient, and the losses by size with their sum."""
+    parts = result.part_figures or {}
+    errors = {loss: parts[name].stated_error for name, loss in POWERS.items() if name in parts}
+    terms = sorted(((power, term) for term, power in result.power_terms_W.items() if power), reverse=True)
+    whole = sum(power for power, _ in terms) or 1.0
+    losses = [
+        (term.replace("_", " "), with_error(power, errors.get(term)), f"{100.0 * power / whole:.2g} %")
+        for power, term in terms
+    ]
+    losses.append(("all", with_error(result.power_loss_W.value, result.power_loss_W.stated_error), "100 %"))
     losses += [
-        (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance_W.items()
+        (f"rolling resistance, {race} race alone", shown(power, 3), f"{100.0 * power / whole:.2g} %")
+        for race, power in result.rolling_resistance_W.items()
     ]
     gap = result.power_balance["relative_gap"] * result.power_loss_W.value
     turns = result.transient_turns
     return [
         Paragraph("" if turns is None else f"transient: {counted(turns, 'shaft turn')}", detail=Detail.ALL),
-        Table(f"Power lost; the power balance closes to {gap:.2g} W", ("term", "W"), losses, detail=Detail.ALL),
-        Table(
-            "Cost", ("", ""), [(label(key), f"{value:.6g}") for key, value in result.cost.items()], detail=Detail.ALL
-        ),
+        Table(f"Power lost; the balance closes to {gap:.2g} W", ("term", "W", "share"), losses, detail=Detail.ALL),
     ]
 
 

@@ -26,6 +26,7 @@ import re
 import secrets
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -294,6 +295,7 @@ class EntryCache:
         try:
             return self.rebuild(context, *_payload(path.read_bytes(), self._key(signature, magic)))
         except FileNotFoundError:
+            COMPILING.begin()
             return None
         except Exception:  # a pickle may raise any
             _remove(path)
@@ -301,6 +303,7 @@ class EntryCache:
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Save compiled code, or warn once in a process that this fails."""
+        COMPILING.end()
         if compiled.library.has_dynamic_globals:
             return  # the code contains addresses of this process
         magic = compiled.codegen.magic_tuple()
@@ -321,6 +324,30 @@ class EntryCache:
 
     def _key(self, signature: Any, magic: tuple[Any, ...]) -> tuple[Any, ...]:
         return self.name, self.stamp, signature, magic, WAY, VERSIONS
+
+
+class Compiling:
+    """Time that compiling took so far in this process, ``seconds``, of functions within each other once; said at the first."""
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._since = 0.0, 0, 0.0
+
+    def begin(self) -> None:
+        """A function that is not saved on disk begins to be compiled."""
+        if self._depth == 0:
+            self._since = time.perf_counter()
+            if not self.seconds:
+                logging.getLogger("rbdyn.compiled").info("Compiling ... (once; kept for later runs)")
+        self._depth += 1
+
+    def end(self) -> None:
+        """It is compiled."""
+        self._depth = max(self._depth - 1, 0)
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._since
+
+
+COMPILING = Compiling()
 
 
 @functools.cache

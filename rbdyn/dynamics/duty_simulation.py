@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.forecast import Notice, named, part_of
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Note, merged
+from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
 from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case

@@ -9,14 +9,15 @@ import math
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from numbers import Integral
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
-from rbdyn.base.forecast import LONG_S, Forecast, Measured, Notice, duration
+from rbdyn.base.pace import NOTABLE_S, Notice, estimate
+from rbdyn.base.words import counted
 
 if TYPE_CHECKING:
     from rbdyn.scene import Scene
@@ -121,13 +122,8 @@ def run_all(
     pool.shutdown()
 
 
-# Runs are looked at after this time under way [s], then at every doubling of it; the budget of steps of one run after
-# this time of its own [s].
-FIRST_LOOK_S, BUDGET_LOOK_S = 1.0, 10.0
-# Scatter of the time of a shaft turn between runs of one scene, and between scenes of other speeds and loads.
-ALIKE, UNLIKE = 0.1, 0.4
-# A companion takes from so many to so many times the time of a run, by its tolerance and its longest step.
-COMPANION = (0.6, 1.5)
+# The time of the runs is estimated once they took this time [s], from the end of the first or, of slow ones, after EARLY_S.
+LOOK_S, EARLY_S = 2.0, 20.0
 
 
 def log(sentence: str) -> None:
@@ -137,88 +133,68 @@ def log(sentence: str) -> None:
 
 @dataclass
 class Pace:
-    """Time that ``runs`` of so many shaft turns take on so many threads, then ``companions``, as shown by those under way.
+    """One estimate of the time of planned runs, by those under way.
 
-    ``growth``: how many times as long they may become; ``scatter``: relative standard deviation of a turn's time between
-    runs. ``prediction``: least and most time of all of it [s], as stated first.
+    ``turns``: shaft turns of the plan, which each of ``threads`` threads makes one after the other; ``first``: those of a first
+    run. ``keys``: what shortens the plan. ``estimate_s``: estimated time of the whole plan [s], once stated.
     """
 
-    scene: "Scene"
     notice: Notice
-    runs: int
     turns: float
+    first: float
     threads: int
-    growth: float = 1.0
-    companions: int = 0
-    scatter: float = ALIKE
-    prediction: tuple[float, float] | None = field(default=None, init=False)
+    keys: Sequence[str] = ()
+    estimate_s: float | None = field(default=None, init=False)
+    _why: str = field(default="", init=False)
     _under_way: dict[int, tuple[float, float]] = field(default_factory=dict, init=False)
     _tickets: "itertools.count[int]" = field(default_factory=itertools.count, init=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
-
-    def __post_init__(self) -> None:
-        self._look_s, self._spent_s, self._stated_s, self._short_of_steps = FIRST_LOOK_S, 0.0, 0.0, False
 
     def enter(self) -> int:
         """The number of a run that begins, by which ``look`` knows it."""
         return next(self._tickets)
 
-    def look(self, run: int, spent_s: float, turns: float, steps: int, budget: int) -> None:
-        """Look at a run that took so many seconds for so many shaft turns and steps, of which it has a budget.
+    def lengthen(self, turns: float, length: float) -> None:
+        """Add so many turns to the plan, whose runs get so long; they are estimated anew."""
+        with self._lock:
+            self.turns += turns
+            if self.estimate_s is not None:
+                self.estimate_s, self._why = None, f"figures drift, so all runs go on to {length:.4g} shaft turns: "
 
-        The time of all runs is stated once, and again where they prove to take longer than the most that was stated.
-        """
+    def look(self, run: int, spent_s: float, turns: float) -> None:
+        """Look at a run that took so many seconds for so many shaft turns; the estimate is stated once there is a rest worth it."""
         if self.notice is None or turns <= 0.0:
             return
-        sentences = []
         with self._lock:
-            before_s, _ = self._under_way.get(run, (0.0, 0.0))
             self._under_way[run] = spent_s, turns
-            self._spent_s += spent_s - before_s
-            elapsed_s = self._spent_s / min(len(self._under_way), self.threads)
-            if elapsed_s >= self._look_s:
-                self._look_s = 2.0 * elapsed_s
-                forecast, least_s = self._forecast(elapsed_s)
-                if forecast.notable and forecast.runs[1] and least_s > self._stated_s:
-                    whole_s = forecast.whole_s(elapsed_s)
-                    self.prediction, self._stated_s = self.prediction or whole_s, whole_s[1]
-                    sentences.append(forecast.sentence)
-            budget_s = spent_s / steps * budget
-            short = spent_s >= BUDGET_LOOK_S and budget_s < spent_s / turns * self.turns
-            if short and budget_s >= LONG_S and not self._short_of_steps:
-                self._short_of_steps = True
-                sentences.append(self._budget_sentence(budget_s))
-        for sentence in sentences:
-            self.notice(sentence)
+            if self.estimate_s is not None:
+                return
+            spent, made = (sum(part) for part in zip(*self._under_way.values(), strict=True))
+            elapsed_s = spent / min(len(self._under_way), self.threads)
+            ended = turns >= self.first * (1.0 - 1e-9)
+            rest_s = spent / made * self.turns - elapsed_s
+            if elapsed_s < (LOOK_S if ended else EARLY_S) or rest_s < NOTABLE_S:
+                return
+            self.estimate_s = elapsed_s + rest_s
+        self.notice(f"{self._why}{estimate(rest_s, self.keys)}")
 
-    def _forecast(self, elapsed_s: float) -> tuple[Forecast, float]:
-        """What is to come, and the least time of all runs [s], those that have ended included."""
-        count, turns_run = self.runs + self.companions, [turns for _, turns in self._under_way.values()]
-        total = sum(turns_run)
-        # Turns by which a run was lengthened are no progress of the others.
-        planned = sum(min(turns, self.turns) for turns in turns_run)
-        progress_s = elapsed_s * planned / total
-        ended = sum(turns >= self.turns * (1.0 - 1e-9) for turns in turns_run)
-        to_come, measured = max(count - ended, 0), Measured(len(turns_run), total, self._spent_s)
-        first, rest = (math.ceil(number / self.threads) for number in (self.runs, self.companions))
-        low, high = (
-            factor * (measured.pace or 0.0) * self.turns * (first + companion * rest)
-            for factor, companion in zip(measured.factors(to_come, self.scatter), COMPANION, strict=True)
-        )
-        seconds = max(low - progress_s, 0.0), max(high - progress_s, 0.0)
-        longest_s = self.growth * high - elapsed_s if self.growth > 1.0 else 0.0
-        turns = max(count * self.turns - planned, 0.0)
-        return Forecast((to_come, to_come), (turns, turns), seconds, self.threads, longest_s, remedy=self._remedy), low
 
-    def _budget_sentence(self, budget_s: float) -> str:
-        per_turn = self.scene.numerics.step_budget_per_turn
-        return (
-            f"runs will use up their budget of steps after about {duration(budget_s)} (numerics.step_budget_per_turn = "
-            f"{per_turn}) at this pace; {self._remedy} to shorten them"
-        )
+def in_turn(scene: "Scene", threads: int = 1, length: float | None = None) -> float:
+    """Shaft turns of replicates and companions, by default of the scene's length, that each thread makes one after the other."""
+    numerics = scene.numerics
+    length = numerics.warm_up_turns + numerics.turns if length is None else length
+    return length * (math.ceil(numerics.replicates / threads) + math.ceil(numerics.companions / threads))
 
-    @property
-    def _remedy(self) -> str:
-        keys = ["model.slices"] if self.scene.slices > 1 else []
-        keys += ["numerics.turns", *(["numerics.replicates"] if self.scene.numerics.replicates > 1 else [])]
-        return f"reduce {' or '.join([', '.join(keys[:-1]), keys[-1]] if keys[1:] else keys)}"
+
+def plan_of(scene: "Scene", threads: int, points: int = 1) -> str:
+    """The runs of a scene at so many points, before they start."""
+    numerics = scene.numerics
+    heat = "" if scene.thermal is None else " after shorter ones for the temperatures"
+    runs = counted(points * (numerics.replicates + numerics.companions), "run")
+    return f"{runs} of {numerics.warm_up_turns + numerics.turns:.4g} shaft turns{heat}, {threads} at once"
+
+
+def keys_of(scene: "Scene") -> list[str]:
+    """Keys of a scene that make its runs shorter."""
+    keys = ["model.slices"] if scene.slices > 1 else []
+    return [*keys, "numerics.turns", *(["numerics.replicates"] if scene.numerics.replicates > 1 else [])]

@@ -23,7 +23,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import Brief, Figure
 from rbdyn.contact.film_thickness import hertz_pressure
@@ -178,7 +178,8 @@ def history(
     refuse(_request_faults(scene, turns, replicate, per_turn))
     bearing = roller_bearing(scene)
     z = bearing.rollers
-    pace = Pace(scene, notice, 1, scene.numerics.warm_up_turns + turns, 1)
+    length = scene.numerics.warm_up_turns + turns
+    pace = Pace(notice, length, length, 1)
     run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop(), pace)
     run.to(scene.numerics.warm_up_turns)
     run.forget()

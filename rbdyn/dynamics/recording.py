@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
@@ -253,7 +253,9 @@ def run_series(
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
     turns = scene.numerics.warm_up_turns + scene.numerics.turns
-    pace = Pace(scene, notice, len(rtols) * len(replicates), turns, threads_of(workers))
+    threads = threads_of(workers)
+    rounds = math.ceil(len(rtols) * len(replicates) / threads)
+    pace = Pace(notice, rounds * turns, turns, threads)
     tasks = [partial(run_replicate, scene, bearing, index, rtol, stop, pace) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 

@@ -13,7 +13,7 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 from rbdyn.base.faults import RunError
-from rbdyn.dynamics.ensemble import Outcome, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all
 from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
@@ -61,10 +61,12 @@ class Growing(Protocol):
 Start = Callable[[int, Companions | None, Stop], Growing]
 
 
-def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
+def run_until_settled(
+    scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop, pace: Pace | None = None
+) -> Ensemble:
     """Run the replicates of a scene until they have settled, then their companions just as far.
 
-    Raises RunError when a replicate cannot go on, KeyboardInterrupt.
+    ``pace``: hears of runs that get longer. Raises RunError when a replicate cannot go on, KeyboardInterrupt.
     """
     numerics = scene.numerics
     team = Team(start, range(numerics.replicates), None, workers, stop, progress, numerics.companions)
@@ -79,6 +81,9 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
         longer = next_stage(scene, runs, stage, begin.first) if scene.extends else None
         if longer is None:
             break
+        if pace is not None:
+            more = in_turn(scene, pace.threads, longer.turns - stage.turns)
+            pace.lengthen(more, numerics.warm_up_turns + longer.turns)
         stage = longer
     notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first))
     plan = companions_of(scene, runs)

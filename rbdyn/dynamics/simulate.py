@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.base.forecast import Notice
-from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, log, threads_of
+from rbdyn.base.pace import Notice
+from rbdyn.compiled.kernel import COMPILING
+from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
 from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -67,7 +68,7 @@ def simulate(
     - ``workers``: threads, all processors by default; the result does not depend on it
     - ``progress(done, total)`` is called after every run
     - ``target``: relative error to reach, which chooses tolerance, turns and replicates (``rbdyn.dynamics.target``)
-    - ``notice(sentence)`` is called early with the time that the runs still take; by default it is a warning of the logger
+    - ``notice(sentence)`` is called once with the time that the runs still take; by default it is a warning of the logger
       "rbdyn", None for silence
     - ``overrides``: keys of the scene with other values, such as ``["cage.mass_g=50"]``
 
@@ -79,16 +80,15 @@ def simulate(
         from rbdyn.dynamics.target import reach
 
         return reach(scene, target, partial(simulate, notice=notice), workers, progress, stop, notice)
-    stop = Stop(outer=stop)
-    run = partial(_ensemble, workers=workers, stop=stop)
+    run = partial(_ensemble, workers=workers, stop=Stop(outer=stop), pace=_pace(scene, notice, threads_of(workers)))
     if scene.thermal is not None:
         from rbdyn.dynamics.temperatures import with_temperatures
 
-        return with_temperatures(scene, run, _gather, progress, notice)
-    return _gather(scene, *run(scene, roller_bearing(scene), progress, notice))
+        return with_temperatures(scene, run, _gather, progress)
+    return _gather(scene, *run(scene, roller_bearing(scene), progress))
 
 
-def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None) -> Scene:
+def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = None, pace: Pace | None = None) -> Scene:
     """The scene at its steady temperatures where it has [thermal], else the scene itself.
 
     Raises RunError where it has none or is above a ceiling there, and InputError where it is impossible even at the temperature of its surroundings.
@@ -97,31 +97,35 @@ def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = N
         return scene
     from rbdyn.dynamics import temperatures
 
-    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=Stop(outer=stop)))
+    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=Stop(outer=stop), pace=pace))
+
+
+def _pace(scene: Scene, notice: Notice, threads: int) -> Pace:
+    """The time of a simulation, stated after its first run; the short runs of a heat balance come first."""
+    length = first = scene.numerics.warm_up_turns + (whole_windows(scene) if scene.extends else scene.numerics.turns)
+    turns = in_turn(scene, threads, length)
+    if scene.thermal is not None:
+        from rbdyn.dynamics.temperatures import short_turns
+
+        heat, first = short_turns(scene, threads)
+        turns += heat
+    return Pace(notice, turns, first, threads, keys_of(scene))
 
 
 def _ensemble(
-    scene: Scene, bearing: RollerBearing, progress: Reporter, notice: Notice, workers: int | None, stop: Stop
+    scene: Scene, bearing: RollerBearing, progress: Reporter, workers: int | None, stop: Stop, pace: Pace | None
 ) -> tuple[Ensemble, dict[str, float]]:
-    """Replicates of a scene with its parameters, and the time [s] that they took and were stated to take."""
+    """Replicates of a scene with its parameters, and the time [s] that they took."""
     compile_s = 0.0
     method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
     if (laws := (method, _types(bearing))) not in _prepared:
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
-    started = time.perf_counter()
-    numerics = scene.numerics
-    turns = numerics.warm_up_turns + (whole_windows(scene) if scene.extends else numerics.turns)
-    growth = numerics.extend_limit if scene.extends else 1.0
-    pace = Pace(scene, notice, numerics.replicates, turns, threads_of(workers), growth, numerics.companions)
-    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
-    wall_s = time.perf_counter() - started
-    return ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_prediction(pace)}
-
-
-def _prediction(pace: Pace) -> dict[str, float]:
-    """Least and most wall time that were stated while the runs went on; nothing where none was."""
-    return dict(zip(("predicted_least_s", "predicted_most_s"), pace.prediction or (), strict=False))
+    started, compiled_s = time.perf_counter(), COMPILING.seconds
+    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop, pace)
+    # A method that a run tries, and this run first, is compiled then.
+    more_s = COMPILING.seconds - compiled_s
+    return ensemble, {"wall_s": time.perf_counter() - started - more_s, "compile_s": compile_s + more_s}
 
 
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:

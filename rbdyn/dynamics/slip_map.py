@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
-from rbdyn.base.forecast import Notice
+from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
 from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.words import counted
-from rbdyn.dynamics.ensemble import UNLIKE, Outcome, Pace, Reporter, Stop, log, run_all, threads_of
+from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.part_figures import part_figures
@@ -166,9 +166,20 @@ def slip_map(
     store, version = Checkpoint(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
     keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
     points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := store.get(key))}
-    numerics, stop = scene.numerics, Stop()
+    numerics, stop, threads = scene.numerics, Stop(), threads_of(workers)
+    missing = len(scenes) - len(points)
+    # Threads that become free take runs of the next point.
+    turns, first = missing * in_turn(scene) / threads, numerics.warm_up_turns + numerics.turns
+    if scene.thermal is not None:
+        from rbdyn.dynamics.temperatures import short_turns
+
+        heat, first = short_turns(scene, threads)
+        turns += missing * heat
+    if notice is not None:
+        notice(plan_of(scene, threads, missing))
+    pace = Pace(notice, turns, first, threads, ["the values of --speed and --load", *keys_of(scene)])
     for place, point in enumerate(scenes if scene.thermal is not None else ()):
-        hot = _at_temperatures(point, workers, stop) if place not in points else point
+        hot = _at_temperatures(point, workers, stop, pace) if place not in points else point
         if isinstance(hot, str):
             points[place] = Point(
                 point.operation.inner_speed_rpm, point.operation.radial_load_N, f"failed: {hot}", {}, None
@@ -180,8 +191,6 @@ def slip_map(
     for place in list(bearings)[:1]:
         prepare(scenes[place], bearings[place])
     total, ended = len(bearings) * (numerics.replicates + numerics.companions), 0
-    turns, runs = numerics.warm_up_turns + numerics.turns, len(bearings) * numerics.replicates
-    pace = Pace(scene, notice, runs, turns, threads_of(workers), companions=total - runs, scatter=UNLIKE)
     series = [Series(place, scenes[place], bearings[place], stop, pace) for place in bearings]
 
     def collect(outcome: Outcome[Replicate]) -> list[Job]:
@@ -204,10 +213,10 @@ def slip_map(
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
 
 
-def _at_temperatures(scene: Scene, workers: int | None, stop: Stop) -> Scene | str:
+def _at_temperatures(scene: Scene, workers: int | None, stop: Stop, pace: Pace) -> Scene | str:
     """The scene at its steady temperatures, or why it has none."""
     try:
-        return steady_scene(scene, workers, stop)
+        return steady_scene(scene, workers, stop, pace)
     except (InputError, RunError) as error:
         return str(error)
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
-from rbdyn.base.forecast import Notice
-from rbdyn.dynamics.ensemble import Reporter, Stop
+from rbdyn.base.pace import Notice
+from rbdyn.base.words import counted
+from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
@@ -132,7 +133,10 @@ def reach(
     while runs < MOST_RUNS and not met and shortest < MOST_TURNS:
         runs += 1
         choice = choose(model, scene, MARGIN * target, shortest, longest)
-        result = simulate(choice.applied(scene), workers, progress, stop)
+        planned = choice.applied(scene)
+        if notice is not None:
+            notice(f"chosen: {plan_of(planned, threads_of(workers))}")
+        result = simulate(planned, workers, progress, stop)
         spent.update({key: result.cost[key] for key in ADDED})
         errors = {name: total_error(quantities_of(result)[name]) for name in AIMED}
         met = all(error is not None and error <= target for error in errors.values())
@@ -150,9 +154,7 @@ def reach(
         },
     }
     notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
-    # The prediction is that of the last run alone.
-    cost = {key: value for key, value in result.cost.items() if not key.startswith("predicted_")}
-    return replace(result, cost=cost | dict(spent), target=record, notes=notes)
+    return replace(result, cost=result.cost | dict(spent), target=record, notes=notes)
 
 
 def total_error(figure: Quantity) -> float | None:
@@ -175,11 +177,17 @@ def measure(
     scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None, notice: Notice = None
 ) -> tuple[Model, dict[str, float]]:
     """Pilots over the ladder of tolerances: their model and their cost (``ADDED``). Raises RunError."""
-    turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
+    numerics = scene.numerics
+    turns = max(PILOT_WINDOWS * numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
     bearing = roller_bearing(pilot)
     compile_s = prepare(pilot, bearing)
     started = time.perf_counter()
+    if notice is not None:
+        runs = len(LADDER) * PILOT_REPLICATES
+        notice(
+            f"{counted(runs, 'pilot run')} of {turns + numerics.warm_up_turns:.4g} shaft turns choose the runs that follow"
+        )
     series = run_series(pilot, bearing, LADDER, workers, progress, Stop(outer=stop), notice)
     wall_s = time.perf_counter() - started
     per_turn = PILOT_REPLICATES * (turns + scene.numerics.warm_up_turns)

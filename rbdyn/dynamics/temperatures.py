@@ -20,7 +20,6 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.forecast import Notice
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.heat import (
@@ -49,6 +48,8 @@ from rbdyn.thermal.network import NODES, carried_off
 
 # Replicates of a short run, and its counted turns as a share of those of the scene.
 SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
+# Short states of a search at least: two for the balance, and two for the gain of its loop.
+SHORT_STATES = 4
 # Warmer nodes of the runs that measure the gain [K].
 WARMER = 5.0
 # Rise of all nodes by the heat [K], up to which the losses of one state serve elsewhere, and solutions of the network that follow.
@@ -61,7 +62,7 @@ MOST_WHOLE_RUNS = 4
 LAST_STEP = 0.1
 
 # Simulates a scene by its parameters: replicates, and the time that they took.
-Simulate = Callable[[Scene, RollerBearing, Reporter, Notice], tuple[Ensemble, dict[str, float]]]
+Simulate = Callable[[Scene, RollerBearing, Reporter], tuple[Ensemble, dict[str, float]]]
 # The result of simulated replicates.
 Gather = Callable[[Scene, Ensemble, dict[str, float]], SimulationResult]
 
@@ -119,6 +120,13 @@ def short(scene: Scene) -> Scene:
     )
 
 
+def short_turns(scene: Scene, threads: int = 1) -> tuple[float, float]:
+    """Shaft turns of the short runs of a search that each thread makes one after the other, and those of one run."""
+    few = short(scene).numerics
+    length = few.warm_up_turns + few.turns
+    return SHORT_STATES * math.ceil(few.replicates / threads) * length, length
+
+
 class Balance:
     """Map from temperatures to those that balance their heat, by short runs or by those of the scene."""
 
@@ -139,13 +147,13 @@ class Balance:
         """Temperatures before any heat [C]."""
         return np.full(len(NODES), inlet_temperature(self.thermal, self.scene.lubricant))
 
-    def at(self, temperatures: Array, whole: bool = False, progress: Reporter = None, notice: Notice = None) -> State:
+    def at(self, temperatures: Array, whole: bool = False, progress: Reporter = None) -> State:
         """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt."""
         hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()))
         # The numerics of a short run change no parameter, and tables of traction take a quarter of a second.
         bearing = roller_bearing(hot)
         network = network_of(hot, self.thermal, bearing)
-        ensemble, clock = self.simulate(hot if whole else short(hot), bearing, progress, notice)
+        ensemble, clock = self.simulate(hot if whole else short(hot), bearing, progress)
         self.compile_s += clock["compile_s"]
         self.wall_s += clock["wall_s"]
         self.runs += [*ensemble.runs, *ensemble.companions]
@@ -248,15 +256,13 @@ def verdict_of(balance: Balance) -> Verdict:
     return Verdict(search.status, search.reason, search.slopes, [*search.states], temperatures)
 
 
-def with_temperatures(
-    scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None, notice: Notice = None
-) -> SimulationResult:
+def with_temperatures(scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None) -> SimulationResult:
     """The result of a scene with [thermal], at its steady temperatures or at the last possible ones. Raises as ``verdict_of``."""
     balance = Balance(scene, simulate)
     verdict = verdict_of(balance)
     path, temperatures = verdict.path, verdict.temperatures
     for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
-        state = balance.at(temperatures, True, progress, notice)
+        state = balance.at(temperatures, True, progress)
         path.append(state)
         temperatures = corrected(state, verdict.slopes)
         if _closes(state, verdict.slopes):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -456,12 +457,9 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     question = read_question(Path(command[0]), Path(command[2]), ("cage.mass_g",), ())
     (doubt,) = record["reasons"][-1:]
     assert design_of(question).doubt == doubt and f"note: {doubt}" in " ".join(first.stderr.split())
-    cost, predicted = record["cost"], record["cost"]["predicted"]
-    assert predicted["runs"][0] <= cost["runs"] <= predicted["runs"][1]
-    assert predicted["turns"][0] <= cost["turns"] <= predicted["turns"][1]
-    assert 0.0 < predicted["seconds"][0] < predicted["seconds"][1] and cost["seconds"] > 0.0
-    assert first.stderr.startswith(f"note: {predicted['runs'][0]:.0f} to {predicted['runs'][1]:.0f} runs of ")
-    assert "shaft turns in all took" in text(blocks(record)) and "; predicted were " in text(blocks(record))
+    low, high = map(int, re.match(r"note: (\d+) to (\d+) runs \(", first.stderr).groups())
+    assert low <= record["cost"]["runs"] <= high and record["cost"]["seconds"] > 0.0
+    assert "shaft turns in all took" in text(blocks(record))
     store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
     assert json.loads(_run(command).stdout) == record
     assert (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns == store

@@ -1,4 +1,4 @@
-"""What a command still costs: stated once on standard error, not with -q, with what is left alone; status counts all steps."""
+"""What a command costs: its runs before they start, their time after the first; on standard error, not with -q; status counts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from test_study_status import Killed, killed_in, study_command
 
 from doe import clearance
 from doe.commands.study import status_blocks
-from doe.running.runner import Ledger, Stage, agenda_in
+from doe.running import runner
+from doe.running.runner import Ledger, RunOutcome, Stage, agenda_in
 from doe.running.store import Point
 from doe.study_file import Study
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import inputs_digest, study_stages, study_status
-from rbdyn.base import forecast
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import notice
 from rbdyn.base.terminal import show
@@ -40,20 +40,22 @@ defaults = "none"
 points = 16
 "cage.mass_g" = { law = "normal", mean = 45.0, sd = 3.0 }
 """
-LEFT = re.compile(r"^note: (?:(\d+) to )?(\d+) runs? of [\d. to]+ shaft turns in all remains?, \d+ at once: ", re.MULTILINE)  # fmt: skip
+LEFT = re.compile(r"^note: (?:(\d+) to )?(\d+) runs?\b.*, \d+ at once$", re.MULTILINE)
+REST = re.compile(r"^note: (?:.*: )?the rest takes about [\d.]+ (?:s|min|h|days)", re.MULTILINE)
 OPTIONS = {"adaptive": False, "robust": False}
 
 
 def left(said: str) -> list[tuple[int, int]]:
-    """Runs that are left, at least and at most, in each sentence on what is left."""
+    """Runs to come, at least and at most, in each sentence of a plan."""
     return [(int(low or high), int(high)) for low, high in LEFT.findall(said)]
 
 
 @pytest.fixture
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let what is left be stated of the shortest runs."""
-    monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
-    monkeypatch.setattr(ensemble, "FIRST_LOOK_S", 0.0)
+    """Let the time of the shortest runs be stated."""
+    monkeypatch.setattr(runner, "NOTABLE_S", 0.0)
+    monkeypatch.setattr(ensemble, "NOTABLE_S", 0.0)
+    monkeypatch.setattr(ensemble, "LOOK_S", 0.0)
 
 
 @pytest.mark.parametrize(("command", "more", "runs"), [("simulate", (), 3), ("map", MAPPED, 6)])
@@ -61,8 +63,8 @@ def test_rbdyn_states_what_is_left_on_standard_error(command, more, runs, eager)
     """With --json standard output is one object; -q is silent."""
     arguments = (command, EXAMPLES / "cylindrical_roller.toml", *more, *SHORT, "--workers", "1")
     shown = in_process("rbdyn", *arguments, "--json")
-    assert shown.returncode == 0 and json.loads(shown.stdout) and left(shown.stderr)[0] == (runs, runs)
-    assert left(shown.stdout) == []
+    assert shown.returncode == 0 and json.loads(shown.stdout) and left(shown.stderr) == [(runs, runs)]
+    assert left(shown.stdout) == [] and len(REST.findall(shown.stderr)) == 1
     assert in_process("rbdyn", *arguments, "-q").stderr == ""
 
 
@@ -103,19 +105,18 @@ def interrupted_after(monkeypatch: pytest.MonkeyPatch, runs: int) -> list[int]:
 @pytest.mark.parametrize(
     ("command", "before", "fewest", "most"),
     [
-        # Baseline and pick, or five points, after what is left of twenty design runs.
-        ("study", 0, 18 + 2, 18 + 5),
-        # Sixteen input sets, or 512 with four times the replicates, and the scene itself.
-        ("uncertainty", 1, 16 - 1, 4 * 512 - 1),
+        # Baseline and pick, or five points, after twenty design runs.
+        ("study", 0, 20 + 2, 20 + 5),
+        # The scene itself and sixteen input sets, or 512 with four times the replicates.
+        ("uncertainty", 1, 1 + 16, 1 + 4 * 512),
         # At three conditions the scene itself, a wave of 64 or four, then 50 sets or twice as many.
-        # Stated before anything runs.
         ("calibrate", 0, 3 * (1 + 64 + 50), 3 * (1 + 4 * 64 + 100)),
     ],
 )
 def test_doe_states_what_is_left_on_standard_error(
     command, before, fewest, most, tmp_path, monkeypatch, eager
 ):  # fmt: skip
-    """After two runs, of a calibration before any, with --json too, where standard output is one object; -q is silent."""
+    """The plan before any run and one time after the first, with --json too, where standard output is one object; -q is silent."""
     path = short_study(tmp_path) if command == "study" else scene_in(tmp_path)
     rig = ("--data", tmp_path / "rig.csv") if command == "calibrate" else ()
     for quiet in (False, True):
@@ -127,7 +128,7 @@ def test_doe_states_what_is_left_on_standard_error(
             assert "note:" not in shown.stderr
         else:
             assert json.loads(shown.stdout)["status"] == "interrupted"
-            assert left(shown.stderr) == [(fewest, most)]
+            assert left(shown.stderr) == [(fewest, most)] and len(REST.findall(shown.stderr)) == 1
 
 
 def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
@@ -143,13 +144,13 @@ def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
-    """The first process counts from its second run on, the next at once, from the store. A confirmation, which needs two runs at
-    least and five at most, found four points to run and was stopped after two: two or three are left, or none for a new process."""
+    """The next process knows the runs of the first. A confirmation, which needs two runs at least and five at most, found four
+    points to run and was stopped after two: two or three are left, or none for a new process."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
-    first = stated(study, out, 8, monkeypatch)
-    assert left(f"note: {first[0]}") == [(18 + 2, 18 + 5)] and len(first) == 1
-    again = stated(study, out, 3, monkeypatch)
-    assert left(f"note: {again[0]}") == [(12 + 2, 12 + 5)] and len(again) == 1
+    assert stated(study, out, 8, monkeypatch)[0].startswith(
+        "22 to 25 runs (design runs 20, confirmation 2 to 5), 1 at once"
+    )
+    assert left(f"note: {stated(study, out, 3, monkeypatch)[0]}") == [(12 + 2, 12 + 5)]
     killed_in(monkeypatch, clearance.CONFIRMATION_SEEDS, after=2)
     with pytest.raises(Killed):
         study_command(study.path, out)
@@ -158,44 +159,73 @@ def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
 
 
 def test_status_counts_every_step_to_the_end(tmp_path, monkeypatch, capsys):
-    """Before anything runs and half-way: each step with its runs, those that are left, and a range of time that holds the time."""
+    """Before anything runs and half-way: each step with its runs, and those to come."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
     names = ["design runs", "front", "confirmation", "tolerances", "answer"]
     fresh = study_status(study, out)
     assert [each["name"] for each in fresh["stages"]] == names and fresh["runs_left"] == [22, 25]
-    assert {each["state"] for each in fresh["stages"]} == {"to come"} and fresh["left_range_s"] is None
+    assert {each["state"] for each in fresh["stages"]} == {"to come"}
     stated(study, out, 8, monkeypatch)
     record = study_status(study, out)
     assert [each["state"] for each in record["stages"]] == ["running", *["to come"] * 4]
     assert record["runs_left"] == [14, 17]
-    low, high = record["left_range_s"]
-    assert 0.0 < low <= record["left_s"] <= high
-    assert record["predicted_s"][0] < record["predicted_s"][1] and record["took_s"] is None
     show(status_blocks(record), Detail.LEAST)
     shown = capsys.readouterr().out
+    assert "of 20 design points 8 done, 0 failed, 0 running, 12 to come" in shown
     assert "5 steps: design runs 8 of 20, front, confirmation 0 of 5, tolerances, answer" in shown
-    assert "runs left 14 to 17; time left " in shown and "Predicted for the last command from its start: " in shown
+    assert "; runs to come 14 to 17" in shown and "time left" not in shown
     robust = {each.name: each for each in study_stages(study, robust=True)}
     settings = study.file.robust
     assert robust["robust"].runs_left == (3 * settings.points, robust["robust"].runs)
     assert list(robust)[-3:] == ["robust", "tolerances", "answer"]
 
 
-def test_a_run_under_way_states_what_is_left_before_it_ends(tmp_path, monkeypatch):
-    """Of a slow run the share that is done tells, with how much longer drift may make it."""
-    sentences: list[str] = []
-    monkeypatch.setattr("doe.running.runner.LOOK_S", 0.0)
-    with agenda_in(tmp_path / STORE, "doe study", 2, OPTIONS, "", sentences.append) as keeper:
-        keeper.plan([Stage.of("design runs", 20, 80.0)])
+@pytest.mark.parametrize(
+    ("compile_s", "cpu_s", "rest"), [(0.0, 40.0, "6.7 min"), (10.0, 40.0, "6.7 min"), (0.0, 10.0, "7.7 min")]
+)
+def test_the_first_run_tells_the_time_of_all_without_what_was_compiled(tmp_path, compile_s, cpu_s, rest):
+    """Of twenty runs on two threads the first takes 40 s as one of two, so nineteen take 19 / 2 as long, besides steps of 20 s, which
+    wait as runs do."""
+    said: list[str] = []
+    with agenda_in(tmp_path / STORE, "doe study", 2, OPTIONS, "", said.append) as keeper:
+        keeper.plan([Stage.of("design runs", 20, 80.0)], ("numerics.turns",), 20.0)
+        points = [Point(name, name) for name in "abcdefghijklmnopqrst"]
+        works = {point.key: 80.0 for point in points}
+        count = keeper.counting(works, silent)
+        ledger = Ledger(silent_ledger, silent_ledger, lambda point, outcome: count(points.index(point) + 1, 20))
 
         def engine(points, ledger):
-            keeper.hear("a", 0.25, 20.0)
+            for point in points[:3]:
+                result = {"cost": {"compile_s": compile_s, "cpu_s": cpu_s}}
+                ledger.give(point, RunOutcome(result, None, {"a": 40.0}.get(point.key, 9.0) + compile_s))
 
-        works, nowhere = {"a": 80.0, "b": 80.0}, Ledger(print, print, print)
-        keeper.timed(engine, works, growth=8.0)([Point("a", "a"), Point("b", "b")], nowhere)
-    (sentence,) = sentences
-    # A second a shaft turn: 20 runs of 80 turns on two threads are 800 s, in the range.
-    assert sentence.startswith("20 runs of 1600 shaft turns in all remain, 2 at once: ")
-    assert sentence.endswith("if figures drift")
-    low, high = (each for each in keeper.agenda.prediction_s)
-    assert low < 800.0 < high
+        keeper.timed(engine, works)(points, ledger)
+    assert said == ["20 runs, 2 at once", f"the rest takes about {rest}"]
+
+
+def test_runs_beyond_the_plan_are_estimated_anew(tmp_path):
+    """Input sets that are doubled: the number of runs and their time are stated once more."""
+    said: list[str] = []
+    with agenda_in(tmp_path / STORE, "doe uncertainty", 1, {}, "", said.append) as keeper:
+        keeper.plan([Stage.of("input sets", 2, 10.0, most=8)])
+        for names in ("ab", "abcdef"):
+            works = dict.fromkeys(names, 10.0)
+            count = keeper.counting(works, silent)
+            before = 0 if names == "ab" else 2
+            count(before, len(works))
+
+            def engine(points, ledger, count=count, before=before, works=works):
+                for number, point in enumerate(points, before + 1):
+                    count(number, len(works))
+                    ledger.give(point, RunOutcome({"cost": {}}, None, 30.0))
+
+            points = [Point(name, name) for name in names[before:]]
+            keeper.timed(engine, works)(points, Ledger(silent_ledger, silent_ledger, silent_ledger))
+    assert said == [
+        "2 to 8 runs, 1 at once", "the rest takes about 30 s",
+        "input sets goes on to 6 runs: the rest takes about 90 s",
+    ]  # fmt: skip
+
+
+def silent_ledger(*_: object) -> None:
+    """Keeps nothing."""

@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 
 import doe
-from doe.commands.study import status_blocks
 from doe.running.runner import agenda_in
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Heading, Note, Paragraph, Table
@@ -107,9 +106,7 @@ def test_a_clock_that_goes_back_gives_no_negative_time(tmp_path, monkeypatch):
     with agenda_in(tmp_path / "study.sqlite", "doe study", 1) as keeper:
         keeper.plan([])
         monkeypatch.setattr("time.time", lambda: 0.0)
-        keeper.finish([])
-        assert 0.0 <= keeper.agenda.took_s < 60.0
-    assert "-" not in str(keeper.agenda.took_s) and callable(status_blocks)
+        assert 0.0 <= keeper.elapsed_s < 60.0
 
 
 def test_save_names_what_no_file_can_be(tmp_path, monkeypatch):

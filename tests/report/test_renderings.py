@@ -1,4 +1,4 @@
-"""One tree of blocks, three renderings: the same figures with the same digits on a terminal, as Markdown and as HTML."""
+"""One tree of blocks, two renderings: the same figures with the same digits on a terminal and as HTML."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from synthetic_study import RESPONSES, motion, summary
 
 from doe.report.files import answer_text, blocks
-from doe.report.page import html_report, markdown_report, sections
+from doe.report.page import html_report, sections
 from rbdyn.base import html as page
-from rbdyn.base import markdown, terminal
+from rbdyn.base import terminal
 from rbdyn.base.blocks import Bullets, Detail, Heading, Note, Paragraph, Section, Table, Tile, Tiles
 
 NUMBER = re.compile(r"[-+±]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -27,11 +27,6 @@ def of_html(text: str) -> list[str]:
     """Figures of the words of HTML; of pictures none."""
     words = re.sub(r"<[^>]*>", " ", PICTURE.sub("", text))
     return numbers(html.unescape(words).replace("\xa0", " "))
-
-
-def of_markdown(text: str) -> list[str]:
-    """Figures of Markdown."""
-    return numbers(html.unescape(re.sub(r"\\(.)", r"\1", text)))
 
 
 def of_terminal(part: Section) -> list[str]:
@@ -53,24 +48,21 @@ def record() -> dict:
 
 
 @pytest.mark.parametrize("section", sections(record(), motion()), ids=lambda section: section.key)
-def test_every_section_has_the_same_figures_in_three_renderings(section):
-    """Terminal, Markdown and HTML of one section: the same numbers to the digit, in the same order.
+def test_every_section_has_the_same_figures_in_both_renderings(section):
+    """Terminal and HTML of one section: the same numbers to the digit, in the same order.
 
     Tiles have their own order on a page, which shows a figure with all that belongs to it together.
     """
     ours = of_terminal(section)
     assert ours or section.key in ("notes", "motion", "surfaces")
-    assert ours == of_markdown(markdown.text(section.blocks))
     tiles = any(isinstance(block, Tiles) for block in section.blocks)
     arranged = sorted if tiles else list
     assert arranged(ours) == arranged(of_html(page.section(section).partition("</h2>")[2]))
 
 
 def test_a_whole_study_has_the_same_figures_as_its_sections():
-    """The files of a study: report.md and report.html hold the numbers of the tree, answer.txt those of its answer."""
+    """The files of a study: report.html holds the numbers of the tree, answer.txt those of its answer."""
     tree = sections(record())
-    whole = [number for part in tree for number in [*numbers(part.title), *of_terminal(part)]]
-    assert of_markdown(markdown_report(record()).partition("\n")[2]) == whole
     body = html_report(record()).partition('<section id="answer"')[2].partition("</main>")[0]
     parts = re.split(r'<section id="', body)
     assert len(parts) == len(tree)
@@ -78,7 +70,7 @@ def test_a_whole_study_has_the_same_figures_as_its_sections():
     assert set(of_terminal(tree[0])) <= set(answer)
     assert set(answer) <= {*of_terminal(tree[0]), *of_terminal(tree[-1])}
     assert set(answer) <= set(numbers(terminal.text(blocks(record()))))
-    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in markdown_report(record())
+    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in body.replace("&nbsp;", " ")
 
 
 def test_no_key_stands_in_what_people_read():
@@ -89,8 +81,8 @@ def test_no_key_stands_in_what_people_read():
         assert name not in text, name
 
 
-def test_every_block_is_rendered_three_times_and_details_are_for_who_asks():
-    """Unit: each kind of block on the terminal, as Markdown and as HTML; quietly no notes, only verbosely all."""
+def test_every_block_is_rendered_twice_and_details_are_for_who_asks():
+    """Unit: each kind of block on the terminal and as HTML; quietly no notes, only verbosely all."""
     tree = [
         Paragraph("A verdict of 5 %.", "statement"), Note("a limit of 1.5"), Heading("Parts"), Bullets(["one of 2"]),
         Table("Sizes", ("part", "size"), [("ring & <b>", "1.0 ± 0.2")], "in mm", detail=Detail.ALL),
@@ -99,10 +91,8 @@ def test_every_block_is_rendered_three_times_and_details_are_for_who_asks():
     quiet, usual, full = (terminal.text(tree, detail) for detail in Detail)
     assert "note:" not in quiet and "note: a limit of 1.5" in usual and "1.0 ± 0.2" not in usual
     assert "ring & <b>" in full and full.index("Sizes") < full.index("in mm")
-    assert "| guide [mm] | 0.185 | 0.150 |" in markdown.text(tree) and "ring &amp; &lt;b>" in markdown.text(tree)
     written = "".join(map(page.render, tree))
     assert "ring &amp; &lt;b&gt;" in written and "baseline 0.150 mm" in written
-    assert numbers(full) == of_markdown(markdown.text(tree))
 
 
 def test_a_terminal_breaks_sentences_between_words():
@@ -118,7 +108,6 @@ def test_bad_news_has_a_word_and_a_class_of_its_own():
     block = Paragraph("LIMIT BROKEN at the pick: power loss <= 250.", "warning")
     written = page.render(block)
     assert 'class="warning"' in written and "Warning:" in written and "statement" not in written
-    assert markdown.text([block]).startswith("**Warning: LIMIT BROKEN")
     assert terminal.text([block]).startswith("Warning: LIMIT BROKEN")
     assert terminal.text([block], width=80, bold=True).startswith("\033[1mWarning: ")
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 
-from doe.report.page import LETTERS, SCRIPTS, html_report, markdown_report, packed
+from doe.report.page import LETTERS, SCRIPTS, html_report, packed
 from doe.report.pictures import response_surface
 from doe.report.sections.answer import CLEARANCES
 from doe.report.sections.fit import _coefficient
@@ -218,7 +218,7 @@ def test_nan_never_appears():
     record["gains"][RESPONSES[1]] = {"percent": 3.0, "error_percent": float("inf"), "verdict": "within error"}
     record["front"]["front"][0]["responses"][RESPONSES[0]] = float("nan")
     text = html_report(record, motion())
-    told = " ".join(Outline(text).words) + json.dumps(data_of(text)) + markdown_report(record)
+    told = " ".join(Outline(text).words) + json.dumps(data_of(text))
     assert not re.search(r"\b(nan|NaN|inf|Infinity|None|null ±)\b", re.sub(r"null", "", told))
     assert "failed" in told
 
@@ -227,7 +227,6 @@ def test_record_is_left_as_it_was():
     record = summary()
     before = copy.deepcopy(record)
     html_report(record, motion())
-    markdown_report(record)
     assert record == before
 
 
@@ -282,39 +281,6 @@ def test_packed_numbers_are_close_and_zero_is_exact():
     assert back[0] == back[-1] == 0.0
     assert back == pytest.approx(numbers, abs=0.51 * record["step"]) and record["step"] < 712.5 / 4000.0
     assert packed([5.0, 5.0])["letters"] == packed([0.0, 0.0])["letters"] == "AAAA"
-
-
-def test_markdown_says_the_same_and_links_the_pictures():
-    text = markdown_report(spoilt(summary(), "a|b<c_mm"), ["pareto_front.png", "cage_orbit.png"])
-    for words in (
-        "# Clearances of a made-up bearing",
-        "**The gain is real",
-        "9.240 0/-0.005",
-        "a\\|b&lt;c",
-        "11.16 ± 0.65 % less",
-    ):
-        assert words in text
-    assert text.index("## The answer") < text.index("## What was asked")
-    assert "![pareto front](<pareto_front.png>)" in text and "![cage orbit](<cage_orbit.png>)" in text
-    tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
-    assert len(tables) > 20
-    for table in tables:
-        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("clearance_study.toml", "clearance_study.toml"),
-        ("_a_ *b* `c`", "\\_a\\_ \\*b\\* \\`c\\`"),
-        ("force [N]", "force [N]"),
-        ("[a](b)", "[a]\\(b)"),
-        ("# x & <b>", "\\# x &amp; &lt;b>"),
-    ],
-)
-def test_markdown_keeps_names_as_they_are(name, text):
-    record = {"pick": {"x": 1.0}, "statement": name}
-    assert f"**{text}**" in markdown_report(record)
 
 
 def test_scripts_and_styles_are_in_the_package():
@@ -430,4 +396,3 @@ def test_the_odds_of_the_gains_follow_these():
     sure = record | {"robust": record["robust"] | {"all": [0.97, 0.94, 0.99]}}
     assert f'class="statement">{sentence}' in html_report(sure)
     assert "3.1 %, 80 (70 to 90)" in words and "57 (51 to 63)" in words
-    assert sentence in markdown_report(record, [])

@@ -15,8 +15,10 @@ from doe.dimension_chain import grade_tolerances, solve
 from doe.dimension_chain.allocation import cheapest, total_cost
 from doe.dimension_chain.closing import total
 from doe.dimension_chain.links import Cost
-from doe.report.page import markdown_report
+from doe.report.page import sections
 from doe.report.sections.chain import chain_blocks
+from rbdyn.base import terminal
+from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text
 
@@ -228,10 +230,10 @@ def test_a_moved_nominal_is_marked():
     record = moved.as_dict()["allocation"]
     assert (record["a"]["moved_mm"], record["b"]["moved_mm"]) == (pytest.approx(0.016), 0.0)
     assert "nominal moved [mm]" in (shown := printed("pocket", moved)) and "+0.016 " in shown
-    report = markdown_report({"chains": {"pocket": moved.as_dict()}})
+    report = reported({"chains": {"pocket": moved.as_dict()}})
     assert "nominal moved" in report and "+0.016 " in report
     still = solve(chain([(1, 9.236), (-1, 9.0, 0.0, -0.004)], (0.20, 0.24)), samples=10)
-    assert "nominal moved" not in printed("pocket", still) + markdown_report({"chains": {"pocket": still.as_dict()}})
+    assert "nominal moved" not in printed("pocket", still) + reported({"chains": {"pocket": still.as_dict()}})
 
 
 def test_tolerances_in_proportion_to_the_unit_say_that_they_are_no_grades():
@@ -244,3 +246,8 @@ def test_tolerances_in_proportion_to_the_unit_say_that_they_are_no_grades():
     )
     assert plain.status.removeprefix("ok") in printed("x", plain)
     assert grades.status == "ok: deviations allocated" and all(part.grade for part in grades.allocation)
+
+
+def reported(record):
+    """The report of a record in words."""
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(record))

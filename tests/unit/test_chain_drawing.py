@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.links import size_text
-from doe.report.page import markdown_report
+from doe.report.page import sections
 from doe.report.sections.chain import chain_blocks
+from rbdyn.base import terminal
+from rbdyn.base.blocks import Detail
 from rbdyn.base.terminal import text
 
 STEP = 0.001
@@ -122,7 +124,7 @@ def test_unit_rounding_inwards_uses_no_more_than_the_limits():
     result = solve(chain([(1, 9.2257), (-1, 9.0)], (0.2163, 0.2257), resolution_mm=STEP), samples=10)
     assert [part.text for part in result.allocation] == ["9.225 0/-0.004", "9.000 +0.004/0"]
     assert result.worst_case_mm == pytest.approx((0.217, 0.225))
-    report = markdown_report({"chains": {"pocket": result.as_dict()}})
+    report = reported({"chains": {"pocket": result.as_dict()}})
     assert "9.225 0/-0.004" in report and "0047" not in report
 
 
@@ -192,3 +194,8 @@ def test_unit_fixed_links_that_fill_the_limits_leave_nothing():
     for extra in ({"fixed": True}, {}):
         result = solve(chain([(1, 9.0, 1.0, 0.0, extra), (1, 8.0)], resolution_mm=STEP), samples=10)
         assert result.refused and "consume 1.0000 mm of the closing link's 1.0000 mm" in result.status
+
+
+def reported(record):
+    """The report of a record in words."""
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(record))

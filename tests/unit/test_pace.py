@@ -1,113 +1,106 @@
-"""Time of the runs of a scene: stated early, once, with what shortens it; no figure depends on it."""
+"""Time of the runs of a scene: stated once after the first, with what shortens it; no figure depends on it."""
 
+import io
 import logging
 import re
+import sys
 
 import pytest
 
 import rbdyn
-from rbdyn.base import forecast
+from rbdyn.base import pace
+from rbdyn.base.command import progress_bar
 from rbdyn.dynamics import ensemble
-from rbdyn.dynamics.ensemble import Pace
+from rbdyn.dynamics.ensemble import Pace, in_turn, keys_of, plan_of
 from rbdyn.dynamics.simulate import simulate
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")
 
 
-def watched(scene, looks, runs=10, turns=120.0, threads=2, growth=1.0, **more):
-    """A pace and what it states at looks (run, seconds, shaft turns, steps, budget of steps)."""
+def watched(looks, turns=1200.0, first=120.0, threads=2, keys=("numerics.turns",)):
+    """A pace and what it states at looks (run, seconds, shaft turns)."""
     stated = []
-    one = Pace(scene, stated.append, runs, turns, threads, growth, **more)
+    one = Pace(stated.append, turns, first, threads, keys)
     for look in looks:
         one.look(*look)
     return one, stated
 
 
-def test_unit_what_is_left_is_stated_with_runs_turns_and_time(make_scene):
-    """Unit: ten runs of 120 turns at 2.4 s a turn, two at once, take 24 min; 12 s of each are over."""
-    looks = [(0, 12.0, 5.0, 10_000, 10**7), (1, 12.0, 5.0, 10_000, 10**7)]
-    scene = make_scene("bearing.roller_profile=logarithmic")
-    one, (first,) = watched(scene, looks, growth=8.0)
-    assert re.fullmatch(
-        r"10 runs of 1200 shaft turns in all remain, 2 at once: \d+ to \d+ min, up to [\d.]+ h if figures drift; "
-        r"reduce model.slices, numerics.turns or numerics.replicates to shorten it",
-        first,
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.0123, "0.012 s"), (2.34, "2.3 s"), (119.0, "120 s"), (150.0, "2.5 min"), (9000.0, "2.5 h"), (1e6, "12 days")],
+)
+def test_unit_a_duration_has_two_digits_and_the_unit_that_suits_it(seconds, words):
+    """Unit: seconds, minutes, hours and days."""
+    assert pace.duration(seconds) == words
+
+
+def test_unit_only_a_plan_above_ten_minutes_says_how_to_make_it_smaller():
+    """Unit: the keys follow from 600 s on."""
+    keys = ("adaptive.budget", "numerics.turns", "numerics.replicates")
+    assert pace.estimate(599.0, keys) == "the rest takes about 10 min"
+    longer = "the rest takes about 10 min; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
+    assert pace.estimate(601.0, keys) == longer
+
+
+def test_unit_the_rest_is_estimated_from_the_first_run():
+    """Unit: of 1200 turns a thread the first run made 120 in 12 s, so 108 s follow; later looks say nothing."""
+    one, stated = watched([(0, 6.0, 60.0), (1, 6.0, 60.0), (0, 12.0, 120.0), (1, 14.0, 120.0)])
+    # Both runs made 180 turns in 18 s, 9 s on each thread.
+    assert stated == ["the rest takes about 110 s"] and one.estimate_s == pytest.approx(120.0)
+
+
+def test_unit_a_slow_first_run_is_not_waited_for():
+    """Unit: after twenty seconds the turns made so far tell."""
+    _, stated = watched([(0, 19.0, 1.0), (0, 21.0, 1.0)])
+    assert len(stated) == 1 and stated[0].startswith("the rest takes about 7 h; reduce numerics.turns")
+
+
+def test_unit_short_runs_say_nothing():
+    """Unit: nothing where less than some seconds are left, in the first moments, and where nobody listens."""
+    assert watched([(0, 2.5, 120.0)], turns=150.0)[1] == [] and watched([(0, 0.5, 120.0)])[1] == []
+    assert watched([(0, 12.0, 0.0)])[1] == []
+    silent = Pace(None, 1200.0, 120.0, 2)
+    silent.look(0, 12.0, 120.0)
+    assert silent.estimate_s is None
+
+
+def test_unit_runs_that_get_longer_are_estimated_anew():
+    """Unit: with 1200 turns more the rest is stated again with the reason; before a first estimate there is none."""
+    one, stated = watched([(0, 12.0, 120.0)])
+    one.lengthen(1200.0, 240.0)
+    one.look(0, 24.0, 240.0)
+    assert stated[1] == "figures drift, so all runs go on to 240 shaft turns: the rest takes about 3.6 min"
+    early, first = watched([])
+    early.lengthen(1200.0, 240.0)
+    early.look(0, 12.0, 120.0)
+    assert first == ["the rest takes about 3.8 min"]
+
+
+def test_unit_a_plan_counts_replicates_and_companions(make_scene):
+    """Unit: rounds of threads, the runs in words, and what shortens them."""
+    scene = make_scene(
+        "numerics.replicates=3", "numerics.turns=10", "numerics.discard_turns=2", "numerics.companion=true"
     )
-    low, high = one.prediction
-    assert low < 24 * 60 < high / 8.0 < 1.5 * 24 * 60
-
-
-def test_unit_companions_and_rounds_of_runs_count(make_scene):
-    """Unit: three runs on two threads are two rounds; a companion is one more, of 0.6 to 1.5 times a run."""
-    looks = [(0, 10.0, 10.0, 10_000, 10**7)]
-    (plain, _), (more, _) = (watched(make_scene(), looks, 3, 100.0, companions=count) for count in (0, 1))
-    assert plain.prediction[0] < 200.0 < plain.prediction[1]
-    assert more.prediction[0] / plain.prediction[0] == pytest.approx(1.3, rel=0.02)
-    assert more.prediction[1] / plain.prediction[1] == pytest.approx(1.75, rel=0.03)
-
-
-def test_unit_runs_that_have_ended_are_not_left(make_scene):
-    """Unit: of ten runs, of which four have made all their turns, six are left."""
-    looks = [(run, 20.0, 120.0, 10_000, 10**7) for run in range(4)]
-    one = Pace(make_scene(), (stated := []).append, 10, 120.0, 2)
-    one._look_s = 40.0
-    for look in looks:
-        one.look(*look)
-    assert stated[0].startswith("6 runs of 720 shaft turns in all remain")
-
-
-def test_unit_a_run_that_was_lengthened_leaves_the_others_their_turns(make_scene):
-    """Unit: of two runs of 10 turns one was lengthened to 40 at a second a turn; one companion of 10 turns is left after the other."""
-    looks = [(0, 40.0, 40.0, 10_000, 10**7)]
-    one, stated = watched(make_scene(), looks, 2, 10.0, threads=1, growth=8.0, companions=1)
-    assert stated[0].startswith("2 runs of 20 shaft turns in all remain, 1 at once: ")
-    # Ten turns of a run, and ten of a companion of 0.6 to 1.5 times the time, after the 40 s.
-    assert one.prediction[0] < 40.0 + 16.0 < 40.0 + 25.0 < one.prediction[1]
-
-
-def test_unit_a_budget_states_the_time_that_it_stands_for(make_scene):
-    """Unit: where steps run out before the turns do, a sentence says when, with the key."""
-    _, stated = watched(make_scene(), [(0, 12.0, 0.001, 10_000, 1_000_000)])
-    assert (
-        "runs will use up their budget of steps after about 20 min (numerics.step_budget_per_turn = 100000)"
-        in stated[-1]
-    )
-
-
-def test_unit_short_runs_say_nothing(make_scene):
-    """Unit: nothing in the first moments, nothing where all take less than some seconds, nothing where nobody asks."""
-    scene = make_scene()
-    assert watched(scene, [(0, 0.9, 0.1, 10_000, 10**9)])[1] == []
-    assert watched(scene, [(0, 1.2, 500.0, 10_000, 10**9)])[1] == []
-    assert watched(scene, [(0, 12.0, 0.0, 10_000, 10**9)])[1] == []
-    silent = Pace(scene, None, 10, 120.0, 2)
-    silent.look(0, 12.0, 0.001, 10_000, 10**9)
-    assert silent.prediction is None
-
-
-def test_unit_the_time_is_stated_again_where_it_exceeds_the_most(make_scene):
-    """Unit: a steady pace is stated once, one that becomes four times as slow twice; the first prediction stays."""
-    steady = [(0, 10.0 * 2.0**n, 2.0**n, 10_000 * 2**n, 10**9) for n in range(6)]
-    assert len(watched(make_scene(), steady)[1]) == 1
-    slower = [(0, 10.0, 10.0, 10_000, 10**9), (0, 40.0, 12.0, 20_000, 10**9), (0, 90.0, 20.0, 30_000, 10**9)]
-    one, stated = watched(make_scene(), slower)
-    assert len(stated) == 2 and one.prediction == watched(make_scene(), slower[:1])[0].prediction
+    companions = scene.numerics.companions
+    assert companions and in_turn(scene) == 12.0 * (3 + companions) and in_turn(scene, 4) == 24.0
+    assert plan_of(scene, 4) == f"{3 + companions} runs of 12 shaft turns, 4 at once"
+    assert plan_of(scene, 4, 5).startswith(f"{5 * (3 + companions)} runs ")
+    assert keys_of(scene) == ["numerics.turns", "numerics.replicates"]
+    assert keys_of(make_scene("bearing.roller_profile=logarithmic", "numerics.replicates=1"))[0] == "model.slices"
 
 
 def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog):
-    """Invariant: stated or not, by default as a warning of the logger "rbdyn", a simulation has the same bits; its cost has what
-    was predicted."""
+    """Invariant: stated or not, by default as a warning of the logger "rbdyn", a simulation has the same bits."""
     scene, stated = make_scene(*QUICK), []
-    monkeypatch.setattr(forecast, "NOTABLE_S", 1e9)
     plain = simulate(scene, notice=stated.append)
-    assert stated == [] and "predicted_most_s" not in plain.cost
-    monkeypatch.setattr(ensemble, "FIRST_LOOK_S", 0.0)
-    monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
+    assert stated == []
+    monkeypatch.setattr(ensemble, "LOOK_S", 0.0)
+    monkeypatch.setattr(ensemble, "NOTABLE_S", 0.0)
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)
-    assert "shaft turns in all remain" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
+    assert [each.getMessage().startswith("the rest takes about ") for each in caplog.records] == [True]
     assert (again.impact_force_N, again.power_loss_W) == (plain.impact_force_N, plain.power_loss_W)
-    assert 0.0 < again.cost["predicted_least_s"] <= again.cost["predicted_most_s"]
 
 
 def test_unit_a_spent_budget_states_the_seconds(make_scene):
@@ -115,3 +108,21 @@ def test_unit_a_spent_budget_states_the_seconds(make_scene):
     with pytest.raises(rbdyn.RunError) as gave_up:
         simulate(make_scene("numerics.step_budget_per_turn=100"), workers=1)
     assert re.search(r"step budget of \d+ used up after [\d.e-]+ s of running", str(gave_up.value))
+
+
+def test_unit_the_bar_shows_the_time_left_of_runs_longer_than_half_a_minute(monkeypatch):
+    """Unit: the bar of a terminal, on a clock that goes a minute a run."""
+
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    now, screen = [0.0], Screen()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("rich.console.monotonic", lambda: now[0])
+    with progress_bar("simulating", quiet=False) as progress:
+        for done in range(4):
+            now[0] = 60.0 * done
+            progress(done, 10)
+    assert "3/10" in screen.getvalue() and "0:07:00" in screen.getvalue()

@@ -46,7 +46,7 @@ def finished(tmp_path_factory):
 def test_every_file_is_written(finished):
     _, folder, files = finished
     assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
-    assert {"report.html", "report.md"} <= set(files)
+    assert {"report.html"} <= set(files)
     assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
     assert sum(name.startswith("surface_") for name in files) == 3
     sheets = pd.read_excel(folder / "tables.xlsx", sheet_name=None)

@@ -140,7 +140,7 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     assert "✗ broken" in page and ">limit<" in page
     assert re.search(r'class="warning"><strong>Warning:</strong> LIMIT BROKEN', page)
     assert not re.search(r'class="statement">[^<]*(LIMIT|a real loss|no gain)', page)
-    assert "LIMIT BROKEN" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "LIMIT BROKEN" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "broken" in (tmp_path / "out" / "confirmation.csv").read_text(encoding="utf-8")
 
 

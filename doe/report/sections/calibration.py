@@ -17,8 +17,8 @@ from doe.workflow.calibration import CALIBRATED, Calibration
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
-from rbdyn.base.forecast import Forecast, duration, span
 from rbdyn.base.identity import Identity
+from rbdyn.base.pace import duration
 from rbdyn.base.page import REPORT, with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, intact, sign
@@ -97,29 +97,14 @@ def record_of(calibration: Calibration, made_of: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def cost_of(runs: int, turns: float, seconds: float, predicted: Forecast | None) -> dict[str, Any]:
-    """Runs, shaft turns and wall time [s] until the files are written, and what was predicted before anything ran.
-
-    ``predicted``: least and most of each, with the time of all steps; None where nothing was predicted.
-    """
-    return {
-        "runs": runs,
-        "turns": turns,
-        "seconds": seconds,
-        "predicted": None
-        if predicted is None
-        else {name: [float(end) for end in getattr(predicted, name)] for name in ("runs", "turns", "seconds")},
-    }
+def cost_of(runs: int, turns: float, seconds: float) -> dict[str, Any]:
+    """Runs, shaft turns and wall time [s] until the files are written."""
+    return {"runs": runs, "turns": turns, "seconds": seconds}
 
 
 def _cost_words(cost: dict[str, Any]) -> str:
-    """What the calibration took compared with its prediction."""
-    runs, predicted = counted(cost["runs"], "run"), cost["predicted"]
-    took = f"{runs} of {shown(cost['turns'], 3)} shaft turns in all took {duration(cost['seconds'])}"
-    if predicted is None:
-        return f"{took}."
-    runs, turns = (" to ".join(dict.fromkeys(shown(end, 3) for end in predicted[name])) for name in ("runs", "turns"))
-    return f"{took}; predicted were {runs} runs of {turns} turns, {span(*predicted['seconds'])}."
+    """What the calibration took."""
+    return f"{counted(cost['runs'], 'run')} of {shown(cost['turns'], 3)} shaft turns in all took {duration(cost['seconds'])}."
 
 
 def _outputs(calibration: Calibration) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from doe.designs import Design
 from doe.report.sections.record import Record, factors
 from doe.report.still import GUIDE, Point, Still
 from doe.study_file import Study
-from doe.workflow.runs import RUNS_TABLE, actual_of
+from doe.workflow.runs import actual_of
 from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.records import quoted_cell
 from rbdyn.base.words import counted, label
@@ -63,7 +63,7 @@ def _points(summary: Record, points: Sequence[Record]) -> Table:
     ]
     note = "± are 95 % half-widths of the mean of the replicates."
     folded = len(rows) > LONG
-    return Table("Runs and responses", header, rows, note, folded, text_columns=(1,), sortable=True, file=RUNS_TABLE)
+    return Table("Runs and responses", header, rows, note, folded, text_columns=(1,), sortable=True)
 
 
 def _response(value: Record | None) -> str:

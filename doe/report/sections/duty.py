@@ -148,7 +148,7 @@ def _life(summary: Record) -> str:
     most = max(damage, key=lambda name: damage[name], default="")
     share = f", {100.0 * damage[most]:.0f} % of the damage at {most}" if len(damage) > 1 else ""
     return (
-        f"Life over the duty, L10r: {shown(before['L10_h'], 4)} h at the baseline, {shown(after['L10_h'], 4)} h at the pick "
+        f"Life over the duty, L10r: {shown(before['L10_h'], 3)} h at the baseline, {shown(after['L10_h'], 3)} h at the pick "
         f"({gain:+.2g} %); equivalent load {shown(after.get('equivalent_load_N'), 4)} N{share}."
     )
 
@@ -189,7 +189,7 @@ def _points(summary: Record) -> Table:
             point["name"],
             _percent(point.get("share")),
             ", ".join(point.get("set") or []),
-            *(shown(hours.get(point["name"]), 4) for hours in lives),
+            *(shown(hours.get(point["name"]), 3) for hours in lives),
         )
         for point in points
     ]

@@ -179,7 +179,7 @@ def _runs(name: str, runs: Sequence[Record]) -> Table:
     """Residual of each run, and its leverage on the surface."""
     rows = [(shown(run.get("run")), *(shown(run.get(key), 5) for key in RUN_COLUMNS)) for run in runs]
     header = ("run", *RUN_COLUMNS)
-    return Table(f"Runs and residuals of {label(name)}", header, rows, folded=True, detail=Detail.ALL, file="runs.csv")
+    return Table(f"Runs and residuals of {label(name)}", header, rows, folded=True, detail=Detail.ALL)
 
 
 def fit_record(surfaces: Sequence[Surface]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from doe.pareto import ParetoFront
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import REFERENCE, dominates
 from doe.report.sections.answer import gains_record, point_record, tolerances
-from doe.report.sections.front_pictures import Front, hypervolume, legend_still, pair_still, parallel_still
+from doe.report.sections.front_pictures import Front, drawn_pairs, hypervolume, legend_still, pair_still, parallel_still
 from doe.report.sections.record import SENSES, Record, change, factors, nearest, part, responses, share_with_interval
 from doe.report.sections.search import in_few_runs
 from doe.response_surface import Surface
@@ -120,8 +119,10 @@ def _pictures(summary: Record, names: Sequence[str], marks: Mapping[str, Record]
         return []
     confirmed = part(summary, "confirmation") or {}
     limits = bounds(summary)
+    goals = {response["name"]: str(response.get("goal")) for response in responses(summary)}
     pairs = [
-        pair_still(one, two, sets, marks, confirmed, limits) for one, two in combinations(list(enumerate(names)), 2)
+        pair_still((one, names[one]), (two, names[two]), sets, marks, confirmed, limits)
+        for one, two in drawn_pairs([goals.get(name, "min") for name in names])
     ]
     caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
     across = parallel_still(factors(summary), names, sets, marks)

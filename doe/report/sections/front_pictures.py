@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from doe.report.sections.record import Factor, Record, half_width, part
@@ -50,6 +51,14 @@ PARALLEL: dict[str, Any] = {
 }  # fmt: skip
 
 
+# Most pictures of pairs of responses: those of six goals.
+MOST_PAIRS = 15
+
+
+# Width of a picture with parallel axes for each of them [pt].
+AXIS_WIDTH = 96.0
+
+
 # Look of a limit of a response.
 LIMIT: dict[str, Any] = {"color": COLOURS["vermilion"], "linewidth": 1.6, "dashes": (4.4, 1.9)}
 
@@ -82,6 +91,23 @@ class Coordinate:
         return float((point[self.kind][self.name] - low) / (high - low))
 
 
+def drawn_pairs(goals: Sequence[str]) -> list[tuple[int, int]]:
+    """Places of the pairs of responses that are drawn, of goals; where there are fewer than two, limited ones follow.
+
+    A goal of "none" is that of a response that only has limits. There are never more than MOST_PAIRS.
+    """
+    aims = [place for place, goal in enumerate(goals) if goal != "none"]
+    limited = [place for place, goal in enumerate(goals) if goal == "none"]
+    return list(combinations(aims if len(aims) > 1 else [*aims, *limited], 2))[:MOST_PAIRS]
+
+
+def near(bounds: Iterable[float], values: Iterable[float]) -> list[float]:
+    """Limits no farther from the values than these are from each other; a farther one would leave no room for the front."""
+    finite = [value for value in values if math.isfinite(value)] or [0.0]
+    low, high = min(finite), max(finite)
+    return [bound for bound in bounds if 2.0 * low - high <= bound <= 2.0 * high - low]
+
+
 def pair_still(
     one: tuple[int, str],
     two: tuple[int, str],
@@ -90,17 +116,18 @@ def pair_still(
     confirmed: Mapping[str, Record],
     limits: Mapping[str, Sequence[float]],
 ) -> Still:
-    """The fronts over two responses, given as place and name, with their limits and with what simulation confirmed."""
+    """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
     simulated = {
         name: pair for name, point in confirmed.items() if (pair := _simulated(point, one[1], two[1])) is not None
     }
     points = [*marks.values(), *(point for front in sets for point in front.points)]
-    axes = []
+    axes, drawn = [], dict[str, list[float]]()
     for along, (place, name) in enumerate((one, two)):
         values = [point["responses"][name] for point in points] + [pair[0][along] for pair in simulated.values()]
-        axes.append(Coordinate("responses", name, place, span([*values, *limits.get(name, ())])))
+        drawn[name] = near(limits.get(name, ()), values)
+        axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
     words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
-    still = Still(words, partial(_pair, axes, sets, marks, simulated, limits))
+    still = Still(words, partial(_pair, axes, sets, marks, simulated, drawn))
     return replace(still, data={"front": _data("pair", axes, still)})
 
 
@@ -222,7 +249,8 @@ def parallel_still(
     axes = [Coordinate(kind, name, place, span((p[kind][name] for p in points), 0.02)) for kind, place, name in keys]
     words = f"Parallel coordinates of {len(points) - len(marks)} points of the front"
     both = {name: marks[name] for name in ("baseline", "pick") if name in marks}
-    still = Still(words, partial(_parallel, axes, sets, both), **PARALLEL)
+    look = PARALLEL | {"width": max(PARALLEL["width"], AXIS_WIDTH * len(axes))}
+    still = Still(words, partial(_parallel, axes, sets, both), **look)
     return replace(still, data={"front": _data("parallel", axes, still)})
 
 

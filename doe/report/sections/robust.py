@@ -79,7 +79,7 @@ def _decides(robust: Record) -> Table:
     ]
     header = ("input", "points of chance gained by measuring it", "flips at", "95 % interval", "pick is better")
     note = "Points: by how much of 100 the chance of the right choice rises."
-    return Table("Inputs that decide", header, rows, note, text_columns=(3, 4), file=DECIDES)
+    return Table("Inputs that decide", header, rows, note, text_columns=(3, 4))
 
 
 def _inputs(robust: Record) -> Table:
@@ -95,7 +95,7 @@ def _inputs(robust: Record) -> Table:
         for entry in robust.get("inputs") or []
     ]
     header = ("input", "range", "source of the range", "screened, share of a variance")
-    return Table("Inputs, ranges and sources", header, rows, text_columns=(1, 2), file=INPUTS)
+    return Table("Inputs, ranges and sources", header, rows, text_columns=(1, 2))
 
 
 def _effort(robust: Record) -> str:

@@ -1,0 +1,31 @@
+"""Pictures of the front stay readable: which pairs of responses they have, which limits, and how large they get."""
+
+import pytest
+
+from doe.report.pictures import _pairs
+from doe.report.sections.front_pictures import MOST_PAIRS, drawn_pairs, near
+
+
+def test_unit_pairs_are_of_goals():
+    """Unit: two goals of five responses are one pair, one goal is drawn against what is limited, ten goals make no more than fifteen."""
+    assert drawn_pairs(["none", "min", "none", "target", "none"]) == [(1, 3)]
+    assert drawn_pairs(["none", "max", "none"]) == [(1, 0), (1, 2), (0, 2)]
+    assert len(drawn_pairs(["min"] * 6 + ["none"] * 9)) == len(drawn_pairs(["min"] * 10)) == MOST_PAIRS == 15
+
+
+def test_unit_a_limit_far_away_is_left_out():
+    """Unit: of a front from 10 to 20 limits from 0 to 30 are drawn."""
+    assert near([-1.0, 0.0, 15.0, 30.0, 31.0], [10.0, 20.0, float("nan")]) == [0.0, 15.0, 30.0]
+
+
+@pytest.mark.parametrize(("goals", "limited", "size"), [(2, 0, (1, 1)), (3, 9, (1, 3)), (6, 9, (5, 3))])
+def test_unit_a_picture_of_the_front_has_three_panels_in_a_row(tmp_path, goals, limited, size):
+    """Unit: its width has a bound, and each mark stands once in the legend."""
+    from matplotlib import image
+
+    pairs, path = drawn_pairs(["min"] * goals + ["none"] * limited), tmp_path / "front.png"
+    for axis, (one, two) in _pairs(pairs, path):
+        axis.plot([one], [two], "s", label="baseline")
+    rows, columns = size
+    high, wide, _ = image.imread(path).shape
+    assert 600 * columns < wide < 670 * columns and 540 * rows < high < 620 * rows + 100
