@@ -184,7 +184,9 @@ def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], s
 def check_goals(study: Study) -> None:
     """Raises InputError for a study without a front: too few goals, or no tolerances for the tolerance-aware one."""
     if len(goals_of(study).objectives) < 2:
-        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one"])
+        limited = [study.responses[index] for index in dict.fromkeys(index for index, _, _ in goals_of(study).limited)]
+        hint = f'; {", ".join(limited)} may be one: write goal = "min" with its limit' if limited else ""
+        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one{hint}"])
     if study.file.front.tolerance_aware != "none":
         tolerances_of(study)
 

@@ -68,7 +68,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
     # Picks by several rules may be one point of the drawing.
     titles = "confirmation", "beyond the region"
     stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=2, most=most))
-    if robust or clearance.declares_unknowns(study):
+    if robust or study.asks_robust:
         from doe.workflow.robust import robust_stage
 
         stages.append(robust_stage(study))

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from doe import clearance
-from doe.clearance import Simulations, declares_unknowns
+from doe.clearance import Simulations
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
@@ -44,7 +44,7 @@ from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
-from doe.workflow.robust import Robust, check_robust, judge, robust_advice
+from doe.workflow.robust import Robust, check_robust, judge
 from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
@@ -335,12 +335,12 @@ def run_study(
     """Run the whole study; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster.
 
     ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``:
-    judge the pick over the unknown inputs; also done if any are declared. ``agenda``: counts all runs. Raises InputError,
+    judge the pick over the unknown inputs; a table [robust] asks for it too. ``agenda``: counts all runs. Raises InputError,
     RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
-    if robust := robust or declares_unknowns(study):
+    if robust := robust or study.asks_robust:
         check_robust(study)
     reference = check_study(study, adaptive)
     clock.plan(study_stages(study, adaptive, robust))
@@ -386,7 +386,7 @@ def run_study(
         published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *step_failures, *selection.failures),
-        notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
+        notes=(*notes, *([] if searched else advice(study, surfaces)), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
@@ -398,11 +398,6 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     front = find_front(study, surfaces)
     clock.lap("front_s")
     return surfaces, front
-
-
-def _advice(study: Study, surfaces: list[Surface], searched: Adaptive | None, robustness: Robust | None) -> list[str]:
-    """Advice on an adaptive search and a robust judgement, where these were not made."""
-    return [*([] if searched else advice(study, surfaces)), *([] if robustness else robust_advice(study))]
 
 
 def _with_its_categories(
