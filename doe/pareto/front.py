@@ -21,7 +21,19 @@ from scipy import special
 
 from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
-from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, growth, hypervolume, search
+from doe.pareto.search import (
+    Archive,
+    Doubt,
+    InfeasibleError,
+    Judged,
+    Objectives,
+    Search,
+    check_search,
+    dominates,
+    growth,
+    hypervolume,
+    search,
+)
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 
@@ -127,6 +139,9 @@ class ParetoFront:
     numbers. ``archive_size``: number of points before thinning, with their ``hypervolume``; ``hypervolume_history``
     (generations,) has the same scale. ``baseline_values`` (m,): None without a baseline. ``feasible``: share of the evaluated
     points that keep all limits. ``uncertainty`` and ``tolerance_aware``: None unless computed.
+
+    ``violations`` (c,): where no point keeps all limits, the front is the closest point alone, with this excess over each limit;
+    else None. ``tolerance_violations`` (c,): the same of the closest point of a tolerance-aware front, which is then None.
     """
 
     points: Array
@@ -149,6 +164,8 @@ class ParetoFront:
     goals: Goals
     uncertainty: FrontUncertainty | None = None
     tolerance_aware: ToleranceAware | None = None
+    violations: Array | None = None
+    tolerance_violations: Array | None = None
 
 
 def front(
@@ -164,6 +181,7 @@ def front(
     keep: int = 200,
     pick: Rule = "knee",
     doubt: Doubt | None = None,
+    closest: bool = False,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -176,9 +194,10 @@ def front(
         worst of each cost, the knee and the picks.
     pick : rule of the pick.
     doubt : maps points (n, k) to the errors of their responses downwards and upwards (n, m), within which limits must hold.
+    closest : where no evaluated point keeps all limits, return the closest one as the front.
 
     Raises MethodError when the bounds are no box, a setting is out of range, or an objective is not finite; InfeasibleError
-    when no evaluated point keeps all limits.
+    when no evaluated point keeps all limits, unless the ``closest`` is asked for.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     check_search(low, high, population, generations, keep)
@@ -186,7 +205,15 @@ def front(
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
+    violations = None
+    try:
+        searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
+    except InfeasibleError as error:
+        if not closest:
+            raise
+        violations, nearest = error.violations, error.point[None]
+        archive = Archive(nearest, goals.costs(_values(objectives, nearest)))
+        searched = Search([archive], population * generations, 0.0)
     points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
@@ -212,6 +239,7 @@ def front(
         generations=generations,
         seed=seed,
         goals=goals,
+        violations=violations,
     )
 
 

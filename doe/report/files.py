@@ -146,6 +146,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
         "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
+        "obstacles": outcome.obstacles.as_dict(),
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
         "asked": settings_record(study),

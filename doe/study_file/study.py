@@ -289,8 +289,11 @@ class Study:
 
     def with_responses(self, names: Collection[str]) -> Self:
         """The study with the responses of these names alone."""
-        responses = [response for response in self.file.response if response.name in names]
-        return replace(self, file=self.file.model_copy(update={"response": responses}))
+        return self.with_file(response=[response for response in self.file.response if response.name in names])
+
+    def with_file(self, **tables: Any) -> Self:
+        """The study with other tables in its file, which are not checked."""
+        return replace(self, file=self.file.model_copy(update=tables))
 
     @property
     def asks_robust(self) -> bool:

@@ -33,7 +33,7 @@ FRONT_S, TOLERANCES_S = 6.0, 1.0
 OWN_PICK_S = 2.0
 # Typical wall time [s] of the emulators for a batch of an adaptive search.
 BATCH_S = 0.6
-DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
+BASELINE, DESIGN, FRONT, TOLERANCES = "baseline", "design runs", "front", "tolerances"
 
 
 def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
@@ -46,7 +46,12 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         for levels in (study.every_level if adaptive else [study.levels])
         for key, work in design_works(study.with_levels(levels))
     }
-    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
+    confirmation = clearance.confirmation_run(study, study.baseline)
+    stages = [
+        _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),
+        Stage(DESIGN, (DESIGN,), len(works), sum(works.values())),
+        Stage(FRONT, besides_s=FRONT_S),
+    ]
     if adaptive:
         from doe.adaptive.search import FRESH
 
@@ -58,16 +63,15 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
         stage = _stage_of("adaptive front", runs, search, fewest=fewest)
         stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
-    # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
+    # The pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
-    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
-    confirmation = clearance.confirmation_run(study, study.baseline)
+    points = rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
     limited = any(response.lower is not None or response.upper is not None for response in study.file.response)
     tries = study.file.confirmation.tries - 1 if limited else 0
     most = points + tries + (len(study.factors) if adaptive else 0)
     # Picks by several rules may be one point of the drawing.
     titles = "confirmation", "beyond the region"
-    stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=2, most=most))
+    stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=1, most=most))
     if robust or study.asks_robust:
         from doe.workflow.robust import robust_stage
 

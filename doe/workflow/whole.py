@@ -37,16 +37,19 @@ from doe.workflow.confirmation import (
     limits_of,
     odds_sentence,
     sentence,
+    simulate_original,
     verdict_of,
     whirl_sentence,
 )
 from doe.workflow.duty import DutyAnswer, duty_answer
-from doe.workflow.front import check_goals, find_front, with_survival
+from doe.workflow.first_look import first_look
+from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
+from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge
 from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
-from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
+from doe.workflow.status import DESIGN, FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
@@ -296,6 +299,11 @@ class StudyResult:
                 missed[chain.name] = "no parts close it, as the notes say"
         return missed
 
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """All that keeps the study from its demands."""
+        return obstacles_of(self.study, self.surfaces, self.front, self.pick, self.missed_chains)
+
     @property
     def verdict(self) -> Verdict:
         """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
@@ -344,27 +352,30 @@ def run_study(
         check_robust(study)
     reference = check_study(study, adaptive)
     clock.plan(study_stages(study, adaptive, robust))
-    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
-    clock.lap("design_s", FRONT)
-    turns = runs.turns
-    surfaces, surface_front = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
-        searched = find_adaptive(study, runs, simulations) if adaptive else None
+        original = simulate_original(study, simulations)
+        clock.lap("baseline_s")
+        watched = first_look(study, folder, original, progress(DESIGN), None if agenda is None else agenda.notice)
+        runs = run_design(study, folder, workers, watched, scheduler, retry, agenda)
+        clock.lap("design_s", FRONT)
+        turns = runs.turns
+        surfaces, surface_front = _surfaces_and_front(study, runs, clock)
+        searched, unsearched = _searched(study, runs, simulations) if adaptive else (None, [])
         if searched is not None:
             study, runs, surfaces, surface_front = _with_its_categories(searched, runs, surfaces, surface_front)
             clock.lap("adaptive_s")
-        selection = choose(study, surfaces, surface_front, searched, simulations)
+        selection = choose(study, surfaces, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
         edge = _edge(study, surfaces, selection, searched, simulations)
         clock.lap("confirmation_s")
         robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
-    tolerances = _tolerances(study, surfaces, searched, confirmed)
+    tolerances = _tolerances(without_broken(study, confirmed["pick"]), surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
-    notes += [*augment_notes(study), *(reference.notes if reference else ())]
+    notes += [*unsearched, *augment_notes(study), *(reference.notes if reference else ())]
     step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,
@@ -398,6 +409,14 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     front = find_front(study, surfaces)
     clock.lap("front_s")
     return surfaces, front
+
+
+def _searched(study: Study, runs: Runs, simulations: Simulations) -> tuple[Adaptive | None, list[str]]:
+    """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
+    try:
+        return find_adaptive(study, runs, simulations), []
+    except OutOfReachError as error:
+        return None, [f"the adaptive search ended without a front, and the pick is that of the surfaces: {error}"]
 
 
 def _with_its_categories(

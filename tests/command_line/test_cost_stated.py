@@ -143,13 +143,14 @@ def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
-    """The first process counts from its second run on, the next at once, from the store. A confirmation, which needs two runs at
-    least and five at most, found four points to run and was stopped after two: two or three are left, or none for a new process."""
+    """The first process counts from its second run on, the next at once, from the store. A confirmation, which needs one run beside
+    the baseline at least and four at most, found three to run and was stopped after one: two or three are left, or none for a new
+    process."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
     first = stated(study, out, 8, monkeypatch)
-    assert left(f"note: {first[0]}") == [(18 + 2, 18 + 5)] and len(first) == 1
+    assert left(f"note: {first[0]}") == [(18 + 1, 18 + 4)] and len(first) == 1
     again = stated(study, out, 3, monkeypatch)
-    assert left(f"note: {again[0]}") == [(12 + 2, 12 + 5)] and len(again) == 1
+    assert left(f"note: {again[0]}") == [(12 + 1, 12 + 4)] and len(again) == 1
     killed_in(monkeypatch, clearance.CONFIRMATION_SEEDS, after=2)
     with pytest.raises(Killed):
         study_command(study.path, out)
@@ -160,21 +161,21 @@ def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
 def test_status_counts_every_step_to_the_end(tmp_path, monkeypatch, capsys):
     """Before anything runs and half-way: each step with its runs, those that are left, and a range of time that holds the time."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
-    names = ["design runs", "front", "confirmation", "tolerances", "answer"]
+    names = ["baseline", "design runs", "front", "confirmation", "tolerances", "answer"]
     fresh = study_status(study, out)
     assert [each["name"] for each in fresh["stages"]] == names and fresh["runs_left"] == [22, 25]
     assert {each["state"] for each in fresh["stages"]} == {"to come"} and fresh["left_range_s"] is None
     stated(study, out, 8, monkeypatch)
     record = study_status(study, out)
-    assert [each["state"] for each in record["stages"]] == ["running", *["to come"] * 4]
-    assert record["runs_left"] == [14, 17]
+    assert [each["state"] for each in record["stages"]] == ["done", "running", *["to come"] * 4]
+    assert record["runs_left"] == [13, 16]
     low, high = record["left_range_s"]
     assert 0.0 < low <= record["left_s"] <= high
     assert record["predicted_s"][0] < record["predicted_s"][1] and record["took_s"] is None
     show(status_blocks(record), Detail.LEAST)
     shown = capsys.readouterr().out
-    assert "5 steps: design runs 8 of 20, front, confirmation 0 of 5, tolerances, answer" in shown
-    assert "runs left 14 to 17; time left " in shown and "Predicted for the last command from its start: " in shown
+    assert "6 steps: baseline 0, design runs 8 of 20, front, confirmation 0 of 4, tolerances, answer" in shown
+    assert "runs left 13 to 16; time left " in shown and "Predicted for the last command from its start: " in shown
     robust = {each.name: each for each in study_stages(study, robust=True)}
     settings = study.file.robust
     assert robust["robust"].runs_left == (3 * settings.points, robust["robust"].runs)
