@@ -193,6 +193,14 @@ def out_of_reach(study: Study, point: Array, violations: Array, suffix: str = ""
     )
 
 
+def tolerances_out_of_reach(study: Study, violations: Array) -> str:
+    """That no point keeps all limits within the factors' own tolerances; the closest exceeds them by ``violations`` (c,)."""
+    return (
+        "No point keeps all limits at the ends of the factors' own tolerances: the closest misses "
+        f"{excess_words(study, violations)}."
+    )
+
+
 def excess_words(study: Study, violations: Array) -> str:
     """'impact_force_N <= 40 by 3.2' of the limits that are exceeded, by their excess (c,)."""
     by_limit = zip(goals_of(study).limited, violations.tolist(), strict=True)

@@ -14,9 +14,10 @@ from doe.response_surface import Surface
 from doe.study_file import Study
 from doe.study_file.study import PointResponse
 from doe.workflow.confirmation import Confirmed, Limit, Verdict, every_limit
-from doe.workflow.front import excess_words
-from doe.workflow.pick import ends_of, sides_of
+from doe.workflow.front import tolerances_out_of_reach
+from doe.workflow.pick import ends_of, place_of, sides_of
 from doe.workflow.surfaces import predict_all
+from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, derived
@@ -99,13 +100,15 @@ class Beyond(Record):
 class Obstacles(Record):
     """All that keeps a study from its demands; empty for one that meets them.
 
-    ``reachable``: whether a point of the region keeps all limits on the surfaces. ``beyond``: changes each of which meets the
-    missed limits by extrapolation. ``chains``: why, by name of the chain. ``tolerances``: why none follow; empty where they do.
+    ``reachable``: whether a point of the region keeps all limits on the surfaces. ``at_bounds``: factors of the best point at a
+    bound, and ``beyond``: changes of these each of which meets the missed limits by extrapolation; both empty where none is missed.
+    ``chains``: why, by name of the chain. ``tolerances``: why none follow, or too fine ones; empty where nothing else is missed.
     ``sentences``: all of it in words, what is missed first.
     """
 
     reachable: bool
     limits: tuple[MissedLimit, ...]
+    at_bounds: list[str]
     beyond: tuple[Beyond, ...]
     chains: dict[str, str]
     tolerances: str
@@ -119,30 +122,41 @@ class Obstacles(Record):
             ways = "; or ".join(way.words for way in self.beyond)
             yield f"The limits may be met beyond the region, extrapolated by the surfaces: {ways}. Widen the design there."
         elif self.limits:
-            yield (
-                "No factor at a bound meets the limits within half the region's width beyond it, by the extrapolated surfaces: relax "
-                "the limits, or change what is no factor."
+            names = " and ".join(quantity(name)[0] for name in self.at_bounds)
+            why = (
+                f"Moving {names} beyond the bound by half the region's width does not meet the limits, by the extrapolated surfaces"
+                if names
+                else "The best point lies within the bounds of all factors, so that a wider region does not help by the surfaces"
             )
+            yield f"{why}: relax the limits, or change what is no factor."
         yield from (f"Chain {name}: {why}." for name, why in self.chains.items())
         if self.tolerances:
             yield self.tolerances
 
 
 def obstacles_of(
-    study: Study, surfaces: Sequence[Surface], front: ParetoFront, pick: Confirmed, chains: Mapping[str, str]
+    study: Study,
+    surfaces: Sequence[Surface],
+    front: ParetoFront,
+    pick: Confirmed,
+    chains: Mapping[str, str],
+    widest: PickTolerances | None,
 ) -> Obstacles:
-    """The obstacles at the simulated ``pick``; ``chains``: those that miss their limits, and why."""
+    """The obstacles at the simulated ``pick``; ``chains``: those that miss their limits, and why; ``widest``: its tolerances."""
     missed = [limit for limit in every_limit(study, pick) if limit.verdict != "kept"]
     reachable = front.violations is None or not missed
     tolerances = ""
     if front.tolerance_violations is not None:
-        tolerances = (
-            "No point keeps all limits at the ends of the factors' own tolerances: the closest misses "
-            f"{excess_words(study, front.tolerance_violations)}."
-        )
-    beyond = tuple(_beyond(study, surfaces, pick, missed)) if missed else ()
+        tolerances = tolerances_out_of_reach(study, front.tolerance_violations)
+    elif widest is not None and (missed or chains):
+        tolerances = widest.warning if widest.any_width else widest.sentence
     return Obstacles(
-        reachable, tuple(MissedLimit.of(study, limit) for limit in missed), beyond, dict(chains), tolerances
+        reachable,
+        tuple(MissedLimit.of(study, limit) for limit in missed),
+        list(place_of(study, pick.point).bounds) if missed else [],
+        tuple(_beyond(study, surfaces, pick)) if missed else (),
+        dict(chains),
+        tolerances,
     )
 
 
@@ -157,16 +171,14 @@ def without_broken(study: Study, pick: Confirmed) -> Study:
     return study.with_file(response=responses)
 
 
-def _beyond(study: Study, surfaces: Sequence[Surface], pick: Confirmed, missed: Sequence[Limit]) -> Iterator[Beyond]:
-    """The least moves of each factor at a bound, else of all of them together, that meet the missed limits."""
+def _beyond(study: Study, surfaces: Sequence[Surface], pick: Confirmed) -> Iterator[Beyond]:
+    """The least moves of each factor at a bound, else of all of them together, that meet all limits."""
     ends = ends_of(study)
     sides = sides_of(pick.point[None], ends)[0]
     places = [place for place in np.flatnonzero(sides).tolist() if place not in study.inactive]
-    ways = [
-        moved for place in places if (moved := _least_move(study, surfaces, pick, missed, sides, [place])) is not None
-    ]
+    ways = [moved for place in places if (moved := _least_move(study, surfaces, pick, sides, [place])) is not None]
     if not ways and len(places) > 1:
-        ways = [moved for moved in [_least_move(study, surfaces, pick, missed, sides, places)] if moved is not None]
+        ways = [moved for moved in [_least_move(study, surfaces, pick, sides, places)] if moved is not None]
     for moved in ways:
         changed = np.flatnonzero(moved != pick.point).tolist()
         yield Beyond(
@@ -176,7 +188,7 @@ def _beyond(study: Study, surfaces: Sequence[Surface], pick: Confirmed, missed: 
 
 
 def _least_move(
-    study: Study, surfaces: Sequence[Surface], pick: Confirmed, missed: Sequence[Limit], sides: Array, places: list[int]
+    study: Study, surfaces: Sequence[Surface], pick: Confirmed, sides: Array, places: list[int]
 ) -> Array | None:
     """The nearest point (k,) to the pick, along these factors outward, at which the surfaces meet the limits; None without one."""
     ends, outward = ends_of(study), np.zeros(pick.point.size)
@@ -186,9 +198,8 @@ def _least_move(
     values = (
         pick.values + predict_all(surfaces, study.coded(points)) - predict_all(surfaces, study.coded(pick.point[None]))
     )
-    kept = every_limit(study, pick)
     broken = np.zeros(len(points), dtype=bool)
-    for limit in kept:
+    for limit in every_limit(study, pick):
         column = values[:, study.responses.index(limit.response)]
         beyond = column - limit.bound if limit.sense == "<=" else limit.bound - column
         broken |= beyond > -(limit.one_sided * np.nan_to_num(limit.error))

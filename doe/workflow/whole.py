@@ -302,7 +302,7 @@ class StudyResult:
     @cached_property
     def obstacles(self) -> Obstacles:
         """All that keeps the study from its demands."""
-        return obstacles_of(self.study, self.surfaces, self.front, self.pick, self.missed_chains)
+        return obstacles_of(self.study, self.surfaces, self.front, self.pick, self.missed_chains, self.tolerances)
 
     @property
     def verdict(self) -> Verdict:

@@ -198,7 +198,9 @@ def _clearances(summary: Record) -> list[Block]:
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
         *_temperatures(summary),
-        Paragraph(part(summary, "tolerances_warning") or "", "warning"),
+        Paragraph(
+            "" if part(summary, "obstacles", "tolerances") else part(summary, "tolerances_warning") or "", "warning"
+        ),
         Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
 
