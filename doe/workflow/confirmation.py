@@ -336,7 +336,9 @@ class Limit:
 
     @property
     def keepable(self) -> float:
-        """The nearest bound, to a digit below the error, that the value keeps with the demanded probability."""
+        """The nearest bound, to a digit below the error, that the value keeps with the demanded probability; NaN without a value."""
+        if math.isnan(self.value):
+            return math.nan
         sign = 1.0 if self.sense == "<=" else -1.0
         margin = float(np.nan_to_num(self.one_sided * self.error))
         edge = self.value + sign * max(margin, 0.0)

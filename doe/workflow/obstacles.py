@@ -20,7 +20,7 @@ from doe.workflow.surfaces import predict_all
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
-from rbdyn.base.records import Record, derived
+from rbdyn.base.records import Record, derived, finite
 from rbdyn.base.words import quantity, shown, with_error
 
 # Steps beyond a bound, up to half the width of the region again, at which the surfaces are asked.
@@ -28,7 +28,7 @@ STEPS = 20
 
 
 class MissedLimit(Record):
-    """A limit that the best point does not keep, by its simulated ``value`` with the 95 % half-width ``error``.
+    """A limit that the best point does not keep, by its simulated ``value`` (None: not reported) with the 95 % half-width ``error``.
 
     ``response``: the figure, at a ``point`` of the duty if there is one. ``excess``: how far the value is beyond the bound;
     negative where only the error is. ``relaxed``: the bound that this point keeps with the demanded probability.
@@ -38,11 +38,11 @@ class MissedLimit(Record):
     point: str | None
     sense: str
     bound: float
-    value: float
+    value: float | None
     error: float | None
     verdict: Verdict
-    excess: float
-    relaxed: float
+    excess: float | None
+    relaxed: float | None
     probability: float
 
     @classmethod
@@ -50,17 +50,16 @@ class MissedLimit(Record):
         """The record of a limit that is not kept."""
         asked = study.file.response[study.responses.index(limit.response)]
         name, point = (asked.figure, asked.point) if isinstance(asked, PointResponse) else (asked.name, None)
-        error = limit.error if np.isfinite(limit.error) else None
         return cls(
             response=name,
             point=point,
             sense=limit.sense,
             bound=limit.bound,
-            value=limit.value,
-            error=error,
+            value=finite(limit.value),
+            error=finite(limit.error),
             verdict=limit.verdict,
-            excess=-limit.room,
-            relaxed=limit.keepable,
+            excess=finite(-limit.room),
+            relaxed=finite(limit.keepable),
             probability=study.file.confirmation.limit_probability,
         )
 
@@ -70,6 +69,8 @@ class MissedLimit(Record):
         words, unit = quantity(self.response)
         where = f" at {self.point}" if self.point else ""
         bound, value = f"{self.sense} {self.bound:g} {unit}".rstrip(), with_error(self.value, self.error)
+        if self.excess is None or self.relaxed is None:
+            return f"Limit {words} {bound}{where} cannot be judged: the simulation reports no value."
         miss = (
             f"is missed by {f'{with_error(self.excess, self.error)} {unit}'.rstrip()}"
             if self.excess > 0.0
@@ -141,10 +142,14 @@ def obstacles_of(
     pick: Confirmed,
     chains: Mapping[str, str],
     widest: PickTolerances | None,
+    searched: bool,
 ) -> Obstacles:
-    """The obstacles at the simulated ``pick``; ``chains``: those that miss their limits, and why; ``widest``: its tolerances."""
+    """The obstacles at the simulated ``pick``, of the ``front`` unless it is of a ``searched`` one.
+
+    ``chains``: those that miss their limits, and why; ``widest``: tolerances of the pick.
+    """
     missed = [limit for limit in every_limit(study, pick) if limit.verdict != "kept"]
-    reachable = front.violations is None or not missed
+    reachable = searched or front.violations is None or not missed
     tolerances = ""
     if front.tolerance_violations is not None:
         tolerances = tolerances_out_of_reach(study, front.tolerance_violations)

@@ -302,7 +302,22 @@ class StudyResult:
     @cached_property
     def obstacles(self) -> Obstacles:
         """All that keeps the study from its demands."""
-        return obstacles_of(self.study, self.surfaces, self.front, self.pick, self.missed_chains, self.tolerances)
+        return obstacles_of(
+            self.study,
+            self.surfaces,
+            self.front,
+            self.pick,
+            self.missed_chains,
+            self.tolerances,
+            self.adaptive is not None,
+        )
+
+    @property
+    def status(self) -> str:
+        """The verdict on the limits unless they are kept; then "missed" where a chain or the tolerances are, else "ok"."""
+        if self.verdict != "kept":
+            return self.verdict
+        return "missed" if self.obstacles.sentences else "ok"
 
     @property
     def verdict(self) -> Verdict:

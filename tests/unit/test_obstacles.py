@@ -168,6 +168,7 @@ def test_unit_a_limit_is_relaxed_to_what_the_value_keeps(value, error, sense, ke
     assert limit.keepable == pytest.approx(kept, rel=1e-2)
     assert Limit("impact_force_N", sense, limit.keepable, value, error, 1.6449 / 1.96).verdict == "kept"
     assert abs(limit.keepable - value) < 2.0 * error + 0.02 * value
+    assert np.isnan(Limit("cage_slip", sense, 1.0, np.nan, np.nan, 0.8).keepable), "nothing is reported"
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def _judged(summary: Record) -> list[Block]:
     """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
     limits = list((part(summary, "limits") or {}).values())
     odds = [limit["odds"][0] for limit in limits if limit.get("odds")]
-    kept = summary.get("status", "ok") == "ok" and all(limit.get("verdict") == "kept" for limit in limits)
+    kept = summary.get("status", "ok") in ("ok", "missed") and all(limit.get("verdict") == "kept" for limit in limits)
     sentence = part(summary, "limits_sentence") or ""
     if not kept or min(odds, default=1.0) < NEARLY_ALL:
         return [_limits_judged(summary), Paragraph(sentence, "warning")]
