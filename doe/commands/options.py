@@ -24,7 +24,10 @@ Adaptive = Annotated[
 ]
 Robust = Annotated[
     bool,
-    flag("--robust", says="Judge the pick over the unknown inputs of the scene; a table [robust] asks for it too."),
+    flag(
+        "--robust",
+        says="Judge the pick over the unknown inputs of the scene; the table robust of a study asks for it too.",
+    ),
 ]
 Out = Annotated[Path | None, folder_option("Folder of results and of the store of finished runs.")]
 StudyOut = Annotated[

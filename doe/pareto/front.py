@@ -25,6 +25,7 @@ from doe.pareto.search import (
     Archive,
     Doubt,
     InfeasibleError,
+    Judge,
     Judged,
     Objectives,
     Search,
@@ -205,15 +206,8 @@ def front(
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    violations = None
-    try:
-        searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
-    except InfeasibleError as error:
-        if not closest:
-            raise
-        violations, nearest = error.violations, error.point[None]
-        archive = Archive(nearest, goals.costs(_values(objectives, nearest)))
-        searched = Search([archive], population * generations, 0.0)
+    judge = partial(_judged, objectives, goals, doubt)
+    searched, violations = _searched(judge, low, high, population, generations, seed, closest)
     points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
@@ -241,6 +235,19 @@ def front(
         goals=goals,
         violations=violations,
     )
+
+
+def _searched(
+    judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int, closest: bool
+) -> tuple[Search, Array | None]:
+    """The search; where no point keeps all limits and the ``closest`` is asked for, that point with its excess (c,) over each."""
+    try:
+        return search(judge, low, high, population, generations, seed), None
+    except InfeasibleError as error:
+        if not closest:
+            raise
+        archive = Archive(error.point[None], judge(error.point[None]).costs)
+        return Search([archive], population * generations, 0.0), error.violations
 
 
 def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: Array) -> Judged:

@@ -80,7 +80,9 @@ def find_front(
         try:
             pareto = _backed_off(study, lambda share: plain(doubt.at_share(share)), failed)
         except InfeasibleError:
-            pareto = replace(plain(doubt.expected, closest=True), pick_reason=CLOSEST)
+            # Before any point is simulated nothing is expected but the surfaces.
+            errors = doubt.expected if simulated else doubt.at_share(SHARES[-1])
+            pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
     pareto = _with_inactive_at(study, study.centre, pareto)
     pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
     if box is None or pareto.violations is not None:

@@ -376,10 +376,9 @@ def run_study(
         clock.lap("design_s", FRONT)
         turns = runs.turns
         surfaces, surface_front = _surfaces_and_front(study, runs, clock)
-        searched, unsearched = _searched(study, runs, simulations) if adaptive else (None, [])
+        searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
         if searched is not None:
             study, runs, surfaces, surface_front = _with_its_categories(searched, runs, surfaces, surface_front)
-            clock.lap("adaptive_s")
         selection = choose(study, surfaces, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
         edge = _edge(study, surfaces, selection, searched, simulations)
@@ -391,7 +390,6 @@ def run_study(
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
     notes += [*unsearched, *augment_notes(study), *(reference.notes if reference else ())]
-    step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,
         inputs=inputs,
@@ -411,7 +409,9 @@ def run_study(
         chains=chains,
         published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=(*runs.failures, *step_failures, *selection.failures),
+        failures=tuple(
+            failure for step in (runs, searched, robustness, selection) if step for failure in step.failures
+        ),
         notes=(*notes, *([] if searched else advice(study, surfaces)), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
@@ -426,12 +426,14 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _searched(study: Study, runs: Runs, simulations: Simulations) -> tuple[Adaptive | None, list[str]]:
+def _searched(study: Study, runs: Runs, simulations: Simulations, clock: "_Clock") -> tuple[Adaptive | None, list[str]]:
     """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
     try:
         return find_adaptive(study, runs, simulations), []
     except OutOfReachError as error:
         return None, [f"the adaptive search ended without a front, and the pick is that of the surfaces: {error}"]
+    finally:
+        clock.lap("adaptive_s")
 
 
 def _with_its_categories(
