@@ -194,8 +194,8 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
     return chain_from(table, source)
 
 
-def check_study(study: Study, adaptive: bool = False) -> Runs | None:
-    """The published runs, if any; ``adaptive``: whether the study also searches adaptively.
+def check_study(study: Study, adaptive: bool = False, robust: bool = False) -> Runs | None:
+    """The published runs, if any; ``adaptive``, ``robust``: whether the study also searches adaptively, and judges unknown inputs.
 
     Raises InputError with all faults of keys, responses, scenes, design and chains.
     """
@@ -205,6 +205,7 @@ def check_study(study: Study, adaptive: bool = False) -> Runs | None:
             lambda: clearance.confirmation_scene(study, study.baseline),
             lambda: check_chains(study),
             lambda: check_adaptive(study, adaptive),
+            lambda: check_robust(study) if robust else None,
         )
     )
     return reference_runs(study)
@@ -357,15 +358,13 @@ def run_study(
 ) -> StudyResult:
     """Run the whole study; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster.
 
-    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``:
-    judge the pick over the unknown inputs; a table [robust] asks for it too. ``agenda``: counts all runs. Raises InputError,
-    RunError, KeyboardInterrupt.
+    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``: judge the
+    pick over unknown inputs, as [robust] asks. ``agenda``: counts all runs. Raises InputError, RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
-    if robust := robust or study.asks_robust:
-        check_robust(study)
-    reference = check_study(study, adaptive)
+    robust = robust or study.asks_robust
+    reference = check_study(study, adaptive, robust)
     clock.plan(study_stages(study, adaptive, robust))
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
