@@ -125,7 +125,7 @@ class Obstacles(Record):
         elif self.limits:
             names = " and ".join(quantity(name)[0] for name in self.at_bounds)
             why = (
-                f"Moving {names} beyond the bound by half the region's width does not meet the limits, by the extrapolated surfaces"
+                f"Moving {names} beyond {'its bound' if len(self.at_bounds) == 1 else 'their bounds'} by half the region's width does not meet the limits, by the extrapolated surfaces"
                 if names
                 else "The best point lies within the bounds of all factors, so that a wider region does not help by the surfaces"
             )

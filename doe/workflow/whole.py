@@ -429,8 +429,11 @@ def _searched(study: Study, runs: Runs, simulations: Simulations, clock: "_Clock
     """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
     try:
         return find_adaptive(study, runs, simulations), []
-    except OutOfReachError as error:
-        return None, [f"the adaptive search ended without a front, and the pick is that of the surfaces: {error}"]
+    except OutOfReachError:
+        return None, [
+            "the adaptive search ended without a front, because nothing that it predicts is likely to keep all limits; the pick is "
+            "that of the surfaces"
+        ]
     finally:
         clock.lap("adaptive_s")
 

@@ -18,6 +18,7 @@ from doe import clearance
 from doe.cli import app
 from doe.study_file import Study
 from doe.workflow.confirmation import Limit
+from doe.workflow.front import OutOfReachError
 from doe.workflow.runs import region_of
 from doe.workflow.status import study_stages
 from doe.workflow.surfaces import reference_runs
@@ -115,6 +116,33 @@ def test_all_obstacles_are_named_at_once(tmp_path, monkeypatch):
         assert words in shown.stderr
     # Without the broken limits the gains and the kept limits still have tolerances.
     assert record["tolerances"] and "keeps impact_force_N <= 5" not in record["tolerances_sentence"]
+
+
+def test_a_limit_that_the_tolerances_break_is_an_obstacle_too(tmp_path, monkeypatch):
+    """The plain pick keeps it by simulation; parts at the ends of the stated tolerances would not, wherever they are."""
+    instant(monkeypatch.setattr)
+    aware = ('tolerance_aware = "none"', 'tolerance_aware = "worst_case"')
+    path = limited_study(tmp_path, "upper = 24.8", [QUICK, aware])
+    answer = doe.study(path, tmp_path / "out")
+    assert answer["limits"]["impact_force_N"]["verdict"] == "kept" and answer["status"] == "missed"
+    (sentence,) = answer["obstacles"]["sentences"]
+    assert sentence.startswith(
+        "No point keeps all limits at the ends of the factors' own tolerances: the closest misses impact"
+    )
+    assert commanded(path, "-q").exit_code == 1
+
+
+def test_an_adaptive_search_that_comes_nowhere_near_leaves_the_pick_to_the_surfaces(tmp_path, monkeypatch):
+    instant(monkeypatch.setattr)
+
+    def nothing(*given):
+        raise OutOfReachError(["no point of the region keeps all limits"])
+
+    monkeypatch.setattr("doe.workflow.whole.find_adaptive", nothing)
+    study = Study.load(limited_study(tmp_path, "upper = 5.0", [QUICK]))
+    outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
+    assert outcome.adaptive is None and outcome.status == "broken" and not outcome.obstacles.reachable
+    assert any("the adaptive search ended without a front" in note for note in outcome.notes)
 
 
 def test_the_point_of_the_duty_that_misses_is_named(tmp_path, monkeypatch):
