@@ -115,13 +115,6 @@ def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     return tables
 
 
-def declares_unknowns(study: Study) -> bool:
-    """Whether the study or its scene declares unknown inputs; values that are only named as estimates are none."""
-    if study.file.uncertain is not None:
-        return True
-    return bool(set(read_scene(study).get("uncertain", {})) - {"estimated"})
-
-
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError for an impossible value."""
     path = study.path_of(study.scene.file)

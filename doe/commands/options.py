@@ -23,7 +23,11 @@ Adaptive = Annotated[
     bool, flag("--adaptive", says="Also search the front in few runs, chosen by emulators; the pick is on it.")
 ]
 Robust = Annotated[
-    bool, flag("--robust", says="Judge the pick over the unknown inputs of the scene; also done if any are declared.")
+    bool,
+    flag(
+        "--robust",
+        says="Judge the pick over the unknown inputs of the scene; the table robust of a study asks for it too.",
+    ),
 ]
 Out = Annotated[Path | None, folder_option("Folder of results and of the store of finished runs.")]
 StudyOut = Annotated[

@@ -307,7 +307,7 @@ def front(
     from doe.report.sections.answer import asked_record
     from doe.report.sections.front import front_record, front_tables, given_point_record
     from doe.study_file import Study
-    from doe.workflow.front import check_goals, find_front, with_survival
+    from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
 
     path = path_given(path, "path")
     table, folder = (
@@ -320,6 +320,10 @@ def front(
         output.claim(path, *_read_later(study, table))
         surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
+        if pareto.violations is not None:
+            raise out_of_reach(study, pareto.points[0], pareto.violations)
+        if pareto.tolerance_violations is not None:
+            reading = (*reading, tolerances_out_of_reach(study, pareto.tolerance_violations))
         record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))

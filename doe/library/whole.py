@@ -138,7 +138,7 @@ def study(
     - ``path``: STUDY.toml; ``out``: folder of the report and the store of runs, by default STUDY_results in the current one.
       A finished answer and finished runs are found there, so an interrupted study goes on where it stopped
     - ``adaptive``: also search the front in few runs, chosen by emulators; the pick is then on it
-    - ``robust``: judge the pick over the unknown inputs of the scene; also done if any are declared
+    - ``robust``: judge the pick over the unknown inputs of the scene; the table robust of a study asks for it too
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs, with their time,
       and with what no run can change

@@ -21,7 +21,20 @@ from scipy import special
 
 from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
-from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, growth, hypervolume, search
+from doe.pareto.search import (
+    Archive,
+    Doubt,
+    InfeasibleError,
+    Judge,
+    Judged,
+    Objectives,
+    Search,
+    check_search,
+    dominates,
+    growth,
+    hypervolume,
+    search,
+)
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 
@@ -127,6 +140,9 @@ class ParetoFront:
     numbers. ``archive_size``: number of points before thinning, with their ``hypervolume``; ``hypervolume_history``
     (generations,) has the same scale. ``baseline_values`` (m,): None without a baseline. ``feasible``: share of the evaluated
     points that keep all limits. ``uncertainty`` and ``tolerance_aware``: None unless computed.
+
+    ``violations`` (c,): where no point keeps all limits, the front is the closest point alone, with this excess over each limit;
+    else None. ``tolerance_violations`` (c,): the same of the closest point of a tolerance-aware front, which is then None.
     """
 
     points: Array
@@ -149,6 +165,8 @@ class ParetoFront:
     goals: Goals
     uncertainty: FrontUncertainty | None = None
     tolerance_aware: ToleranceAware | None = None
+    violations: Array | None = None
+    tolerance_violations: Array | None = None
 
 
 def front(
@@ -164,6 +182,7 @@ def front(
     keep: int = 200,
     pick: Rule = "knee",
     doubt: Doubt | None = None,
+    closest: bool = False,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -176,9 +195,10 @@ def front(
         worst of each cost, the knee and the picks.
     pick : rule of the pick.
     doubt : maps points (n, k) to the errors of their responses downwards and upwards (n, m), within which limits must hold.
+    closest : where no evaluated point keeps all limits, return the closest one as the front.
 
     Raises MethodError when the bounds are no box, a setting is out of range, or an objective is not finite; InfeasibleError
-    when no evaluated point keeps all limits.
+    when no evaluated point keeps all limits, unless the ``closest`` is asked for.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     check_search(low, high, population, generations, keep)
@@ -186,7 +206,8 @@ def front(
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
+    judge = partial(_judged, objectives, goals, doubt)
+    searched, violations = _searched(judge, low, high, population, generations, seed, closest)
     points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
@@ -212,7 +233,21 @@ def front(
         generations=generations,
         seed=seed,
         goals=goals,
+        violations=violations,
     )
+
+
+def _searched(
+    judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int, closest: bool
+) -> tuple[Search, Array | None]:
+    """The search; where no point keeps all limits and the ``closest`` is asked for, that point with its excess (c,) over each."""
+    try:
+        return search(judge, low, high, population, generations, seed), None
+    except InfeasibleError as error:
+        if not closest:
+            raise
+        archive = Archive(error.point[None], judge(error.point[None]).costs)
+        return Search([archive], population * generations, 0.0), error.violations
 
 
 def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: Array) -> Judged:

@@ -139,9 +139,10 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     record: dict[str, Any] = {
         "format": FORMAT,
         "identity": study_identity("doe study", study).as_dict(),
-        "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
+        "status": outcome.status,
         "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
+        "obstacles": outcome.obstacles.as_dict(),
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
         "asked": settings_record(study),

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rbdyn.base.faults import (
     Consistent,
@@ -161,11 +161,16 @@ class Design(Consistent):
             yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true with it"
 
 
+# Keys by which a response wishes for something beyond its limits.
+WISHES = {"goal", "target", "weight", "desired"}
+
+
 class Goal(Consistent):
     """Goal and limits of a response."""
 
     goal: Literal["min", "max", "target", "none"] = "min"
-    """Goal: a small value, a large one, one near target, or "none" (the response is observed, or has limits only)."""
+    """Goal: a small value, a large one, one near target, or "none" (the response is observed, or has limits only). A response
+    that states a limit and no wish (goal, target, weight or desired) has none."""
     target: Figure | None = None
     """Desired value, for goal = "target"."""
     lower: Figure | None = None
@@ -176,6 +181,13 @@ class Goal(Consistent):
     """Weight in the desirability and weights picks."""
     desired: Annotated[list[Figure], Field(min_length=2, max_length=2)] | None = None
     """Ends of the desirability: 0 at one, 1 at the other (for a target 0 at both)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _limits_only(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or not {"lower", "upper"} & data.keys() or WISHES & data.keys():
+            return data
+        return {**data, "goal": "none"}
 
     def faults(self) -> Iterator[str]:
         if self.goal == "target" and self.target is None:
@@ -237,7 +249,7 @@ class Adaptive(Strict):
 
 
 class Robust(Consistent):
-    """Whether the pick beats the baseline over the unknown inputs of the scene, with --robust."""
+    """Whether the pick beats the baseline over the unknown inputs of the scene: with --robust, or where this table is written."""
 
     points: Annotated[int, Field(ge=32, le=1024)] = 256
     """Input sets, a power of two; the baseline and the pick are simulated at each."""

@@ -135,7 +135,7 @@ class StudyFile(Consistent):
     adaptive: Adaptive = Adaptive()
     """The search with emulators, with --adaptive."""
     robust: Robust = Robust()
-    """The judgement over unknown inputs, with --robust."""
+    """The judgement over unknown inputs, with --robust or where this table is written."""
     uncertain: Uncertain | None = None
     """Unknown inputs of the scene; they replace those that the scene declares."""
     tolerances: Tolerances | None = None
@@ -288,11 +288,18 @@ class Study:
         """Shares of the time by point of the duty, in the order of their names; empty without a duty."""
         return shares_of(self.file.duty)
 
+    def with_responses(self, names: Collection[str]) -> Self:
+        """The study with the responses of these names alone."""
+        return self.with_file(response=[response for response in self.file.response if response.name in names])
+
+    def with_file(self, **tables: Any) -> Self:
+        """The study with other tables in its file, which are not checked."""
+        return replace(self, file=self.file.model_copy(update=tables))
+
     @property
-    def of_figures(self) -> Self:
-        """The study without the limits at points of its duty: its responses are then those of any table of its design."""
-        figures = [response for response in self.file.response if not isinstance(response, PointResponse)]
-        return replace(self, file=self.file.model_copy(update={"response": figures}))
+    def asks_robust(self) -> bool:
+        """Whether its file asks for the judgement over unknown inputs, by a table [robust]."""
+        return "robust" in self.file.model_fields_set
 
     @property
     def figures(self) -> list[str]:

@@ -22,7 +22,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.intervals import chance_above, joint_freedom, joint_half_width, one_sided, standard_errors, times_wider
 from rbdyn.base.records import Record, derived, keyed, outside_json
-from rbdyn.base.words import chance, improvement, with_error
+from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
@@ -132,25 +132,30 @@ class Gain(Record):
         return self.error * float(times_wider(self.freedom, count))
 
 
+def simulate_original(study: Study, simulations: Simulations) -> Confirmed:
+    """The original design, simulated with fresh seeds. Raises RunError where it fails, InputError, KeyboardInterrupt."""
+    run = clearance.confirmation_run(study.with_levels(()), study.baseline)
+    (result,) = simulations.run([run], ["baseline"], simulations.progress("baseline"))
+    if isinstance(result, Failure):
+        raise RunError(f"the original design cannot be simulated: {result}")
+    return confirmed_from(study, Choice(study.baseline, "the original design"), result)
+
+
 @one_thread
 def confirm(
-    study: Study, choices: Mapping[str, Choice], simulations: Simulations
+    study: Study, baseline: Confirmed, choices: Mapping[str, Choice], simulations: Simulations
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
-    """Simulate the baseline and the choices with fresh seeds. Returns the simulated points and the failures.
+    """Simulate the choices with fresh seeds. Returns the simulated points, the ``baseline`` first, and the failures.
 
-    Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
+    Raises RunError where the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
-    points = {"baseline": Choice(study.baseline, "the original design"), **choices}
-    runs = [
-        clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, choice.point)
-        for name, choice in points.items()
-    ]
-    results = simulations.run(runs, list(points), simulations.progress("confirmation"))
-    confirmed, failures = {}, []
-    for (name, choice), result in zip(points.items(), results, strict=True):
+    runs = [clearance.confirmation_run(study, choice.point) for choice in choices.values()]
+    results = simulations.run(runs, list(choices), simulations.progress("confirmation"))
+    confirmed, failures = {"baseline": baseline}, []
+    for (name, choice), result in zip(choices.items(), results, strict=True):
         if not isinstance(result, Failure):
             confirmed[name] = confirmed_from(study, choice, result)
-        elif name in ("baseline", "pick"):
+        elif name == "pick":
             raise RunError(f"confirmation of the {result}")
         else:
             failures.append(result)
@@ -281,6 +286,28 @@ class Limit:
         if not self.error > 0.0:
             return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
         return float(chance_above(self.room, self.error, self.freedom))
+
+    @property
+    def bound_words(self) -> str:
+        """'impact force <= 40 N'."""
+        words, unit = quantity(self.response)
+        return f"{words} {self.sense} {self.bound:g} {unit}".rstrip()
+
+    @property
+    def excess_words(self) -> str:
+        """'3.2 ± 1.1 N' of a value beyond its bound."""
+        return f"{with_error(-self.room, self.error)} {quantity(self.response)[1]}".rstrip()
+
+    @property
+    def keepable(self) -> float:
+        """The nearest bound, to a digit below the error, that the value keeps with the demanded probability; NaN without a value."""
+        if math.isnan(self.value):
+            return math.nan
+        sign = 1.0 if self.sense == "<=" else -1.0
+        margin = float(np.nan_to_num(self.one_sided * self.error))
+        edge = self.value + sign * max(margin, 0.0)
+        unit = 10.0 ** -decimals(margin if margin > 0.0 else 1e-2 * abs(edge) or 1.0)
+        return float(f"{unit * (math.floor(sign * edge / unit) + 1.0) * sign:.12g}")
 
     @property
     def text(self) -> str:

@@ -17,7 +17,7 @@ from doe.study_file import Study
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed, Gain, gains
-from doe.workflow.front import find_front
+from doe.workflow.front import find_front, out_of_reach
 from doe.workflow.runs import Runs, rounded_within
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array
@@ -201,6 +201,8 @@ def own_pick(study: Study, runs: Runs, pick: Array) -> OwnPick:
     """
     surfaces = fit_surfaces(study, runs)
     front = find_front(study, surfaces)
+    if front.violations is not None:
+        raise out_of_reach(study, front.points[0], front.violations)
     point = rounded_within(study, front.points[front.pick])
     values = predict_all(surfaces, study.coded(point)[None])[0]
     from_pick = study.file.model_copy(update={"baseline": study.by_factor(pick)})

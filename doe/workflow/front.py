@@ -39,6 +39,8 @@ from rbdyn.base.faults import InputError, MethodError, refuse
 
 # Shares of the back-off from limits: the search takes the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
+# Why a point is the pick that no other comes nearer to the limits than.
+CLOSEST = "the point of the region that is expected to miss the limits least"
 # Keys of [front] that are arguments of the searches.
 SEARCH = {"population", "generations", "seed", "pick"}
 AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
@@ -54,14 +56,15 @@ def find_front(
     errors of the surfaces and from their misses at points ``simulated``; it shrinks where no point keeps all of it. Each
     of the ``failed`` earlier picks shows that the errors are larger: the back-off grows by its own size.
 
-    Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
+    Where no point keeps all limits, the front is the point that is expected to miss them least (see `ParetoFront.violations`).
+    Raises InputError when fewer than two responses have a goal, or a tolerance is missing.
     """
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
     doubt = SurfaceDoubt(study, surfaces, simulated)
 
-    def plain(share: float) -> ParetoFront:
+    def plain(errors: Doubt, closest: bool = False) -> ParetoFront:
         return front(
             lambda points: predict_all(surfaces, study.coded(points)),
             study.actual(-reach),
@@ -69,18 +72,28 @@ def find_front(
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
-            doubt=lambda points: doubt.at_share(share)(study.coded(points)),
+            doubt=lambda points: errors(study.coded(points)),
+            closest=closest,
         )
 
     with named_faults(study, goals, lambda point: point, ""):
-        pareto = _with_inactive_at(study, study.centre, _backed_off(study, plain, failed))
+        try:
+            pareto = _backed_off(study, lambda share: plain(doubt.at_share(share)), failed)
+        except InfeasibleError:
+            # Before any point is simulated nothing is expected but the surfaces.
+            errors = doubt.expected if simulated else doubt.at_share(SHARES[-1])
+            pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
+    pareto = _with_inactive_at(study, study.centre, pareto)
     pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
-    if box is None:
+    if box is None or pareto.violations is not None:
         return pareto
     with named_faults(study, goals, study.actual, " after manufacture"):
-        aware = _backed_off(
-            study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt.at_share(share)), failed
-        )
+        try:
+            aware = _backed_off(
+                study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt.at_share(share)), failed
+            )
+        except InfeasibleError as error:
+            return replace(pareto, tolerance_violations=error.violations)
     return replace(pareto, tolerance_aware=_with_inactive_at(study, np.zeros_like(study.centre), aware))
 
 
@@ -157,34 +170,55 @@ def _tolerance_aware(
 
 @contextmanager
 def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
-    """Raises InputError with a sentence for a search without a feasible point; ``actual`` gives points in factor units."""
+    """Raises OutOfReachError for a search without a feasible point; ``actual`` gives points in factor units."""
     try:
         yield
     except InfeasibleError as error:
-        by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
-        broken_limits = [
-            (study.responses[index], sense, limit, violation)
-            for (index, sense, limit), violation in by_limit
-            if violation > 0.0
-        ]
-        excess = " and ".join(
-            f"{name} {sense} {limit:g} by {violation:.4g}" for name, sense, limit, violation in broken_limits
-        )
-        position = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
-        raise InputError(
-            [
-                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{suffix}; the closest "
-                f"({position}) misses {excess}; loosen a limit or widen the design"
-            ]
-        ) from None
+        raise out_of_reach(study, actual(error.point), error.violations, suffix) from None
     except MethodError as error:
         raise InputError([f"{study.path}: front{suffix}: {error}"]) from None
+
+
+class OutOfReachError(InputError):
+    """No point of a search keeps all limits."""
+
+
+def out_of_reach(study: Study, point: Array, violations: Array, suffix: str = "") -> OutOfReachError:
+    """The fault of a study whose limits no point keeps: the closest ``point`` (k,) in factor units exceeds them by (c,)."""
+    excess = excess_words(study, violations)
+    position = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(point).items())
+    return OutOfReachError(
+        [
+            f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{suffix}; the closest "
+            f"({position}) misses {excess}; loosen a limit or widen the design"
+        ]
+    )
+
+
+def tolerances_out_of_reach(study: Study, violations: Array) -> str:
+    """That no point keeps all limits within the factors' own tolerances; the closest exceeds them by ``violations`` (c,)."""
+    return (
+        "No point keeps all limits at the ends of the factors' own tolerances: the closest misses "
+        f"{excess_words(study, violations)}."
+    )
+
+
+def excess_words(study: Study, violations: Array) -> str:
+    """'impact_force_N <= 40 by 3.2' of the limits that are exceeded, by their excess (c,)."""
+    by_limit = zip(goals_of(study).limited, violations.tolist(), strict=True)
+    return " and ".join(
+        f"{study.responses[index]} {sense} {limit:g} by {violation:.4g}"
+        for (index, sense, limit), violation in by_limit
+        if violation > 0.0
+    )
 
 
 def check_goals(study: Study) -> None:
     """Raises InputError for a study without a front: too few goals, or no tolerances for the tolerance-aware one."""
     if len(goals_of(study).objectives) < 2:
-        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one"])
+        limited = [study.responses[index] for index in dict.fromkeys(index for index, _, _ in goals_of(study).limited)]
+        hint = f'; {", ".join(limited)} may be one: write goal = "min" with its limit' if limited else ""
+        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one{hint}"])
     if study.file.front.tolerance_aware != "none":
         tolerances_of(study)
 
@@ -320,6 +354,13 @@ class SurfaceDoubt:
             return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
 
         return doubt
+
+    def expected(self, coded: Array) -> tuple[Array, Array]:
+        """The expected responses at coded points (n, k), as errors of the surfaces downwards and upwards (n, m)."""
+        shift = np.zeros((len(coded), len(self._surfaces)))
+        for index in self._fields:
+            shift[:, index] = self._off(index, coded)[0]
+        return -shift, shift
 
     def kept_with(self, index: int, sense: str, bound: float, coded: Array) -> float:
         """Probability with which a limited response keeps a bound ("<=" or ">=") at a coded point (k,)."""

@@ -30,6 +30,7 @@ from doe.workflow.confirmation import (
     confirm,
     confirmed_from,
     error_of_difference,
+    every_limit,
     limits_of,
     verdict_of,
 )
@@ -190,32 +191,30 @@ def choose(
     surfaces: Sequence[Surface],
     surface_front: ParetoFront,
     searched: Adaptive | None,
+    baseline: Confirmed,
     simulations: Simulations,
 ) -> Selection:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
-    If no point keeps all limits, the best of them is the pick. Raises RunError, InputError, KeyboardInterrupt.
+    Where no point is expected to keep all limits, that is the one expected to miss them least, as long as this is less than
+    simulated so far. If no point keeps all limits, the best of them is the pick. Raises RunError, InputError, KeyboardInterrupt.
     """
     trials: list[tuple[Confirmed, ParetoFront, SearchedPick | None]] = []
-    baseline: list[Confirmed] = []
     front = surface_front
     while True:
-        simulated = [*baseline, *(point for point, _, _ in trials)] if trials else []
+        simulated = [baseline, *(point for point, _, _ in trials)] if trials else []
         candidate = None if searched is None else searched_pick(study, surfaces, searched, simulated, len(trials))
         points = choices(study, front, searched, candidate)
         if any(np.array_equal(points["pick"].point, point.point) for point, _, _ in trials):
             break
-        confirmed, _ = confirm(study, {"pick": points["pick"]}, simulations)
-        baseline = [confirmed["baseline"]]
+        confirmed, _ = confirm(study, baseline, {"pick": points["pick"]}, simulations)
         trials.append((confirmed["pick"], front, candidate))
         limits_kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
         if limits_kept or len(trials) == study.file.confirmation.tries:
             break
         if searched is None:
-            try:
-                front = find_front(study, surfaces, [*baseline, *(point for point, _, _ in trials)], len(trials))
-            except InputError:
-                # With these misses no point keeps all limits.
+            front = find_front(study, surfaces, [baseline, *(point for point, _, _ in trials)], len(trials))
+            if front.violations is not None and not _promises_less(study, front, [point for point, _, _ in trials]):
                 break
     best = min(range(len(trials)), key=lambda place: _badness(limits_of(study, trials[place][0])))
     pick, front, candidate = trials[best]
@@ -224,8 +223,22 @@ def choose(
         if point is not pick:
             points[f"try_{number}"] = Choice(point.point, f"try {number} for the pick: {point.reason}")
     points["pick"] = Choice(pick.point, pick.reason)
-    confirmed, failures = confirm(study, points, simulations)
+    confirmed, failures = confirm(study, baseline, points, simulations)
     return Selection(front, candidate, confirmed, failures, len(trials))
+
+
+def _promises_less(study: Study, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:
+    """Whether the closest point is expected to miss its worst limit by less, beyond the errors, than every ``simulated`` one."""
+    assert front.violations is not None
+    bounds = np.array([abs(bound) or 1.0 for _, _, bound in goals_of(study).limited])
+    missed = min(
+        max(
+            (-limit.room - np.nan_to_num(limit.error)) / (abs(limit.bound) or 1.0)
+            for limit in every_limit(study, point)
+        )
+        for point in simulated
+    )
+    return bool((front.violations / bounds).max() < missed)
 
 
 def _badness(limits: Sequence[Limit]) -> tuple[int, float]:
@@ -268,7 +281,7 @@ def _candidates(
         point = study.actual(aware.points[aware.pick])
         yield name, point, aware.pick_reason
         yield "without_tolerances", front.points[front.pick], front.pick_reason
-    for rule, row in front.picks.items():
+    for rule, row in () if front.violations is not None else front.picks.items():
         yield rule, front.points[row], f"the pick by {rule}"
     if searched is not None:
         yield searched.name, searched.front.points[searched.front.pick], f"the pick of the {searched.name} front"
@@ -369,7 +382,7 @@ class Edge(Record):
 
 def share_at_edge(study: Study, points: Array) -> float:
     """Share of points (n, k) in factor units within `NEAR` of a bound of the region."""
-    return float(_sides(points, ends_of(study)).any(axis=1).mean())
+    return float(sides_of(points, ends_of(study)).any(axis=1).mean())
 
 
 def ends_of(study: Study) -> Array:
@@ -381,7 +394,7 @@ def ends_of(study: Study) -> Array:
 def place_of(study: Study, point: Array) -> Place:
     """Where a point (k,) in factor units lies in the region of the design."""
     ends = ends_of(study)
-    sides = zip(study.factors, _sides(point[None], ends)[0].tolist(), ends.tolist(), strict=True)
+    sides = zip(study.factors, sides_of(point[None], ends)[0].tolist(), ends.tolist(), strict=True)
     bounds = {name: ("upper", high) if side > 0 else ("lower", low) for name, side, (low, high) in sides if side}
     return Place(bounds, beyond_runs(study, study.coded(point)))
 
@@ -400,7 +413,7 @@ def edge_of(
     ``ends`` (k, 2): ends of the searched region in factor units, where that has grown.
     """
     ends = ends_of(study) if ends is None else ends
-    sides = _sides(pick.point[None], ends)[0]
+    sides = sides_of(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
     gains_beyond = {} if simulations is None else _gains_by_simulation(study, pick, names, simulations)
     outward = []
@@ -414,11 +427,11 @@ def edge_of(
         goals = {response.name: response.goal for response in study.file.response}
         which = "upper" if side > 0 else "lower"
         outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
-    far = None if searched is None else float(_sides(searched, ends).any(axis=1).mean())
+    far = None if searched is None else float(sides_of(searched, ends).any(axis=1).mean())
     return Edge(tuple(outward), beyond_runs(study, study.coded(pick.point)), share_at_edge(study, front), far)
 
 
-def _sides(points: Array, ends: Array) -> Whole:
+def sides_of(points: Array, ends: Array) -> Whole:
     """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k) in a region with ``ends`` (k, 2)."""
     half = 0.5 * (ends[:, 1] - ends[:, 0])
     offsets = (points - ends.mean(axis=1)) / half

@@ -412,17 +412,6 @@ class Robust:
     odds: Mapping[str, Share] = field(default_factory=dict)
 
 
-def robust_advice(study: Study) -> list[str]:
-    """Advice to judge the pick over the unknown inputs, if the scene names estimates; else none."""
-    if "uncertain" not in clearance.read_scene(study):
-        return []
-    runs = round(2 * study.file.robust.points * (1.0 + study.file.robust.settle))
-    return [
-        f"some values of the scene are estimates: --robust computes the probability that the pick is better, by {runs} short "
-        "simulations and more for a front; doe uncertainty shows their effect on each figure"
-    ]
-
-
 def check_robust(study: Study) -> None:
     """Raises InputError if the unknown inputs of the study's scene are declared wrongly."""
     case_of_study(study)

@@ -29,7 +29,7 @@ from rbdyn.result import read_json, versions
 
 # Typical wall time [s] of surfaces, front, pictures and report.
 STEPS_S = 12.0
-DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
+BASELINE, DESIGN, FRONT, TOLERANCES = "baseline", "design runs", "front", "tolerances"
 
 
 def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
@@ -42,7 +42,12 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         for levels in (study.every_level if adaptive else [study.levels])
         for key, work in design_works(study.with_levels(levels))
     }
-    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT)]
+    confirmation = clearance.confirmation_run(study, study.baseline)
+    stages = [
+        _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),
+        Stage(DESIGN, (DESIGN,), len(works), sum(works.values())),
+        Stage(FRONT),
+    ]
     if adaptive:
         from doe.adaptive.search import FRESH
 
@@ -53,17 +58,16 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         # The shortest search stops after one batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
         stages.append(_stage_of("adaptive front", runs, search, fewest=fewest))
-    # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
+    # The pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
-    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
-    confirmation = clearance.confirmation_run(study, study.baseline)
+    points = rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
     limited = any(response.lower is not None or response.upper is not None for response in study.file.response)
     tries = study.file.confirmation.tries - 1 if limited else 0
     most = points + tries + (len(study.factors) if adaptive else 0)
     # Picks by several rules may be one point of the drawing.
     titles = "confirmation", "beyond the region"
-    stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=2, most=most))
-    if robust or clearance.declares_unknowns(study):
+    stages.append(_stage_of("confirmation", points, confirmation, *titles, fewest=1, most=most))
+    if robust or study.asks_robust:
         from doe.workflow.robust import robust_stage
 
         stages.append(robust_stage(study))

@@ -24,12 +24,13 @@ from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file import Study
 from doe.study_file.study import Fitted
+from doe.study_file.table import read_sheet
 from doe.threads import one_thread
 from doe.workflow.runs import Runs, design_of, read_runs
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.records import Record, derived, keyed, outside_json
-from rbdyn.base.words import error_alone, improvement
+from rbdyn.base.words import are, error_alone, improvement
 
 
 def goals_of(study: Study) -> Goals:
@@ -172,11 +173,18 @@ class PublishedComparison(Record):
 
 
 def reference_runs(study: Study) -> Runs | None:
-    """The published table in the order of our design. Raises InputError for a table of another design."""
+    """The published table in the order of our design; responses that it does not have are NaN, and a note names them.
+
+    Raises InputError for a table of another design, or one without any of the responses.
+    """
     if study.file.reference is None:
         return None
     path = study.path_of(study.file.reference.file)
-    table = read_runs(study.of_figures, path)
+    sheet = read_sheet(path)
+    shared = [name for name in study.figures if name in sheet]
+    table = read_runs(study.with_responses(shared or study.figures), path)
+    missing = [name for name in study.figures if name not in shared]
+    notes = [f"{path} has no column of {', '.join(missing)}, which {are(len(missing))} not compared"] if missing else []
     rows = list(range(len(table.coded)))
     order = []
     for point in design_of(study).coded:
@@ -186,15 +194,17 @@ def reference_runs(study: Study) -> Runs | None:
                 [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
             )
         order.append(rows.pop(int(np.argmin(distance))))
-    # No table has limits at points of a duty.
-    blank = np.full((len(order), len(study.responses) - len(study.figures)), np.nan)
-    values, errors = (np.hstack([array[order], blank]) for array in (table.values, table.errors))
-    return Runs(table.coded[order], table.actual[order], values, errors, table.notes)
+    values, errors = np.full((2, len(order), len(study.responses)), np.nan)
+    columns = [study.responses.index(name) for name in shared]
+    values[:, columns], errors[:, columns] = table.values[order], table.errors[order]
+    return Runs(table.coded[order], table.actual[order], values, errors, (*table.notes, *notes))
 
 
 def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
     """Each response of both tables, with the linear effects on the surfaces through each table."""
-    study, ours, theirs = study.of_figures, *(_of_figures(study, runs) for runs in (ours, theirs))
+    columns = np.flatnonzero(np.isfinite(theirs.values).any(axis=0))
+    study = study.with_responses([study.responses[column] for column in columns])
+    ours, theirs = (_of_columns(runs, columns) for runs in (ours, theirs))
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
@@ -215,9 +225,8 @@ def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[Publi
     return rows
 
 
-def _of_figures(study: Study, runs: Runs) -> Runs:
-    """Runs without the limits at points of a duty, which are the last responses."""
-    columns = slice(len(study.figures))
+def _of_columns(runs: Runs, columns: Rows) -> Runs:
+    """Runs with these columns of their responses alone."""
     replicates = (
         runs.replicates if runs.replicates is None or runs.replicates.ndim == 1 else runs.replicates[:, columns]
     )

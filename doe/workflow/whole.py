@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.clearance import Simulations, declares_unknowns
+from doe.clearance import Simulations
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
@@ -38,17 +38,20 @@ from doe.workflow.confirmation import (
     limits_of,
     odds_sentence,
     sentence,
+    simulate_original,
     verdict_of,
     whirl_sentence,
 )
 from doe.workflow.duty import DutyAnswer, duty_answer
-from doe.workflow.front import check_goals, find_front, known_tolerances, with_survival
+from doe.workflow.first_look import first_look
+from doe.workflow.front import OutOfReachError, check_goals, find_front, known_tolerances, with_survival
+from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
 from doe.workflow.parts import grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.rivals import Forecast, rivals_sentences
-from doe.workflow.robust import Robust, check_robust, judge, robust_advice
+from doe.workflow.robust import Robust, check_robust, judge
 from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
-from doe.workflow.status import FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
+from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
@@ -194,8 +197,8 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
     return chain_from(table, source)
 
 
-def check_study(study: Study, adaptive: bool = False) -> Runs | None:
-    """The published runs, if any; ``adaptive``: whether the study also searches adaptively.
+def check_study(study: Study, adaptive: bool = False, robust: bool = False) -> Runs | None:
+    """The published runs, if any; ``adaptive``, ``robust``: whether the study also searches adaptively, and judges unknown inputs.
 
     Raises InputError with all faults of keys, responses, scenes, design and chains.
     """
@@ -205,6 +208,7 @@ def check_study(study: Study, adaptive: bool = False) -> Runs | None:
             lambda: clearance.confirmation_scene(study, study.baseline),
             lambda: check_chains(study),
             lambda: check_adaptive(study, adaptive),
+            lambda: check_robust(study) if robust else None,
         )
     )
     return reference_runs(study)
@@ -313,6 +317,26 @@ class StudyResult:
                 missed[chain.name] = "no parts close it, as the notes say"
         return missed
 
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """All that keeps the study from its demands."""
+        return obstacles_of(
+            self.study,
+            self.surfaces,
+            self.front,
+            self.pick,
+            self.missed_chains,
+            self.tolerances,
+            self.adaptive is not None,
+        )
+
+    @property
+    def status(self) -> str:
+        """The verdict on the limits unless they are kept; then "missed" where a chain or the tolerances are, else "ok"."""
+        if self.verdict != "kept":
+            return self.verdict
+        return "missed" if self.obstacles.sentences else "ok"
+
     @property
     def verdict(self) -> Verdict:
         """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
@@ -351,39 +375,38 @@ def run_study(
 ) -> StudyResult:
     """Run the whole study; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster.
 
-    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``:
-    judge the pick over the unknown inputs; also done if any are declared. ``agenda``: counts all runs. Raises InputError,
-    RunError, KeyboardInterrupt.
+    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``: judge the
+    pick over unknown inputs, as [robust] asks. ``agenda``: counts all runs. Raises InputError, RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
-    if robust := robust or declares_unknowns(study):
-        check_robust(study)
-    reference = check_study(study, adaptive)
+    robust = robust or study.asks_robust
+    reference = check_study(study, adaptive, robust)
     if agenda is not None:
         agenda.plan(study_stages(study, adaptive, robust), shorter_by(study, adaptive, robust), STEPS_S)
-    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
-    clock.lap("design_s", FRONT)
-    turns = runs.turns
-    surfaces, surface_front = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
-        searched = find_adaptive(study, runs, simulations) if adaptive else None
+        original = simulate_original(study, simulations)
+        clock.lap("baseline_s")
+        watched = first_look(study, folder, original, progress(DESIGN), None if agenda is None else agenda.notice)
+        runs = run_design(study, folder, workers, watched, scheduler, retry, agenda)
+        clock.lap("design_s", FRONT)
+        turns = runs.turns
+        surfaces, surface_front = _surfaces_and_front(study, runs, clock)
+        searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
         if searched is not None:
             study, runs, surfaces, surface_front = _with_its_categories(searched, runs, surfaces, surface_front)
-            clock.lap("adaptive_s")
-        selection = choose(study, surfaces, surface_front, searched, simulations)
+        selection = choose(study, surfaces, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
         edge = _edge(study, surfaces, selection, searched, simulations)
         clock.lap("confirmation_s")
         robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
-    tolerances = _tolerances(study, surfaces, searched, confirmed)
+    tolerances = _tolerances(without_broken(study, confirmed["pick"]), surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
-    notes += [*augment_notes(study), *(reference.notes if reference else ())]
-    step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
+    notes += [*unsearched, *augment_notes(study), *(reference.notes if reference else ())]
     return StudyResult(
         study=study,
         inputs=inputs,
@@ -403,8 +426,10 @@ def run_study(
         chains=chains,
         published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=(*runs.failures, *step_failures, *selection.failures),
-        notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
+        failures=tuple(
+            failure for step in (runs, searched, robustness, selection) if step for failure in step.failures
+        ),
+        notes=(*notes, *([] if searched else advice(study, surfaces)), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
@@ -418,9 +443,17 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _advice(study: Study, surfaces: list[Surface], searched: Adaptive | None, robustness: Robust | None) -> list[str]:
-    """Advice on an adaptive search and a robust judgement, where these were not made."""
-    return [*([] if searched else advice(study, surfaces)), *([] if robustness else robust_advice(study))]
+def _searched(study: Study, runs: Runs, simulations: Simulations, clock: "_Clock") -> tuple[Adaptive | None, list[str]]:
+    """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
+    try:
+        return find_adaptive(study, runs, simulations), []
+    except OutOfReachError:
+        return None, [
+            "the adaptive search ended without a front, because nothing that it predicts is likely to keep all limits; the pick is "
+            "that of the surfaces"
+        ]
+    finally:
+        clock.lap("adaptive_s")
 
 
 def _with_its_categories(

@@ -205,10 +205,11 @@ def test_command_line_a_study_whose_chain_misses_ends_with_one(tmp_path, monkeyp
     assert shown.returncode == 1, shown.stderr
     why = "the fixed links consume 0.0124 mm of the closing link's 0.0100 mm"
     assert f"note: chain pocket will miss its limits: {why}" in shown.stderr
-    assert f"chain pocket: refused: {why}" in shown.stderr
+    assert f"Chain pocket: refused: {why}" in shown.stderr
     for words in ("Contributions to the scatter of the closing link, chain pocket", "misses its limits: "):
         assert words in shown.stdout, words
     table = (tmp_path / "out" / "part_dimensions.csv").read_text(encoding="utf-8")
     assert "pocket,roller_diameter,9.0,0.0063,-0.0061,,0.0,,stated" in table
     again = doe("study", str(path), "--out", str(tmp_path / "out"), "--json")
-    assert again.returncode == 1 and list(json.loads(again.stdout)["missed_chains"]) == ["pocket"]
+    record = json.loads(again.stdout)
+    assert again.returncode == 1 and record["status"] == "missed" and list(record["missed_chains"]) == ["pocket"]

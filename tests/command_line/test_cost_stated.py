@@ -144,11 +144,11 @@ def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
-    """The next process knows the runs of the first. A confirmation, which needs two runs at least and five at most, found four
-    points to run and was stopped after two: two or three are left, or none for a new process."""
+    """The next process knows the runs of the first. A confirmation, which needs one run beside the baseline at least and four at
+    most, found three to run and was stopped after one: two or three are left, or none for a new process."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
     assert stated(study, out, 8, monkeypatch)[0].startswith(
-        "22 to 25 runs (design runs 20, confirmation 2 to 5), 1 at once"
+        "22 to 25 runs (baseline 1, design runs 20, confirmation 1 to 4), 1 at once"
     )
     assert left(f"note: {stated(study, out, 3, monkeypatch)[0]}") == [(12 + 2, 12 + 5)]
     killed_in(monkeypatch, clearance.CONFIRMATION_SEEDS, after=2)
@@ -161,19 +161,19 @@ def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
 def test_status_counts_every_step_to_the_end(tmp_path, monkeypatch, capsys):
     """Before anything runs and half-way: each step with its runs, and those to come."""
     study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
-    names = ["design runs", "front", "confirmation", "tolerances", "answer"]
+    names = ["baseline", "design runs", "front", "confirmation", "tolerances", "answer"]
     fresh = study_status(study, out)
     assert [each["name"] for each in fresh["stages"]] == names and fresh["runs_left"] == [22, 25]
     assert {each["state"] for each in fresh["stages"]} == {"to come"}
     stated(study, out, 8, monkeypatch)
     record = study_status(study, out)
-    assert [each["state"] for each in record["stages"]] == ["running", *["to come"] * 4]
-    assert record["runs_left"] == [14, 17]
+    assert [each["state"] for each in record["stages"]] == ["done", "running", *["to come"] * 4]
+    assert record["runs_left"] == [13, 16]
     show(status_blocks(record), Detail.LEAST)
     shown = capsys.readouterr().out
     assert "of 20 design points 8 done, 0 failed, 0 running, 12 to come" in shown
-    assert "5 steps: design runs 8 of 20, front, confirmation 0 of 5, tolerances, answer" in shown
-    assert "; runs to come 14 to 17" in shown and "time left" not in shown
+    assert "6 steps: baseline 0, design runs 8 of 20, front, confirmation 0 of 4, tolerances, answer" in shown
+    assert "; runs to come 13 to 16" in shown and "time left" not in shown
     robust = {each.name: each for each in study_stages(study, robust=True)}
     settings = study.file.robust
     assert robust["robust"].runs_left == (3 * settings.points, robust["robust"].runs)

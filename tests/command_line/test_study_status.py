@@ -75,18 +75,18 @@ def test_running_study_tells_who_runs_what_and_what_is_to_come(tmp_path, monkeyp
         assert abs(datetime.fromisoformat(claim["since"]).timestamp() - time.time()) < 60.0
     # Two threads, runs of 0.02 s and more: 8 or a few more have ended, the others and the confirmation are left.
     assert 8 * 0.02 <= middle["spent_s"] <= 2.5 * passed[8]
-    assert 2 <= middle["runs_left"][0] <= 12 + 2 and middle["runs_left"][1] - middle["runs_left"][0] == 3
+    assert 1 <= middle["runs_left"][0] <= 12 + 1 and middle["runs_left"][1] - middle["runs_left"][0] == 3
     (group,) = middle["failures"]
     assert group["runs"] == [2, 4] and "the oil froze" in group["cause"]
     # The answer is not written, and the confirmation has not begun.
-    assert last["status"] == "running" and last["runs_left"] == [2, 5]
+    assert last["status"] == "running" and last["runs_left"] == [1, 4]
     assert last["points"] == {"total": 20, "done": 18, "failed": 2, "running": 0, "missing": 0}
     show(status_blocks(middle))
     shown = capsys.readouterr().out
     assert (
         f"{points['done']} done, 2 failed" in shown
-        and "5 steps: design runs" in shown
-        and "confirmation 0 of 5, tolerances, answer" in shown
+        and "6 steps: baseline 0, design runs" in shown
+        and "confirmation 0 of 4, tolerances, answer" in shown
         and "Failed: design run 2, design run 4: " in shown
         and "; runs to come " in shown
     )
@@ -185,17 +185,21 @@ def study_command(path: Path, out: Path, **options) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "seeds", "stage"),
+    ("options", "seeds", "after", "stage"),
     [
-        ({}, 10, "design runs"),
-        ({}, clearance.CONFIRMATION_SEEDS, "confirmation"),
-        ({"adaptive": True}, clearance.ADAPTIVE_SEEDS, "adaptive front"),
-        ({"robust": True}, clearance.INPUT_SEEDS, "robust"),
+        ({}, clearance.CONFIRMATION_SEEDS, 0, "baseline"),
+        # The run of the baseline is the first of the confirmation's.
+        ({}, 10, 1, "design runs"),
+        ({}, clearance.CONFIRMATION_SEEDS, 1, "confirmation"),
+        ({"adaptive": True}, clearance.ADAPTIVE_SEEDS, 0, "adaptive front"),
+        ({"robust": True}, clearance.INPUT_SEEDS, 0, "robust"),
     ],
 )
-def test_study_killed_in_any_stage_is_unfinished_there_and_nothing_runs(tmp_path, monkeypatch, options, seeds, stage):
+def test_study_killed_in_any_stage_is_unfinished_there_and_nothing_runs(
+    tmp_path, monkeypatch, options, seeds, after, stage
+):
     path = short_study(tmp_path)
-    killed_in(monkeypatch, seeds)
+    killed_in(monkeypatch, seeds, after)
     with pytest.raises(Killed):
         study_command(path, tmp_path / "out", **options)
     record = study_status(Study.load(path), tmp_path / "out")
@@ -221,6 +225,7 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
             "files": ["summary.json", "answer.txt"],
             "status": "ok",
             "limits_sentence": "",
+            "obstacles": {"sentences": []},
             "cost": {"design_s": 1.0, "total_s": 2.0},
             "answer_sha256": digest_of(b"none"),
         }
@@ -266,9 +271,10 @@ def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
     path = short_study(tmp_path)
     study = Study.load(path)
     plain = {each.name: each for each in study_stages(study)}
-    assert list(plain) == ["design runs", "front", "confirmation", "tolerances", "answer"]
-    # 20 runs of 2 replicates and 4 turns; 5 points of 2 replicates with a companion.
-    assert plain["design runs"].work == 20 * 2 * 4 and plain["confirmation"].work == 5 * 3 * 4
+    assert list(plain) == ["baseline", "design runs", "front", "confirmation", "tolerances", "answer"]
+    # 20 runs of 2 replicates and 4 turns; 5 points of 2 replicates with a companion, the baseline first.
+    assert plain["design runs"].work == 20 * 2 * 4 and plain["confirmation"].work == 4 * 3 * 4
+    assert plain["baseline"].work == 3 * 4
     searched = {each.name: each for each in study_stages(study, adaptive=True, robust=True)}
     assert searched["adaptive front"].runs == study.file.adaptive.budget - 20
     sets = study.file.robust.points

@@ -19,7 +19,7 @@ from doe.duty import Duty, DutyResult, Rule, quotient
 from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.study_file import Study
-from doe.workflow.confirmation import Choice, confirm, every_limit
+from doe.workflow.confirmation import Choice, confirm, every_limit, simulate_original
 from doe.workflow.duty import study_at
 from doe.workflow.robust import case_of_study
 from doe.workflow.runs import run_design
@@ -63,7 +63,7 @@ def designed(study, folder):
 def confirmed_at(study, point):
     with Store(study.path.parent / "study.sqlite", "study") as store:
         simulations = Simulations(store, 1, None, False, lambda title: silent)
-        return confirm(study, {"pick": Choice(point, "")}, simulations)[0]
+        return confirm(study, simulate_original(study, simulations), {"pick": Choice(point, "")}, simulations)[0]
 
 
 def quantities(result):

@@ -25,7 +25,7 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.running.store import Store
 from doe.study_file import Study
-from doe.workflow.confirmation import Choice, confirm
+from doe.workflow.confirmation import Choice, Confirmed, confirm, simulate_original
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import study_status
 from doe.workflow.surfaces import reference_runs
@@ -96,8 +96,11 @@ def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypa
     instantly(monkeypatch.setattr, faulty=(1 + clearance.CONFIRMATION_SEEDS,))
     with Store(tmp_path / STORE) as store:
         simulations = Simulations(store, 2, None, False, lambda title: silent)
-        with pytest.raises(RunError, match=r"^confirmation of the baseline: .*the oil froze$"):
-            confirm(study, {"pick": Choice(study.baseline * 1.1, "why not")}, simulations)
+        with pytest.raises(RunError, match=r"^the original design cannot be simulated: baseline: .*the oil froze$"):
+            simulate_original(study, simulations)
+        original = Confirmed(study.baseline, *np.ones((3, 3)))
+        with pytest.raises(RunError, match=r"^confirmation of the pick: .*the oil froze$"):
+            confirm(study, original, {"pick": Choice(study.baseline * 1.1, "why not")}, simulations)
     with Store(tmp_path / STORE, read_only=True) as store:
         assert [run.status for run in store.ended()] == ["failed", "failed"]
 

@@ -52,7 +52,7 @@ from doe.workflow.runs import region_of
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
+from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
@@ -83,6 +83,7 @@ def first_screen(summary: Record) -> list[Block]:
     identity = part(summary, "identity")
     return [
         *([identity_line(Identity.from_dict(identity))] if identity else ()),
+        *_obstacles(summary),
         *_clearances(summary),
         *_judged(summary),
         *_gained(summary),
@@ -92,11 +93,17 @@ def first_screen(summary: Record) -> list[Block]:
     ]
 
 
+def _obstacles(summary: Record) -> list[Block]:
+    """What keeps the study from its demands, and what would have to change; nothing where it meets them."""
+    first, *others = part(summary, "obstacles", "sentences") or [""]
+    return [Paragraph(first, "warning"), Bullets(others)]
+
+
 def _judged(summary: Record) -> list[Block]:
     """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
     limits = list((part(summary, "limits") or {}).values())
     odds = [limit["odds"][0] for limit in limits if limit.get("odds")]
-    kept = summary.get("status", "ok") == "ok" and all(limit.get("verdict") == "kept" for limit in limits)
+    kept = summary.get("status", "ok") in ("ok", "missed") and all(limit.get("verdict") == "kept" for limit in limits)
     sentence = part(summary, "limits_sentence") or ""
     if not kept or min(odds, default=1.0) < NEARLY_ALL:
         return [_limits_judged(summary), Paragraph(sentence, "warning")]
@@ -198,7 +205,9 @@ def _clearances(summary: Record) -> list[Block]:
         Paragraph(part(summary, "clearance_class") or ""),
         Paragraph(meaning, "small"),
         *_temperatures(summary),
-        Paragraph(part(summary, "tolerances_warning") or "", "warning"),
+        Paragraph(
+            "" if part(summary, "obstacles", "tolerances") else part(summary, "tolerances_warning") or "", "warning"
+        ),
         Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
     ]
 
