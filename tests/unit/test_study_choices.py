@@ -12,7 +12,7 @@ from doe.clearance import Simulations
 from doe.running.store import Store
 from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Gain, gains, statement
-from doe.workflow.front import find_front
+from doe.workflow.front import find_front, known_tolerances
 from doe.workflow.pick import choices
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
@@ -71,7 +71,11 @@ def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
     assert len(notes) == 1 and "half_width_mm = 0.005: wider than the 0.003" in notes[0]
     nothing = SimpleNamespace(half_widths=np.zeros(3))
     chains, notes = solve_chains(study, study.baseline, nothing)
-    assert set(chains) == {"pocket"} and any("chain guide: half_width_mm" in note for note in notes)
+    # Without a tolerance that is found, parts are made to the factor's own.
+    low, high = chains["guide"].limits_mm
+    assert set(chains) == {"guide", "pocket"} and 0.5 * (high - low) == pytest.approx(
+        known_tolerances(study)["guide_clearance_mm"]
+    )
 
 
 @pytest.mark.parametrize(
