@@ -103,7 +103,7 @@ def study(
     """``rbdyn accuracy SCENE methods`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
         raise InputError([f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"])
-    counted = Progress(progress, [1.0] * (len(LIMITED) * (len(limits) + perturbations)))
+    counted = Progress(progress, len(LIMITED) * (len(limits) + perturbations))
     attempts = work_precision(problem_of(scene), limits, counted)
     nearby = perturbed(scene, perturbations)
     rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]

@@ -380,7 +380,7 @@ def study(
     """
     stretches = starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
-    counted = Progress(progress, [1.0] * (STARTS + sum(len(method.settings) for method in methods)))
+    counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
     references = reference(stretches, counted.step)
     attempts = [one for method in methods for one in counted.over(attempts_of(method, stretches, references))]
     ratios = speedups(attempts, references.floor(turns))

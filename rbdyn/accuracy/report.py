@@ -42,10 +42,11 @@ class Report:
 class Progress:
     """Counts steps, whose number is logged before the first and whose time after it.
 
-    ``works``: of the steps, in any unit.
+    ``works``: of the steps, in any unit; a number of equal ones.
     """
 
-    def __init__(self, report: Reporter, works: Sequence[float]) -> None:
+    def __init__(self, report: Reporter, works: Sequence[float] | int) -> None:
+        works = [1.0] * works if isinstance(works, int) else works
         self.report, self.total, self.count = report, len(works), 0
         self.works, self.started, self.estimated = works, self._now(), False
         LOGGER.info(counted(self.total, "step"))

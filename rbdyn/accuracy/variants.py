@@ -55,7 +55,7 @@ def option_costs(
     plain_bearing = roller_bearing(plain)
     prepare(plain, plain_bearing)
     variants = lawful(plain, options)
-    rows, counted = [], Progress(progress, [1.0] * len(variants))
+    rows, counted = [], Progress(progress, len(variants))
     for name, option in counted.over(variants.items()):
         bearing = roller_bearing(option)
         compile_s = prepare(option, bearing)
@@ -149,7 +149,7 @@ def battery(
 ) -> list[Ending]:
     """A row a case, of all cases unless there is a ``selection``. Raises KeyboardInterrupt."""
     listed = cases(scene) if selection is None else selection
-    counted = Progress(progress, [1.0] * len(listed))
+    counted = Progress(progress, len(listed))
     return [ending(scene, name, assignments) for name, assignments in counted.over(listed.items())]
 
 
