@@ -20,6 +20,7 @@ from doe.study_file.decimal_marks import Marks
 from doe.study_file.table_file import TableFile, read_table_file
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, one_line, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
 
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
@@ -136,9 +137,9 @@ class Sheet:
         return self.file.rows
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Notes:
         """A note on how the table was read, where that is not UTF-8 with commas and decimal points."""
-        return (f"{self.path}: {self.file.manner}",) if self.file.manner else ()
+        return (Note("table", f"{self.path}: {self.file.manner}"),) if self.file.manner else ()
 
     @cached_property
     def places(self) -> dict[str, int]:
@@ -243,7 +244,7 @@ class Table:
     errors: Array
     replicates: Whole
     block: Whole
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
 
 
 def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
@@ -306,17 +307,18 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
     )
 
 
-def gap_notes(path: Path, columns: Mapping[str, Array]) -> list[str]:
+def gap_notes(path: Path, columns: Mapping[str, Array]) -> list[Note]:
     """A note on each response or output without a value in some rows: the others of these rows serve all the same."""
-    notes = []
+    notes = list[Note]()
     for name, values in columns.items():
         rows = [str(row + 1) for row in np.flatnonzero(np.isnan(values)).tolist()]
         if rows:
             those = "that row, which serves" if len(rows) == 1 else "those rows, which serve"
-            notes.append(
+            sentence = (
                 f"{path}: {one_line(name, LONGEST_NAME)} has no value in {'row' if len(rows) == 1 else 'rows'} {listed(rows)}; "
                 f"it does without {those} the others"
             )
+            notes.append(Note("table", sentence))
     return notes
 
 

@@ -55,6 +55,7 @@ from doe.workflow.rig import MOST_CONDITIONS, PULSE_OUTPUTS, SPEED, Rig, read_ri
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.forecast import Measured as Paces
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import counted, quantity
 from rbdyn.result import SimulationResult
@@ -77,7 +78,7 @@ class Question(NamedTuple):
     case: Case
     targets: list[Input]
     rig: Rig
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 def question_of(question: Question) -> str:
@@ -138,9 +139,10 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         *case.remarks,
         *override_notes(case, overrides),
         *(
-            (
-                f"{candidate.key} varies, so it has no single value to identify; it keeps the scene's value, or its ratio to "
-                "the key that it multiplies"
+            Note(
+                "inputs",
+                f"{candidate.key}: varies, so it has no single value to identify; it keeps the scene's value, or its ratio to "
+                "the key that it multiplies",
             )
             for candidate in case.every
             if candidate.law.kind == "varies"
@@ -153,7 +155,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     )
     refuse([*_vain_question(case, rig, targets), *_endless_question(case, rig, targets)])
     if case.scene.calibrate.discrepancy == "none":
-        notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
+        exact = "discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow"
+        notes.append(Note("inputs", exact))
     else:
         refuse(
             f"{path}: calibrate.discrepancy: {name} is not measured; name one of {', '.join(rig.outputs)}"
@@ -254,7 +257,7 @@ class Calibration:
     match: Matched
     before: Array
     runs: int
-    notes: tuple[str, ...]
+    notes: Notes
     design: Design
     after: Array | None = None
     learnt: Learnt | None = None
@@ -511,7 +514,10 @@ def _with_judgement(calibration: Calibration) -> Calibration:
     notes = (
         *calibration.notes,
         *(
-            f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow"
+            Note(
+                "inputs",
+                f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow",
+            )
             for place in gained.narrow
         ),
     )

@@ -28,6 +28,7 @@ from doe.threads import one_thread
 from doe.workflow.runs import Runs, design_of, read_runs
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
+from rbdyn.base.notes import Note
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import error_alone, improvement
 
@@ -108,14 +109,11 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     return results
 
 
-def unrivalled(surfaces: Sequence[Surface]) -> list[str]:
+def unrivalled(surfaces: Sequence[Surface]) -> list[Note]:
     """A note on surfaces with too many runs for a comparison with a Gaussian process; else none."""
     runs = max(len(surface.data.values) for surface in surfaces)
-    return (
-        [f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"]
-        if runs > MOST_RIVALLED
-        else []
-    )
+    sentence = f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"
+    return [Note("left-out", sentence)] if runs > MOST_RIVALLED else []
 
 
 def independent_values(runs: Runs) -> Whole:

@@ -40,6 +40,7 @@ from doe.workflow.confirmation import (
     verdict_of,
     whirl_sentence,
 )
+from doe.workflow.dangers import choice_notes
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
@@ -51,6 +52,7 @@ from doe.workflow.surfaces import PublishedComparison, compare_with_published, f
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
@@ -157,25 +159,27 @@ def _widest_half_widths(study: Study) -> Array:
 
 def solve_chains(
     study: Study, pick: Array, tolerances: PickTolerances | None
-) -> tuple[dict[str, ChainResult], list[str]]:
+) -> tuple[dict[str, ChainResult], list[Note]]:
     """Every chain by name at the picked point (k,), and notes on chains without a solution."""
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
-    solved, notes = {}, []
+    solved, notes = {}, list[Note]()
     for number, chain in enumerate(study.file.chain):
         if (place := study.factors.index(chain.factor)) in study.inactive:
-            notes.append(f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories")
+            sentence = f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories"
+            notes.append(Note("chain", sentence))
             continue
         limit, half_width = half_widths[place], chain.half_width_mm
         if half_width is not None and half_width > limit:
-            notes.append(
+            sentence = (
                 f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
                 "the gains are kept as [tolerances] asks; narrow it, or demand less there"
             )
+            notes.append(Note("chain", sentence))
         try:
             parts = _chain(study, number, pick, half_widths)
             solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
         except InputError as error:
-            notes += error.faults
+            notes += [Note("missed-chain", fault) for fault in error.faults]
     return solved, notes
 
 
@@ -237,7 +241,7 @@ class StudyResult:
     published_comparisons: list[PublishedComparison]
     reference_values: Array | None
     failures: tuple[Failure, ...]
-    notes: tuple[str, ...]
+    notes: Notes
     cost: Mapping[str, float]
     duty: DutyAnswer | None = None
 
@@ -300,6 +304,13 @@ class StudyResult:
     def verdict(self) -> Verdict:
         """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
         return verdict_of(self.limits)
+
+    @property
+    def every_note(self) -> Notes:
+        """The dangers of the pick first, then those of its runs and of the baseline's, then all other notes."""
+        pick = choice_notes(self.gains["pick"], self.verdict, self.limits_sentence, self.missed_chains)
+        runs = (note.about(f"at the {name}") for name in ("pick", "baseline") for note in self.confirmed[name].dangers)
+        return (*pick, *runs, *self.notes)
 
     @property
     def whirl_sentence(self) -> str:
@@ -400,9 +411,10 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _advice(study: Study, surfaces: list[Surface], searched: Adaptive | None, robustness: Robust | None) -> list[str]:
+def _advice(study: Study, surfaces: list[Surface], searched: Adaptive | None, robustness: Robust | None) -> list[Note]:
     """Advice on an adaptive search and a robust judgement, where these were not made."""
-    return [*([] if searched else advice(study, surfaces)), *([] if robustness else robust_advice(study))]
+    sentences = [*([] if searched else advice(study, surfaces)), *([] if robustness else robust_advice(study))]
+    return [Note("advice", sentence) for sentence in sentences]
 
 
 def _with_its_categories(

@@ -6,7 +6,7 @@ import os
 import re
 import string
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +19,8 @@ from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
+from rbdyn.base.notes import DANGER, Note, merged, of_level
+from rbdyn.base.records import plain
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
 
@@ -80,11 +82,19 @@ def hand_over(
 ) -> None:
     """Print the ``record`` as JSON, else let ``answer`` print and list the ``files`` written to the ``folder``."""
     if as_json:
-        print_json(record())
+        printed = plain(record())
+        print_json(printed)
+        alarm(printed.get("notes", ()))
         return
     answer()
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
+
+
+def alarm(notes: Iterable[Note | Mapping[str, Any]]) -> None:
+    """Print every danger among notes or their JSON forms on standard error."""
+    for note in of_level(merged(map(Note.of, notes)), DANGER):
+        print(f"danger: {escaped(note)}", file=sys.stderr)
 
 
 @contextmanager
@@ -235,7 +245,7 @@ Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes but dangers.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
 
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from rbdyn.base.blocks import WARNING, Block, Bullets, Heading, Note, Paragraph, Section, Table, Tiles, says
+from rbdyn.base.blocks import ALARMS, Block, Bullets, Heading, Paragraph, Remarks, Section, Table, Tiles, Verdict, says
 
 # Rows of a table that a text has whole, and the page that has all of a longer one.
 LONG, WHOLE = 12, "report.html"
@@ -38,12 +38,14 @@ def plain(text: str) -> str:
 
 def _render(block: Block) -> str:
     match block:
-        case Paragraph(text, "warning"):
-            return f"**{WARNING}: {plain(text)}**"
+        case Paragraph(text, role) if role in ALARMS:
+            return f"**{ALARMS[role]}: {plain(text)}**"
         case Paragraph(text, role):
             return f"**{plain(text)}**" if role == "statement" else plain(text)
-        case Note(text):
-            return f"- {plain(text)}"
+        case Verdict(paragraphs=paragraphs):
+            return "\n\n".join(map(_render, paragraphs))
+        case Remarks(listed=listed):
+            return "\n".join(f"- {note.level}: {plain(note)}" for note in listed)
         case Heading(text):
             return f"### {plain(text)}"
         case Bullets(items):

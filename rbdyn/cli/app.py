@@ -115,6 +115,8 @@ def simulate(
             result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), out, written
         )
     if result.status != "ok":
+        if not as_json:
+            command.alarm(result.notes)
         raise typer.Exit(command.FAILED)
 
 

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Paragraph, Table, with_notes
 from rbdyn.base.faults import key_path
-from rbdyn.base.records import finite
+from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import finite, plain
 from rbdyn.base.words import shown
+from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty
 
@@ -28,7 +30,7 @@ class MapDuty:
     points: Sequence[DutyPoint]
     scenes: Sequence[Scene]
     life: "DutyLife"
-    notes: Sequence[str]
+    notes: Notes
 
     @property
     def marks(self) -> dict[str, tuple[float, float]]:
@@ -54,7 +56,7 @@ class MapDuty:
 
     def as_record(self) -> dict[str, Any]:
         """JSON of the duty."""
-        return {"points": self.rows, "life": self.life.as_record(), "notes": list(self.notes)}
+        return {"points": self.rows, "life": self.life.as_record(), "notes": plain(self.notes)}
 
     def table(self) -> "pd.DataFrame":
         """A row a point; units in the names."""
@@ -76,7 +78,8 @@ class MapDuty:
             )
             for row in self.rows
         ]
-        return [Table("Duty", header, rows), Paragraph(life_sentence(self.life.as_record())), *notes(self.notes)]
+        sentence = Paragraph(life_sentence(self.life.as_record()))
+        return with_notes(self.notes, [Table("Duty", header, rows), sentence])
 
 
 def life_sentence(life: Mapping[str, float | None]) -> str:
@@ -101,27 +104,35 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
     scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
     whole = sum(point.share for point in points)
     life = roller_duty_life(scenes, [point.share / whole for point in points])
-    return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))
+    notes = (*life_notes(life.hours, whole), *_notes(points, scenes, speeds_rpm, loads_N))
+    return MapDuty(points, scenes, life, notes)
+
+
+def life_notes(life: float, hours: float) -> Notes:
+    """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
+    if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
+        return ()
+    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)
 
 
 def _notes(
     points: Sequence[DutyPoint], scenes: Sequence[Scene], speeds: Sequence[float], loads: Sequence[float]
-) -> list[str]:
-    """Sentences on points off the map, and on keys that the map keeps at the values of the scene."""
-    notes = []
+) -> Notes:
+    """Notes on points off the map, and on keys that the map keeps at the values of the scene."""
+    notes = list[Note]()
     for point, scene in zip(points, scenes, strict=True):
         speed, load = _place(scene)
         if not (speeds[0] <= speed <= speeds[-1] and loads[0] <= load <= loads[-1]):
-            notes.append(
+            sentence = (
                 f"duty {point.name!r}: {speed:g} rpm and {load:g} N are off the map, so its mark is at the edge; widen --speed "
                 "or --load"
             )
+            notes.append(Note("off-map", sentence))
         others = [".".join(path) for text in point.set if (path := key_path(text)) and ".".join(path) not in AXES]
         if others:
-            notes.append(
-                f"duty {point.name!r}: sets {', '.join(others)} too, which the map keeps at the scene's values"
-            )
-    return notes
+            sentence = f"duty {point.name!r}: sets {', '.join(others)} too, which the map keeps at the scene's values"
+            notes.append(Note("off-map", sentence))
+    return tuple(notes)
 
 
 def _place(scene: Scene) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.forecast import span
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends
@@ -18,12 +18,13 @@ TRACE_TURNS = 10.0
 
 
 def blocks(result: SimulationResult) -> list[Block]:
-    """Figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
+    """The verdict, figures with their errors, the target, loads and balance, races, clearances, friction, losses, cost, notes."""
     from rbdyn.compiled.kernel import compiler_notes
 
     figures = _figures(result)
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
+        Verdict(result.notes),
         _table(figures),
         Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
@@ -33,8 +34,7 @@ def blocks(result: SimulationResult) -> list[Block]:
         *(_clearances(result.clearance_um) if result.scene.get("mounting") else ()),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
         *_further(result),
-        *notes(result.notes),
-        *notes(compiler_notes(), Detail.ALL),
+        Remarks((*result.notes, *compiler_notes())),
     ]
 
 
