@@ -78,7 +78,6 @@ CODES: dict[str, Code] = {
     "oil-fraction": Code(NOTE, "the oil fraction that follows from a flow is a guess"),
     "clear-balls": Code(NOTE, "some balls are clear of a race"),
     "table": Code(NOTE, "how a table was read"),
-    "reference": Code(NOTE, "what a comparison with published results leaves open"),
     "remark": Code(NOTE, "any other remark"),
     "definition": Code(NOTE, "how a figure is defined", True),
     "estimate": Code(NOTE, "inputs are estimated, with their error", True),

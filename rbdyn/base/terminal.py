@@ -17,8 +17,8 @@ from rbdyn.base.words import counted
 PADDING, FRAME = 3, 1
 # Longest cell that is never broken, unless it is a value with its error.
 SHORT = 20
-# Notes that are shown below full detail, dangers among them, and the lines of each.
-MOST_NOTES, NOTE_LINES = 5, 2
+# Notes that are shown below full detail, dangers among them.
+MOST_NOTES = 5
 # Width of tables in a file or a pipe.
 WIDE = 160
 
@@ -78,10 +78,8 @@ class Page(NamedTuple):
         return "".join(f"{line}\n" for lines in broken for line in lines or [""])
 
     def short(self, text: str) -> str:
-        """As much of a note as surely fits in its lines of the page."""
-        return (
-            text if self.width is None else shorten(text, NOTE_LINES * self.width - self.width // 4, placeholder=" …")
-        )
+        """As much of a note as fits in a line of the page."""
+        return text if self.width is None else shorten(text, max(self.width, len("warning …")), placeholder=" …")
 
     def title(self, text: str) -> str:
         """A heading or a caption."""

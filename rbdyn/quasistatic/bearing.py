@@ -16,6 +16,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import counted
+from rbdyn.life.balls import FASTEST
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic import finite_search, full_system
@@ -121,7 +122,7 @@ def _limit_notes(scene: SingleRowScene, model: RowModel) -> Notes:
     if bearing.kind == "deep_groove_ball" and scene.mounting is not None:
         drawn = clearance_of(row_of(scene.model_copy(update={"mounting": None, "thermal": None})).row)[0]
         plays["radial"] = OperatingClearance(drawn, clearance_of(model.row)[0] - drawn, 0.0, 0.0)
-    return (*clearance_notes(plays), *speed_notes(inner - outer, bearing.pitch_diameter, None))
+    return (*clearance_notes(plays), *speed_notes(inner - outer, bearing.pitch_diameter, None, FASTEST[bearing.kind]))
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:

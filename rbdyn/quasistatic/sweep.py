@@ -399,6 +399,8 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
         notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
+    limits = (note for note in result.notes or () if note.code in ("seizure", "fast", "overspeed"))
+    notes += [Remark(note.code, note.code, np.array([True]), partial(lambda note, _: note, note)) for note in limits]
     figures = {name: float(value[0]) for name, value in columns.items()}
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]

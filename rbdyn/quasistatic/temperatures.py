@@ -16,6 +16,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError
 from rbdyn.base.notes import Note, Notes
+from rbdyn.life.balls import FASTEST
 from rbdyn.life.friction import ANGULAR_GEOMETRY, DEEP_GROOVE_GEOMETRY, starvation_factor
 from rbdyn.quasistatic.heat import Heat, at_temperatures, balance, term_shares
 from rbdyn.quasistatic.result import BallResult
@@ -32,8 +33,6 @@ from rbdyn.thermal.network import NODES, carried_off
 TOLERANCE, DIFFERENCE = 1e-9, 0.01
 # Deviation from the balance of an input set of a range [K].
 RANGE_TOLERANCE = 0.1
-# Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
-FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 # SKF's friction over the heat of ISO 15312 at the reference speeds of 8 deep groove and 6 angular contact bearings of series 60 to
 # 64, 72 and 73 in that catalogue.
 LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}

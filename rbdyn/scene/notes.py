@@ -152,7 +152,7 @@ NEARLY_LOST, MOSTLY_LOST = 0.1, 0.5
 # Speeds over the reference speed, of bearings by designation: limiting speeds of a catalogue are 1 to 1.5 times it. Of others the
 # product of speed and pitch diameter [m/s]: usual ones at their reference speed twice over, and the 3 million mm/min up to which
 # special bearings were tested.
-FAST_LISTED, FAST_OWN = (1.0, 2.0), (2.0 * REFERENCE_SPEED, 3.0e3 * RPM)
+FAST_LISTED, FAST_USUAL, FASTEST = (1.0, 2.0), 2.0, 3.0e3 * RPM
 
 
 def clearance_notes(clearances: Mapping[str, OperatingClearance | None]) -> Notes:
@@ -172,18 +172,21 @@ def clearance_notes(clearances: Mapping[str, OperatingClearance | None]) -> Note
     return tuple(notes)
 
 
-def speed_notes(speed: float, pitch_diameter: float, reference: float | None) -> Notes:
-    """A note on a ``speed`` above the ``reference`` speed [rad/s] of a listed bearing, or far above that of a usual one."""
+def speed_notes(speed: float, pitch_diameter: float, reference: float | None, usual: float = REFERENCE_SPEED) -> Notes:
+    """A note on a ``speed`` above the ``reference`` speed [rad/s] of a listed bearing, or far above that of a usual one.
+
+    ``usual``: reference speed times pitch diameter [m/s] of such bearings.
+    """
     name = "reference speed"
     if reference is not None:
         fast, limit = (factor * reference for factor in FAST_LISTED)
     else:
-        fast, limit = (product / pitch_diameter for product in FAST_OWN)
+        fast, limit = FAST_USUAL * usual / pitch_diameter, FASTEST / pitch_diameter
         name = "usual reference speed"
     speed = abs(speed)
     if speed <= fast:
         return ()
-    base = reference or REFERENCE_SPEED / pitch_diameter
+    base = reference or usual / pitch_diameter
     sentence = f"{speed / RPM:.0f} rpm is {speed / base:.2g} times the {name} of {base / RPM:.3g} rpm"
     if speed <= limit:
         return (

@@ -126,17 +126,17 @@ def test_bad_news_has_a_word_and_a_class_of_its_own():
 
 
 def long_notes(count: int, code: str = "unit") -> tuple[Note, ...]:
-    """Notes of two lines and more that say different things."""
+    """Long notes that say different things."""
     return tuple(Note(code, f"{number}: {number * 'more '}{'word ' * 30}end") for number in range(count))
 
 
-def test_a_screen_has_five_notes_of_two_lines_and_says_where_the_others_are():
+def test_a_screen_has_five_notes_of_a_line_each_and_says_where_the_others_are():
     """Unit: below full detail the first five, cut; a file has them whole; at full detail all; general ones in files alone."""
     tree = [Paragraph("before"), Remarks((Note("left-out", "general"), *long_notes(8))), Paragraph("after")]
     lines = terminal.text(tree, width=80).splitlines()
-    assert [line[:10] for line in lines[1:11:2]] == [f"warning: {number}" for number in range(5)]
-    assert all(len(line) <= 80 for line in lines) and all(line.endswith("…") for line in lines[2:11:2])
-    assert lines[11].startswith("4 more notes in the report") and lines[12:] == ["after"]
+    assert [line[:10] for line in lines[1:6]] == [f"warning: {number}" for number in range(5)]
+    assert all(len(line) <= 80 and line.endswith("…") for line in lines[1:6])
+    assert lines[6].startswith("4 more notes in the report") and lines[7:] == ["after"]
     whole = terminal.text(tree)
     assert whole.count("end\n") == 5 and "4 more notes in the report" in whole and "general" not in whole
     assert terminal.text(tree, Detail.ALL, 80).count("end") == 8 and "note: general" in markdown.text(tree)

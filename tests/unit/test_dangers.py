@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,8 @@ from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import clearance_notes, speed_notes
 
-SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
+MODULES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
+SOURCES = [path for path in MODULES if re.search(r"\b(Note|Remark)\(", path.read_text(encoding="utf-8"))]
 # A run of a tenth of a second, whose figures mean nothing.
 SHORT = (
     "numerics.turns=0.2", "numerics.discard_turns=0.0", "numerics.replicates=1", "numerics.companion=false",
