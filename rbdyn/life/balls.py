@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import MethodError
+from rbdyn.base.faults import RPM, MethodError
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning
 
