@@ -21,7 +21,18 @@ from doe.commands.options import (
     print_predicted,
 )
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
-from rbdyn.base.command import FAILED, Force, Json, Workers, folder_option, guarded, hand_over, notice, print_json
+from rbdyn.base.command import (
+    FAILED,
+    Force,
+    Json,
+    Workers,
+    alarm,
+    folder_option,
+    guarded,
+    hand_over,
+    notice,
+    print_json,
+)
 from rbdyn.base.faults import InputError
 from rbdyn.base.forecast import duration, span
 from rbdyn.base.terminal import show
@@ -74,6 +85,7 @@ def _leave_by(record: dict[str, Any], as_json: bool) -> None:
     """Print the record if asked for, and fail if the pick did not keep its limits, or a chain misses its own."""
     if as_json:
         print_json(record)
+        alarm(note for note in record["notes"] if note["code"] not in ("broken-limit", "missed-chain"))
     missed = record.get("missed_chains") or {}
     if record["status"] != "ok":
         print(record["limits_sentence"], file=sys.stderr)

@@ -138,15 +138,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         *rig.notes,
         *case.remarks,
         *override_notes(case, overrides),
-        *(
-            Note(
-                "inputs",
-                f"{candidate.key}: varies, so it has no single value to identify; it keeps the scene's value, or its ratio to "
-                "the key that it multiplies",
-            )
-            for candidate in case.every
-            if candidate.law.kind == "varies"
-        ),
+        *(_varies(candidate) for candidate in case.every if candidate.law.kind == "varies"),
     ]
     refuse(
         f"--free {key}: its documented range does not apply to this scene (rbdyn keys {key}); give it a law"
@@ -165,6 +157,11 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         )
     refuse(_impossible_conditions(cases_of(case, rig), rig))
     return Question(case, targets, rig, tuple(notes))
+
+
+def _varies(candidate: Input) -> Note:
+    sentence = "varies, so it has no single value to identify; it keeps the scene's value, or its ratio to the key that it multiplies"
+    return Note("inputs", f"{candidate.key}: {sentence}")
 
 
 def _vain_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[str]:

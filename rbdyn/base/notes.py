@@ -27,6 +27,7 @@ class Code(NamedTuple):
 
 
 DANGER, WARNING, NOTE = Level
+# By level, those that matter most first: what is wrong with the bearing, with the figures, with what is known.
 CODES: dict[str, Code] = {
     "seizure": Code(DANGER, "the cage or the bearing seizes at its temperatures, or a clearance in operation is nearly lost"),
     "overload": Code(DANGER, "pressure above the shakedown limit: no elastic theory holds, and the figures are none of a bearing"),
@@ -140,8 +141,9 @@ def status_of(notes: Iterable[Note]) -> str:
 
 
 def ranked(notes: Iterable[Note]) -> list[Note]:
-    """Notes once each, the worst first."""
-    return sorted(dict.fromkeys(notes), key=lambda note: list(Level).index(note.level))
+    """Notes once each, the worst first; of one level in the order of their codes."""
+    levels, codes = list(Level), list(CODES)
+    return sorted(dict.fromkeys(notes), key=lambda note: (levels.index(note.level), codes.index(note.code)))
 
 
 def of_level(notes: Iterable[Note], level: Level) -> list[Note]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Paragraph, Table, with_notes
+from rbdyn.base.blocks import Block, Paragraph, Table
 from rbdyn.base.faults import key_path
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain
@@ -65,7 +65,7 @@ class MapDuty:
         return pd.DataFrame(self.rows)
 
     def blocks(self) -> list[Block]:
-        """The points with their lives, the life over the duty, and notes."""
+        """The points with their lives, and the life over the duty."""
         header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
         rows = [
             (
@@ -78,8 +78,7 @@ class MapDuty:
             )
             for row in self.rows
         ]
-        sentence = Paragraph(life_sentence(self.life.as_record()))
-        return with_notes(self.notes, [Table("Duty", header, rows), sentence])
+        return [Table("Duty", header, rows), Paragraph(life_sentence(self.life.as_record()))]
 
 
 def life_sentence(life: Mapping[str, float | None]) -> str:

@@ -164,9 +164,9 @@ def clearance_notes(clearances: Mapping[str, OperatingClearance | None]) -> Note
         lost = play.operating < NEARLY_LOST * max(play.drawn, 0.0)
         subject = "seizure: " if lost else ""
         sentence = (
-            f"{subject}{name} clearance in operation {1e6 * play.operating:.1f} um: fits {1e6 * play.fit:+.1f}, temperature "
-            f"{1e6 * play.temperature:+.1f} and rotation {1e6 * play.rotation:+.1f} um leave this of {1e6 * play.drawn:.1f} um drawn; "
-            "widen it or check the temperatures"
+            f"{subject}{name} clearance in operation {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um drawn: fits "
+            f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; widen it or "
+            "check the temperatures"
         )
         notes.append(Note("seizure" if lost else "clearance", sentence))
     return tuple(notes)

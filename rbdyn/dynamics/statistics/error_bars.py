@@ -356,7 +356,7 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | 
     rtol, percent = scene.numerics.rtol, f"{100.0 * error / size:.2g} %"
     if biased:
         tolerance = f"{tighter or 0.1 * rtol:.1g}"
-        fix = f"; tighten numerics.rtol = {rtol:g} to {tolerance}"
+        fix = f"); tighten numerics.rtol = {rtol:g} to {tolerance}"
     else:
-        fix = ", mostly scatter; raise numerics.turns or numerics.replicates"
-    return Note("numerical-error", f"{name}: may be off by {percent} by the steps (numerical error){fix}")
+        fix = ", mostly scatter); raise numerics.turns or numerics.replicates"
+    return Note("numerical-error", f"{name}: may be off by {percent} (numerical error{fix}")
