@@ -161,8 +161,8 @@ def verdict(notes: Iterable[Note]) -> str:
     return dangers[0]
 
 
-# Figures in a note: notes of a code that differ in these alone are one.
-NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
+# Figures in a note, and the places and numbers of runs at its end: notes of a code that differ in these alone are one.
+NUMBER, PLACES = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?"), re.compile(r"(?: \([^()]*\))+$")
 
 
 def merged(notes: Iterable[Note]) -> list[Note]:
@@ -173,7 +173,7 @@ def merged(notes: Iterable[Note]) -> list[Note]:
     """
     groups: dict[tuple[str, str], list[Note]] = {}
     for note in ranked(notes):
-        groups.setdefault((note.code, NUMBER.sub("#", _parted(note)[1])), []).append(note)
+        groups.setdefault((note.code, NUMBER.sub("#", PLACES.sub("", _parted(note)[1]))), []).append(note)
     return [_one(group) for group in groups.values()]
 
 

@@ -62,9 +62,9 @@ def test_notes_alike_are_one_and_the_worst_come_first():
         Note("numerical-error", "cage speed: may be off by 1.5e-3 %; tighten rtol"),
         Note("numerical-error", "whirl: may be off by 3 %, mostly scatter"),
         Note("dent", "inner race: dented by 4100 MPa"),
-        Note("dent", "inner race: dented by 4100 MPa"),
+        Note("dent", "inner race: dented by 4200 MPa").about("at climb"),
     ]
-    assert [note.level for note in ranked(notes)] == ["danger", *["warning"] * 3, "note"]
+    assert [note.level for note in ranked(notes)] == [*["danger"] * 2, *["warning"] * 3, "note"]
     assert merged(notes) == [
         "inner race: dented by 4100 MPa",
         "power loss: may be off by 3 %; tighten rtol; likewise cage speed",
