@@ -31,7 +31,7 @@ class DesignAnswer(Answer):
     def blocks(self) -> list[Block]:
         from doe.report.sections.design import design_blocks
 
-        return with_notes(self.record.get("notes", ()), design_blocks(self.as_dict()))
+        return with_notes(self.record.get("notes", ()), design_blocks(self.as_dict()), judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
         runs, evaluation = self.record["runs"], self.record["evaluation"]
@@ -98,7 +98,7 @@ class FitAnswer(Answer):
             for name, fitted in drop_undefined(self.record["responses"]).items()
             for block in fit_blocks(name, fitted, self.factors)
         ]
-        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits, {})])
+        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits, {})], judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
         return fit_rows(self.record["responses"])

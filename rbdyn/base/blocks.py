@@ -37,9 +37,10 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Every danger among the notes of a result, or the sentence that there is none; all renderings begin with it."""
+    """Every danger among the notes of a result, or, where dangers are ``judged``, that there is none; renderings begin with it."""
 
     notes: Notes
+    judged: bool = True
     detail: Detail = Detail.LEAST
 
     @property
@@ -177,10 +178,10 @@ class Section:
     blocks: Sequence[Block]
 
 
-def with_notes(notes: Iterable[Note | Mapping[str, Any]], blocks: Iterable[Block]) -> list[Block]:
+def with_notes(notes: Iterable[Note | Mapping[str, Any]], blocks: Iterable[Block], judged: bool = True) -> list[Block]:
     """The blocks between the verdict of ``notes``, or of their JSON forms, and those of them that are no dangers."""
     every = tuple(map(Note.of, notes))
-    return [Verdict(every), *blocks, Remarks(every)]
+    return [Verdict(every, judged), *blocks, Remarks(every)]
 
 
 def says(block: Block) -> bool:
@@ -190,4 +191,6 @@ def says(block: Block) -> bool:
             return bool(content)
         case Paragraph(text=content) | Heading(text=content) | Remarks(listed=content):
             return bool(content)
+        case Verdict(notes=content, judged=judged):
+            return judged or bool(of_level(content, DANGER))
     return True

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rbdyn.base import html
-from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict
+from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict, says
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import Identity, identity_table
 from rbdyn.base.vector import vector_copies
@@ -87,7 +87,7 @@ def page(
 
 def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
     """Page of a result: its verdict, its identity, its blocks at every detail with long tables folded, its pictures (SVG by name)."""
-    opening = "".join(html.render(block) for block in blocks if isinstance(block, Verdict))
+    opening = "".join(html.render(block) for block in blocks if isinstance(block, Verdict) and says(block))
     blocks = [_folded(block) for block in blocks if not isinstance(block, Verdict)]
     drawn = [Figures([picture], name) for name, picture in pictures.items()]
     parts = [identity_section(identity), Section("result", "Result", blocks), Section("pictures", "Pictures", drawn)]

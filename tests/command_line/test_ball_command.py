@@ -129,8 +129,8 @@ def test_command_line_studies_write_tables_and_pictures(tmp_path):
     assert [point["outer_stress_MPa"] for point in record["points"]] == pytest.approx(
         table["outer_pressure_MPa"], rel=1e-8
     )
-    dented = "3 points, the first at preload_N = 0: "
-    assert any(note.startswith(dented) and "MPa of ISO 76" in note for note in record["notes"])
+    dents = [note["text"] for note in record["notes"] if note["code"] == "dent"]
+    assert all(text.endswith(" (3 points, the first at preload_N = 0)") for text in dents) and len(dents) == 2
     assert table["notes"].str.contains("inner dent").all()
 
 

@@ -224,7 +224,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         Paragraph(_screened(record["screened"])),
         Paragraph(_cost_words(record["cost"]) if "cost" in record else "", "small"),
     ]
-    return with_notes(record["notes"], answer)
+    return with_notes(record["notes"], answer, judged=False)
 
 
 def verdict_words(record: Mapping[str, Any]) -> str:

@@ -107,7 +107,7 @@ def uncertainty_blocks(uncertainty: Uncertainty) -> list[Block]:
         Table("Variance of a single run by cause [%]", sources, parts),
         Paragraph(screened),
     ]
-    return with_notes(uncertainty.notes, answer)
+    return with_notes(uncertainty.notes, answer, judged=False)
 
 
 def _by_key(output: OutputRange) -> dict[str, Share]:
