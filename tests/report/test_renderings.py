@@ -155,10 +155,10 @@ def test_dangers_come_first_even_quietly_and_take_the_place_of_notes():
     tree = with_notes([*plain(notes[:3]), *notes[3:]], [Heading("answer")])
     quiet = terminal.text([Paragraph("bearing"), *tree], Detail.LEAST).splitlines()
     assert (
-        quiet[:2] == ["Danger: inner race: dented by 5 MPa; likewise outer race", "Danger: hot"]
+        quiet[:2] == ["Danger: hot", "Danger: inner race: dented by 5 MPa; likewise outer race"]
         and "warning" not in quiet[-1]
     )
     assert terminal.text(tree).count("warning:") == 3 and "2 more notes" in terminal.text(tree)
-    assert markdown.text(tree).startswith("**Danger: inner race") and 'class="danger"' in page.render(tree[0])
+    assert markdown.text(tree).startswith("**Danger: hot") and 'class="danger"' in page.render(tree[0])
     assert terminal.text(with_notes((), [])) == "No danger found\n"
     assert terminal.text(with_notes(long_notes(2), [])).startswith("No danger found; 2 warnings\n")
