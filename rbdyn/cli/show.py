@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.base.blocks import Block, Detail, Table, with_notes
 from rbdyn.base.faults import refuse
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import DANGER, Note, Notes, of_level
 from rbdyn.base.records import plain, save_table
 from rbdyn.base.words import counted, quantity, with_error
 from rbdyn.result import SimulationResult, versions, write_json
@@ -45,15 +45,16 @@ class Request:
 
     @property
     def notes(self) -> Notes:
-        """A note where the motion may differ from that of the result."""
+        """Dangers of the result, and a note where the motion may differ from its own."""
+        dangers = tuple(of_level(self.result.notes, DANGER))
         now = versions()
         then = self.result.versions
         other = [name for name in now if then.get(name) != now[name]]
         if not other:
-            return ()
+            return dangers
         change = ", ".join(f"{name} {then.get(name, 'unknown')} then and {now[name]} now" for name in other)
         sentence = f"this motion may differ from that of the result, which was computed with other versions: {change}"
-        return *self.result.notes, Note("versions", sentence)
+        return *dangers, Note("versions", sentence)
 
 
 def request_of(path: Path, turns: float | None, replicate: int) -> Request:

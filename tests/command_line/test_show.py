@@ -166,7 +166,7 @@ def test_show_bad_input(command, saved, tmp_path):
 def test_show_other_versions(saved, tmp_path):
     """Show: a result of other versions is shown with a warning."""
     record = json.loads((saved / "result.json").read_text())
-    assert request_of(saved, None, 1).notes == []
+    assert request_of(saved, None, 1).notes == ()
     record["versions"]["numba"] = "0.1"
     (tmp_path / "result.json").write_text(json.dumps(record))
     (note,) = request_of(tmp_path, None, 1).notes
