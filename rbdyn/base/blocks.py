@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, Literal, Self
 
-from rbdyn.base.notes import DANGER, Note, Notes, merged, of_level, ranked, verdict
+from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level, ranked, verdict
 
 
 class Detail(IntEnum):
@@ -46,7 +46,7 @@ class Verdict:
     @property
     def paragraphs(self) -> list[Paragraph]:
         """The verdict first."""
-        further = of_level(merged(self.notes), DANGER)[1:]
+        further = of_level(condensed(self.notes), DANGER)[1:]
         role: Role = "danger" if of_level(self.notes, DANGER) else ""
         return [Paragraph(verdict(self.notes), role), *(Paragraph(note, "danger") for note in further)]
 

@@ -19,7 +19,7 @@ from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.forecast import Remaining, clock_words
 from rbdyn.base.loading import INTERRUPTED
-from rbdyn.base.notes import DANGER, Note, merged, of_level
+from rbdyn.base.notes import DANGER, Note, condensed, of_level
 from rbdyn.base.records import plain
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
@@ -93,7 +93,7 @@ def hand_over(
 
 def alarm(notes: Iterable[Note | Mapping[str, Any]]) -> None:
     """Print every danger among notes or their JSON forms on standard error."""
-    for note in of_level(merged(map(Note.of, notes)), DANGER):
+    for note in of_level(condensed(map(Note.of, notes)), DANGER):
         print(f"danger: {escaped(note)}", file=sys.stderr)
 
 

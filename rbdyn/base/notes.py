@@ -153,7 +153,7 @@ def of_level(notes: Iterable[Note], level: Level) -> list[Note]:
 
 def verdict(notes: Iterable[Note]) -> str:
     """The first danger, else that there is none, with the numbers of what else there is to read."""
-    notes = merged(notes)
+    notes = condensed(notes)
     dangers, warnings = of_level(notes, DANGER), of_level(notes, WARNING)
     warned = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else ""
     if not dangers:
@@ -165,7 +165,7 @@ def verdict(notes: Iterable[Note]) -> str:
 NUMBER, PLACES = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?"), re.compile(r"(?: \([^()]*\))+$")
 
 
-def merged(notes: Iterable[Note]) -> list[Note]:
+def condensed(notes: Iterable[Note]) -> list[Note]:
     """Notes ``ranked``, those of one code that say the same of several things in one sentence.
 
     They say the same where they share the words behind the subject that may stand before the first colon, figures apart: the

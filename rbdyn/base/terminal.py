@@ -9,7 +9,7 @@ from textwrap import shorten, wrap
 from typing import NamedTuple
 
 from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Tiles, Verdict, says
-from rbdyn.base.notes import CODES, DANGER, merged, of_level
+from rbdyn.base.notes import CODES, DANGER, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
 
@@ -53,8 +53,8 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
 
 def _few_notes(block: Remarks, page: "Page") -> str:
     """The first notes, merged and cut, without general ones, and where the others are."""
-    every = merged(block.listed)
-    room = max(MOST_NOTES - len(of_level(merged(block.notes), DANGER)), 0)
+    every = condensed(block.listed)
+    room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)), 0)
     first = [note for note in every if not CODES[note.code].general][:room]
     lines = [f"{note.level}: {note}" for note in first]
     short = [page.short(line) for line in lines]

@@ -18,7 +18,7 @@ from doe.response_surface import fit
 from doe.workflow.confirmation import Gain
 from doe.workflow.dangers import choice_notes, extrapolation_notes
 from rbdyn.base.faults import RPM
-from rbdyn.base.notes import CODES, Level, Note, merged, ranked, status_notes, status_of, verdict
+from rbdyn.base.notes import CODES, Level, Note, condensed, ranked, status_notes, status_of, verdict
 from rbdyn.cli.app import app
 from rbdyn.cli.manual.page import code_table
 from rbdyn.contact.hertz_line import BALLS, ROLLERS, SHAKEDOWN, pressure_notes
@@ -65,7 +65,7 @@ def test_notes_alike_are_one_and_the_worst_come_first():
         Note("dent", "inner race: dented by 4200 MPa").about("at climb"),
     ]
     assert [note.level for note in ranked(notes)] == [*["danger"] * 2, *["warning"] * 3, "note"]
-    assert merged(notes) == [
+    assert condensed(notes) == [
         "inner race: dented by 4100 MPa",
         "power loss: may be off by 3 %; tighten rtol; likewise cage speed",
         "whirl: may be off by 3 %, mostly scatter",
