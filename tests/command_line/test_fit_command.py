@@ -268,7 +268,7 @@ def test_a_missing_response_is_fitted_to_the_other_rows_and_the_row_serves_the_o
 def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeypatch):
     """Unit: a Gaussian process costs the cube of the runs; without it the surface stands and a note says so."""
     monkeypatch.setattr("doe.workflow.surfaces.MOST_RIVALLED", 11)
-    shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear", "-q")
+    shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear")
     assert (
         shown.exit_code == 0
         and "note: 12 runs are not compared with a rival: a Gaussian process of more than 11" in shown.stdout
