@@ -23,6 +23,7 @@ from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, read_toml, refuse
+from rbdyn.base.notes import verdict
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.result import TEMPERATURES, SimulationResult
@@ -430,7 +431,7 @@ def heat_fault(result: SimulationResult) -> str | None:
     """Why a result has no steady temperatures, or too high ones; None for a sound one."""
     if result.status == "ok":
         return None
-    return f"{result.status}: {(result.thermal or {}).get('reason', 'its heat balance fails')}"
+    return f"{result.status}: {(result.thermal or {}).get('reason') or verdict(result.notes)}"
 
 
 def attempt_text(text: str, version: str) -> RunOutcome:

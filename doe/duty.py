@@ -18,6 +18,7 @@ from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, key_path, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.figure_names import HARMONIC
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -348,14 +349,15 @@ class DutyResult:
         return quotient(value, divisor, self.baseline_errors)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Notes:
         """Notes of all points, each once: those that not every point has name their points."""
         placed = [(group[0], note) for group in self.groups for note in self.points[group[0]].notes]
-        texts = []
+        every = list[Note]()
         for notes in alike(placed, lambda pair: pair[1]):
             names = list(dict.fromkeys(name for name, _ in notes))
-            texts.append(notes[0][1] if len(names) == len(self.groups) else f"at {', '.join(names)}: {notes[0][1]}")
-        return tuple(texts)
+            first = notes[0][1]
+            every.append(first if len(names) == len(self.groups) else first.about(f"at {', '.join(names)}"))
+        return tuple(every)
 
     @property
     def power_terms_W(self) -> dict[str, float]:  # noqa: N802

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.intervals import errors_of_differences
-from rbdyn.base.notes import Level, Note, merged
+from rbdyn.base.notes import Level, Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import Brief, Figure, counted, quantity
@@ -95,7 +95,7 @@ class Comparison(Brief, SavedRecord, kw_only=True):
     inputs: tuple[Input, ...]
     figures: dict[str, Difference]
     parts: dict[str, Difference]
-    notes: tuple[str, ...]
+    notes: Notes
 
     @property
     def failed(self) -> bool:
@@ -191,7 +191,7 @@ def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparis
         inputs=different_inputs(a.scene, b.scene),
         figures=differences(*figures),
         parts=differences(_parts(a), _parts(b)),
-        notes=tuple(_notes(a, b)),
+        notes=_notes(a, b),
     )
 
 
@@ -298,18 +298,18 @@ def _parts(result: Any) -> dict[str, Quantity]:
     return (result.part_figures or {}) if isinstance(result, SimulationResult) else {}
 
 
-def _notes(a: Any, b: Any) -> list[str]:
+def _notes(a: Any, b: Any) -> Notes:
     """Dangers and warnings of both, and what makes figures of one unlike those of the other besides the inputs."""
-    found = merged({"A": a.notes or (), "B": b.notes or ()}, least=Level.WARNING)
+    found = [*merged({"A": a.notes or (), "B": b.notes or ()}, least=Level.WARNING)]
     other = [name for name in a.versions if a.versions[name] != b.versions.get(name)]
     if other:
         change = ", ".join(f"{name} {a.versions[name]} and {b.versions.get(name, 'unknown')}" for name in other)
-        found.append(Note("other_versions", f"A and B were computed by other versions, which differ too: {change}"))
+        found.append(Note("versions", f"A and B were computed by other versions, which differ too: {change}"))
     windows = [getattr(result, "impact_window_turns", None) for result in (a, b)]
     if windows[0] != windows[1]:
         found.append(
             Note(
-                "other_windows",
+                "windows",
                 f"the impact force is the largest in {windows[0]:g} shaft turns of A and in {windows[1]:g} of B, so that it differs "
                 "for that alone; make numerics.impact_window_turns and the turns alike",
             )
@@ -318,12 +318,12 @@ def _notes(a: Any, b: Any) -> list[str]:
     if min(replicates) < ENOUGH:
         found.append(
             Note(
-                "few_replicates",
+                "few-replicates",
                 f"intervals rest on {replicates[0]} and {replicates[1]} replicates; with {ENOUGH} of each (--replicates) they are far "
                 "narrower",
             )
         )
-    return found
+    return tuple(found)
 
 
 def different_inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Input, ...]:

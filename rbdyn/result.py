@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
+from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, derived, json_fields
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
@@ -142,7 +143,7 @@ class SimulationResult(Brief, SavedRecord):
       None unless numerics.pulse_threshold_N is stated
     """
 
-    FORMAT = "rbdyn.simulation/4"
+    FORMAT = "rbdyn.simulation/5"
     WHAT = "simulation result"
     impact_force_N: Quantity  # noqa: N815
     impact_contact_force_N: Quantity  # noqa: N815
@@ -152,7 +153,7 @@ class SimulationResult(Brief, SavedRecord):
     cage_slip: Quantity
     power_balance: dict[str, float]
     loads: dict[str, float]
-    notes: tuple[str, ...]
+    notes: Notes
     power_terms_W: dict[str, float]  # noqa: N815
     rolling_resistance_W: dict[str, float]  # noqa: N815
     clearance_um: dict[str, Any]

@@ -21,7 +21,18 @@ from doe.commands.options import (
 )
 from doe.running.runner import count_of
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
-from rbdyn.base.command import FAILED, Force, Json, Workers, folder_option, guarded, hand_over, notice, print_json
+from rbdyn.base.command import (
+    FAILED,
+    Force,
+    Json,
+    Workers,
+    alarm,
+    folder_option,
+    guarded,
+    hand_over,
+    notice,
+    print_json,
+)
 from rbdyn.base.faults import InputError
 from rbdyn.base.pace import duration
 from rbdyn.base.terminal import show
@@ -74,6 +85,8 @@ def _leave_by(record: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print_json(record)
     sentences = record["obstacles"]["sentences"]
+    if as_json:
+        alarm(note for note in record["notes"] if note["text"] not in sentences)
     for sentence in sentences:
         print(sentence, file=sys.stderr)
     if sentences:

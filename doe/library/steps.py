@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered, saved, step_folder, texts_given
-from rbdyn.base.blocks import Block, Detail, Note, Paragraph
+from rbdyn.base.blocks import Block, Paragraph, with_notes
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
+from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import plain
 from rbdyn.base.words import counted, quantity, with_error
 
 if TYPE_CHECKING:
@@ -18,9 +20,9 @@ if TYPE_CHECKING:
     from doe.study_file import Study
 
 
-def with_notes(record: Mapping[str, Any], blocks: Sequence[Block]) -> list[Block]:
-    """The blocks behind the notes of their record."""
-    return [*(Note(note, Detail.LEAST) for note in record.get("notes", ())), *blocks]
+def notes_record(notes: Notes) -> dict[str, Any]:
+    """The JSON key of notes, where there are any."""
+    return {"notes": plain(notes)} if notes else {}
 
 
 class DesignAnswer(Answer):
@@ -29,7 +31,7 @@ class DesignAnswer(Answer):
     def blocks(self) -> list[Block]:
         from doe.report.sections.design import design_blocks
 
-        return with_notes(self.record, design_blocks(self.as_dict()))
+        return with_notes(self.record.get("notes", ()), design_blocks(self.as_dict()), judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
         runs, evaluation = self.record["runs"], self.record["evaluation"]
@@ -71,9 +73,8 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
         if study.file.scene and study.path_of(study.scene.file).exists():
             check_study(study)
         points = design_of(study)
-        notes = augment_notes(study)
         output.claim(path)
-        record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
+        record = design_record(study, points, evaluation(study, points)) | notes_record(augment_notes(study))
         answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
         return replace(answer, files=saved(output, "design.json", answer, partial(design_tables, record)))
 
@@ -97,7 +98,7 @@ class FitAnswer(Answer):
             for name, fitted in drop_undefined(self.record["responses"]).items()
             for block in fit_blocks(name, fitted, self.factors)
         ]
-        return [Paragraph(self.columns), *with_notes(self.record, readable(fits, {}))]
+        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits, {})], judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
         return fit_rows(self.record["responses"])
@@ -172,8 +173,7 @@ def fit(
         stack.enter_context(registered(study.path, folder))
         surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         surfaces = with_rivals(surfaces)
-        remarks = [*reading, *notes, *unrivalled(surfaces)]
-        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
+        record = fit_record(surfaces) | notes_record((*reading, *notes, *unrivalled(surfaces)))
         columns = (
             f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
             "of a factor's range"
@@ -190,7 +190,7 @@ def fit(
 
 def _study_or_table(
     path: Path | None, data: Path | None, factors: Any, responses: Any, model: str | None
-) -> "tuple[Study, tuple[str, ...]]":
+) -> "tuple[Study, Notes]":
     """The study of the file, or else that of the table with the options that name its columns; and notes.
 
     Raises InputError.
@@ -222,9 +222,7 @@ def _read_later(study: "Study", data: Path | None) -> list[Path]:
     return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]
 
 
-def _surfaces(
-    study: "Study", data: Path | None, out: Path | None, effort: Effort
-) -> "tuple[list[Surface], tuple[str, ...]]":
+def _surfaces(study: "Study", data: Path | None, out: Path | None, effort: Effort) -> "tuple[list[Surface], Notes]":
     """Surfaces of a study, of a table or of simulated runs, and notes on the table.
 
     Raises InputError, RunError, KeyboardInterrupt.
@@ -255,7 +253,7 @@ class FrontAnswer(Answer):
         from doe.report.sections.record import drop_undefined, readable
 
         clean = drop_undefined({"asked": self.asked, "front": self.as_dict()})
-        return with_notes(self.record, readable(front_blocks(clean), clean))
+        return with_notes(self.record.get("notes", ()), readable(front_blocks(clean), clean))
 
     def rows(self) -> Mapping[str, Rows]:
         picks = {"baseline": self.record["baseline"], **self.record["picks"]}
@@ -307,6 +305,7 @@ def front(
     from doe.report.sections.answer import asked_record
     from doe.report.sections.front import front_record, front_tables, given_point_record
     from doe.study_file import Study
+    from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
 
     path = path_given(path, "path")
@@ -323,8 +322,9 @@ def front(
         if pareto.violations is not None:
             raise out_of_reach(study, pareto.points[0], pareto.violations)
         if pareto.tolerance_violations is not None:
-            reading = (*reading, tolerances_out_of_reach(study, pareto.tolerance_violations))
-        record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
+            reading = (*reading, Note("tolerances", tolerances_out_of_reach(study, pareto.tolerance_violations)))
+        extrapolated = extrapolation_notes(surfaces, study.coded(pareto.points[pareto.pick]))
+        record = front_record(study, surfaces, pareto) | notes_record((*extrapolated, *reading))
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
         identity = study_identity("doe front", study, table)

@@ -24,7 +24,7 @@ from doe.report.sections.design import runs_record
 from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
-from doe.report.sections.record import drop_undefined, readable
+from doe.report.sections.record import drop_undefined, notes_of, readable
 from doe.report.sections.robust import robust_tables
 from doe.report.sections.search import (
     adaptive_record,
@@ -43,15 +43,15 @@ from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import RUNS_TABLE, evaluation
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Block, Detail
+from rbdyn.base.blocks import Block, Detail, Verdict
 from rbdyn.base.identity import Identity
-from rbdyn.base.records import finite, save_table
+from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
 from rbdyn.result import versions, write_json
 
-FORMAT = "doe.study/1"
+FORMAT = "doe.study/2"
 # What the name of a file should not have; a limit at a point of a duty has a name with a colon.
 NO_WORD = re.compile(r"[^\w.-]+")
 # Shaft turns of the motion in the pictures.
@@ -128,7 +128,12 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         *diagnostics(clean, {}).blocks,
     ]
     return readable(
-        [*first_screen(clean), *notes(clean, {}).blocks, *(replace(block, detail=Detail.ALL) for block in details)],
+        [
+            Verdict(notes_of(clean)),
+            *first_screen(clean),
+            *notes(clean, {}).blocks,
+            *(replace(block, detail=Detail.ALL) for block in details),
+        ],
         clean,
     )
 
@@ -162,7 +167,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "made": outcome.made,
         "missed_chains": outcome.missed_chains,
         "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
-        "notes": list(outcome.notes),
+        "notes": plain(outcome.every_note),
         "failures": grouped(outcome.failures),
         "cost": dict(outcome.cost),
         "versions": versions(),

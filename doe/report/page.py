@@ -25,13 +25,15 @@ from doe.report.sections.record import (
     factors,
     fits,
     is_ratio,
+    notes_of,
     part,
     readable,
     record_table,
     response_label,
     responses,
 )
-from rbdyn.base.blocks import Block, Bullets, Note, Section, Table, Widget
+from rbdyn.base import html
+from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
 from rbdyn.base.identity import Identity
 from rbdyn.base.page import identity_section, page
 from rbdyn.base.words import label, quantity, rounded_down, shown
@@ -65,7 +67,8 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
     data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
-    return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS, "\n".join(scripts))
+    opening = "".join(map(html.render, readable([Verdict(notes_of(record))], record)))
+    return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
 
 
 def title(summary: Record) -> str:
@@ -268,8 +271,7 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
     """Runs that failed, and limits of the model that the runs met."""
     failures = failure_table(part(summary, "failures") or [])
-    remarks = [Note(str(note)) for note in part(summary, "notes") or []]
-    return Section("notes", "Notes and failures", [failures, *remarks])
+    return Section("notes", "Notes and failures", [failures, Remarks(notes_of(summary))])
 
 
 CHAPTERS = (

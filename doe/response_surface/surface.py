@@ -250,12 +250,16 @@ class Surface(Record):
         A new observation has ``observation_variance`` as additional variance. For a transformed response it is the error
         of the transform over the slope of the transform, to first order.
         """
-        matrix = model_matrix(coded, self.terms)
-        variance = np.einsum("...j,jk,...k", matrix, self.covariance, matrix).clip(0.0)
+        variance = self.coefficient_error(coded) ** 2
         error = np.sqrt(variance + (0.0 if self.model_error is None else self.model_error.variance))
         if self.transform is None:
             return error
         return error / slope(self.predict(coded), self.transform)
+
+    def coefficient_error(self, coded: ArrayLike) -> Array:
+        """Standard error of the fit at coded points (..., k), shape (...), by the covariance of its coefficients alone."""
+        matrix = model_matrix(coded, self.terms)
+        return np.sqrt(np.einsum("...j,jk,...k", matrix, self.covariance, matrix).clip(0.0))
 
     def refit(self, rows: Rows) -> "Surface":
         """The same kind of surface fitted to these runs alone. Raises MethodError when they do not suffice."""

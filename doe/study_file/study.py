@@ -32,6 +32,7 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.tables.decimal_marks import is_like_number
 from rbdyn.base.tables.sheet import DATE, Column, Sheet, listed, quoted, read_sheet
 from rbdyn.base.tables.workbook import split_path
@@ -415,7 +416,7 @@ NEARLY_NUMBER = re.compile(r"\W{0,3}\d")
 MOST_UNNAMED = 100
 
 
-def study_of_table(path: Path, factors: list[str], responses: list[str], model: str) -> tuple[Study, tuple[str, ...]]:
+def study_of_table(path: Path, factors: list[str], responses: list[str], model: str) -> tuple[Study, Notes]:
     """The study of the named columns of a table, without a scene, and notes on columns that it leaves out.
 
     If only factors or only responses are named, the other kind is all further columns of numbers. Coded -1 and 1 are the
@@ -434,7 +435,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     )
     if not factors and not responses:
         raise InputError([f"{path}: name its factors by --factor NAME and its responses by --response NAME; {has}"])
-    notes = list[str]()
+    notes = list[Note]()
     if not factors or not responses:
         numbers, notes = _rest(sheet, {*factors, *responses}, responses)
         factors, responses = factors or numbers, responses or numbers
@@ -456,7 +457,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     return Study(split_path(path)[0], validated(StudyFile, data, str(path))), tuple(notes)
 
 
-def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[str]]:
+def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[Note]]:
     """Columns of numbers that are not in ``excluded``, and notes on other columns.
 
     Columns of errors belong to ``responses``, or else to the rest. A column of nearly numbers is one of them, and its
@@ -473,7 +474,8 @@ def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> 
     unused = [name for name in candidates if name in idle_errors and name not in errors]
     reasons = [("no numbers", labels), ("errors of no response", unused)]
     reasons.append(("without a name", [f"column {number}" for number in sheet.nameless]))
-    return numbers, [f"{sheet.path}: left out as {reason}: {listed(names)}" for reason, names in reasons if names]
+    left_out = (f"{sheet.path}: left out as {reason}: {listed(names)}" for reason, names in reasons if names)
+    return numbers, [Note("table", sentence) for sentence in left_out]
 
 
 def _words(column: Column) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Limits, Sheet, listed, quoted, read_sheet
 
 # Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.
@@ -34,7 +35,7 @@ class Table:
     errors: Array
     replicates: Whole
     block: Whole
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
 
 
 def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
@@ -97,17 +98,18 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
     )
 
 
-def gap_notes(path: Path, columns: Mapping[str, Array]) -> list[str]:
+def gap_notes(path: Path, columns: Mapping[str, Array]) -> list[Note]:
     """A note on each response or output without a value in some rows: the others of these rows serve all the same."""
-    notes = []
+    notes = list[Note]()
     for name, values in columns.items():
         rows = [str(row + 1) for row in np.flatnonzero(np.isnan(values)).tolist()]
         if rows:
             those = "that row, which serves" if len(rows) == 1 else "those rows, which serve"
-            notes.append(
+            sentence = (
                 f"{path}: {one_line(name, LONGEST_NAME)} has no value in {'row' if len(rows) == 1 else 'rows'} {listed(rows)}; "
                 f"it does without {those} the others"
             )
+            notes.append(Note("table", sentence))
     return notes
 
 

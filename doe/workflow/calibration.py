@@ -54,6 +54,7 @@ from doe.workflow.input_sets import (
 from doe.workflow.rig import MOST_CONDITIONS, PULSE_OUTPUTS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import counted, quantity
 from rbdyn.result import SimulationResult
@@ -76,7 +77,7 @@ class Question(NamedTuple):
     case: Case
     targets: list[Input]
     rig: Rig
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 def question_of(question: Question) -> str:
@@ -136,14 +137,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         *rig.notes,
         *case.remarks,
         *override_notes(case, overrides),
-        *(
-            (
-                f"{candidate.key} varies, so it has no single value to identify; it keeps the scene's value, or its ratio to "
-                "the key that it multiplies"
-            )
-            for candidate in case.every
-            if candidate.law.kind == "varies"
-        ),
+        *(_varies(candidate) for candidate in case.every if candidate.law.kind == "varies"),
     ]
     refuse(
         f"--free {key}: its documented range does not apply to this scene (rbdyn keys {key}); give it a law"
@@ -152,7 +146,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     )
     refuse([*_vain_question(case, rig, targets), *_endless_question(case, rig, targets)])
     if case.scene.calibrate.discrepancy == "none":
-        notes.append("discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow")
+        exact = "discrepancy = none: the simulation counts as exact; if it is not, intervals are far too narrow"
+        notes.append(Note("inputs", exact))
     else:
         refuse(
             f"{path}: calibrate.discrepancy: {name} is not measured; name one of {', '.join(rig.outputs)}"
@@ -161,6 +156,11 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         )
     refuse(_impossible_conditions(cases_of(case, rig), rig))
     return Question(case, targets, rig, tuple(notes))
+
+
+def _varies(candidate: Input) -> Note:
+    sentence = "varies, so it has no single value to identify; it keeps the scene's value, or its ratio to the key that it multiplies"
+    return Note("inputs", f"{candidate.key}: {sentence}")
 
 
 def _vain_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[str]:
@@ -253,7 +253,7 @@ class Calibration:
     match: Matched
     before: Array
     runs: int
-    notes: tuple[str, ...]
+    notes: Notes
     design: Design
     after: Array | None = None
     learnt: Learnt | None = None
@@ -510,7 +510,10 @@ def _with_judgement(calibration: Calibration) -> Calibration:
     notes = (
         *calibration.notes,
         *(
-            f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow"
+            Note(
+                "inputs",
+                f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow",
+            )
             for place in gained.narrow
         ),
     )

@@ -21,6 +21,7 @@ from doe.workflow.surfaces import gain_verdict, goals_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.intervals import chance_above, joint_freedom, joint_half_width, one_sided, standard_errors, times_wider
+from rbdyn.base.notes import DANGER, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
 from rbdyn.result import Quantity, SimulationResult
@@ -86,6 +87,7 @@ class Confirmed:
     temperature_ranges: Mapping[str, Sequence[float]] | None = None
     hot: Mapping[str, Scene] = field(default_factory=dict)
     jitter_points: tuple[str, ...] = ()
+    dangers: Notes = ()
 
     @property
     def error(self) -> Array:
@@ -175,6 +177,7 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
     confirmed = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    confirmed = replace(confirmed, dangers=tuple(of_level(condensed(result.notes), DANGER)))
     if isinstance(result, DutyResult):
         hot = {name: simulated_scene(one) for name, one in result.points.items() if one.thermal is not None}
         return replace(

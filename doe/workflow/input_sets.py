@@ -30,6 +30,7 @@ from rbdyn.base.faults import (
     set_key,
     validated,
 )
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import digest_of
 from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import shown
@@ -102,7 +103,7 @@ class Case:
     outputs: tuple[str, ...]
     sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     doubt: str = ""
-    remarks: tuple[str, ...] = ()
+    remarks: Notes = ()
     home: str = ""
     duty: Duty | None = None
 
@@ -154,9 +155,9 @@ class Case:
         return rollers_only(Scene.from_dict(self.tables(), f"{self.home}: uncertain.set"))
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences on the inputs: the doubt about the sample, and the remarks."""
-        return (self.doubt, *self.remarks) if self.doubt else self.remarks
+    def notes(self) -> Notes:
+        """Notes on the inputs: the doubt about the sample, and the remarks."""
+        return (Note("inputs", self.doubt), *self.remarks) if self.doubt else self.remarks
 
     @property
     def replicates(self) -> int:
@@ -214,7 +215,7 @@ def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Ma
     refuse(f"--set {override}: {reason}" for override in overrides if (reason := claimed.on(key_path(override))))
 
 
-def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list[str]:
+def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list[Note]:
     """Notes on the runs that each --set of a numerics key changes.
 
     Input sets have the keys of uncertain.set, so that only other ``runs``, if any, have the override.
@@ -223,19 +224,19 @@ def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list
     clashing = {key_path(override) for override in _clashing(case, overrides)}
     numerics = [override for override in overrides if key_path(override)[:1] == ("numerics",)]
     others = [override for override in numerics if key_path(override) not in clashing]
-    return [*notes, f"--set {', '.join(others)} changes every run"] if others else notes
+    return [*notes, Note("remark", f"--set {', '.join(others)} changes every run")] if others else notes
 
 
-def run_notes(case: Case, overrides: Sequence[str], source: str, runs: str = "") -> list[str]:
+def run_notes(case: Case, overrides: Sequence[str], source: str, runs: str = "") -> list[Note]:
     """A note on overrides by a ``source``, an option or a key, that uncertain.set replaces in the input sets, if any."""
     declared = {key_path(override): override for override in case.uncertain.assignments}
     clashing = _clashing(case, overrides)
     if not clashing:
         return []
     values = ", ".join(declared[key_path(override)] for override in clashing)
-    if runs:
-        return [f"{source}{', '.join(clashing)} changes {runs}, not the input sets: uncertain.set gives these {values}"]
-    return [f"{source}{', '.join(clashing)} changes no run: uncertain.set gives all of them {values}"]
+    change = f"changes {runs}, not the input sets: uncertain.set gives these"
+    change = change if runs else "changes no run: uncertain.set gives all of them"
+    return [Note("inputs", f"{source}{', '.join(clashing)} {change} {values}")]
 
 
 def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
@@ -283,7 +284,12 @@ def case_of(
     doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
     constant = {*by_set, *fixed, *keys}
     exact = [entry.key for entry in documented_of(case.ran) if not entry.on_request and entry.key not in constant]
-    case = replace(case, every=inputs, doubt=doubt, remarks=tuple(_remarks(len(keys), by_set, idle_keys, exact)))
+    case = replace(
+        case,
+        every=inputs,
+        doubt=doubt,
+        remarks=tuple(Note("inputs", text) for text in _remarks(len(keys), by_set, idle_keys, exact)),
+    )
     case.joint(inputs)
     refuse(impossible(case))
     return case

@@ -20,6 +20,7 @@ from doe.workflow.surfaces import predict_all
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite
 from rbdyn.base.words import quantity, shown, with_error
 
@@ -113,26 +114,39 @@ class Obstacles(Record):
     beyond: tuple[Beyond, ...]
     chains: dict[str, str]
     tolerances: str
-    sentences: list[str] = derived(lambda self: list(self._sentences()))
+    sentences: list[str] = derived(lambda self: [str(note) for note in self._notes()])
 
-    def _sentences(self) -> Iterator[str]:
+    @property
+    def notes(self) -> Notes:
+        """The same as notes."""
+        return tuple(self._notes())
+
+    def _notes(self) -> Iterator[Note]:
+        broken = any(limit.verdict == "broken" for limit in self.limits)
+        worst = "broken-limit" if broken or not self.reachable else "open-limit"
         if not self.reachable:
-            yield "No point of the region keeps all limits: the chosen clearances are those that miss them least."
-        yield from (limit.sentence for limit in self.limits)
-        if self.limits and self.beyond:
-            ways = "; or ".join(way.words for way in self.beyond)
-            yield f"The limits may be met beyond the region, extrapolated by the surfaces: {ways}. Widen the design there."
-        elif self.limits:
-            names = " and ".join(quantity(name)[0] for name in self.at_bounds)
-            why = (
-                f"Moving {names} beyond {'its bound' if len(self.at_bounds) == 1 else 'their bounds'} by half the region's width does not meet the limits, by the extrapolated surfaces"
-                if names
-                else "The best point lies within the bounds of all factors, so that a wider region does not help by the surfaces"
-            )
-            yield f"{why}: relax the limits, or change what is no factor."
-        yield from (f"Chain {name}: {why}." for name, why in self.chains.items())
+            least = "No point of the region keeps all limits: the chosen clearances are those that miss them least."
+            yield Note(worst, least)
+        for limit in self.limits:
+            yield Note("broken-limit" if limit.verdict == "broken" else "open-limit", limit.sentence)
+        if self.limits:
+            yield Note(worst, self._remedy())
+        yield from (Note("missed-chain", f"Chain {name}: {why}.") for name, why in self.chains.items())
         if self.tolerances:
-            yield self.tolerances
+            yield Note("tolerances", self.tolerances)
+
+    def _remedy(self) -> str:
+        if self.beyond:
+            ways = "; or ".join(way.words for way in self.beyond)
+            return f"The limits may be met beyond the region, extrapolated by the surfaces: {ways}. Widen the design there."
+        names = " and ".join(quantity(name)[0] for name in self.at_bounds)
+        bounds = "its bound" if len(self.at_bounds) == 1 else "their bounds"
+        why = (
+            f"Moving {names} beyond {bounds} by half the region's width does not meet the limits, by the extrapolated surfaces"
+            if names
+            else "The best point lies within the bounds of all factors, so that a wider region does not help by the surfaces"
+        )
+        return f"{why}: relax the limits, or change what is no factor."
 
 
 def obstacles_of(

@@ -14,6 +14,7 @@ from doe.study_file.table import gap_notes
 from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
 from rbdyn.scene.key_columns import key_values, unknown_keys
@@ -78,7 +79,7 @@ class Rig:
     keys: tuple[str, ...]
     outputs: tuple[str, ...]
     accuracies: dict[str, float]
-    notes: tuple[str, ...]
+    notes: Notes
 
     @property
     def conditions(self) -> list[dict[str, Any]]:
@@ -100,7 +101,7 @@ def read_rig(path: Path) -> Rig:
     if training < FEWEST:
         faults.append(f"{path}: only {counted(training, 'row')} not on hold; at least {FEWEST} are needed")
     refuse(faults)
-    rows, notes = [], []
+    rows, notes = [], list[Note]()
     for place in range(len(sheet.rows)):
         try:
             row, note = _row(cells, place, outputs)
@@ -108,7 +109,7 @@ def read_rig(path: Path) -> Rig:
             faults += error.faults
             continue
         rows.append(row)
-        notes += [note] if note else []
+        notes += [Note("measurement", note)] if note else []
     refuse(faults)
     gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
     rig = Rig(path, rows, keys, outputs, accuracies, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))

@@ -40,6 +40,7 @@ from doe.workflow.runs import region_of, rounded_within
 from doe.workflow.surfaces import goals_of
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import refuse, set_key
+from rbdyn.base.notes import Notes
 from rbdyn.scene.unknown import Input, is_number
 
 
@@ -408,7 +409,7 @@ class Robust:
     doubtful: int
     failures: tuple[Failure, ...]
     decision: Decision
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
     odds: Mapping[str, Share] = field(default_factory=dict)
 
 

@@ -24,6 +24,7 @@ from doe.study_file.sections import Design as DesignSettings
 from doe.study_file.table import Table, read_table
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
+from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import are, counted
 
@@ -248,7 +249,7 @@ class Runs:
     actual: Array
     values: Array
     errors: Array
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
     replicates: Whole | None = None
     block: Whole | None = None
     failures: tuple[Failure, ...] = ()
@@ -325,9 +326,8 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _distinct_notes([result.notes for result in sound])
     if failures:
-        notes.append(
-            f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
-        )
+        lost = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
+        notes.append(Note("lost-runs", lost))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
     runs = Runs(
@@ -341,18 +341,23 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
     return replace(runs, at_points=at_points)
 
 
-def _distinct_notes(notes: Sequence[Sequence[str]]) -> list[str]:
+def _distinct_notes(notes: Sequence[Notes]) -> list[Note]:
     """Notes of all runs in the order of their mean place in a run, the most important first.
 
-    Of notes that differ in their numbers only the first is kept, with the number of its runs.
+    Of notes that differ in their numbers only the first is kept, with the number of its runs. A danger of some of them is none
+    of the pick, and so a warning.
     """
     placed = [(place, note) for of_run in notes for place, note in enumerate(of_run)]
     groups = sorted(alike(placed, itemgetter(1)), key=lambda group: fmean(place for place, _ in group))
     texts = [[note for _, note in group] for group in groups]
-    return [
-        group[0] if len(set(group)) == 1 else f"{group[0]} (in {len(group)} of {len(notes)} runs; figures of the first)"
-        for group in texts
-    ]
+    distinct = []
+    for group in texts:
+        some, alone = f"in {len(group)} of {len(notes)} runs", len(set(group)) == 1
+        if len(group) < len(notes) and group[0].level == DANGER:
+            distinct.append(Note("corner", f"{group[0]} ({some}{'' if alone else '; figures of the first'})"))
+        else:
+            distinct.append(group[0] if alone else group[0].about(f"{some}; figures of the first"))
+    return distinct
 
 
 def read_runs(study: Study, path: Path) -> Runs:
@@ -362,7 +367,7 @@ def read_runs(study: Study, path: Path) -> Runs:
     return Runs(coded, table.actual, table.values, table.errors, table.notes, table.replicates, table.block)
 
 
-def augment_notes(study: Study) -> tuple[str, ...]:
+def augment_notes(study: Study) -> Notes:
     """How the table of design.augment was read, where that is unusual. Raises InputError."""
     name = study.file.design.augment
     return () if name is None else read_sheet(study.path_of(name)).notes

@@ -29,6 +29,7 @@ from doe.threads import one_thread
 from doe.workflow.runs import Runs, design_of, read_runs
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
+from rbdyn.base.notes import Note
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import are, error_alone, improvement
 
@@ -109,14 +110,11 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     return results
 
 
-def unrivalled(surfaces: Sequence[Surface]) -> list[str]:
+def unrivalled(surfaces: Sequence[Surface]) -> list[Note]:
     """A note on surfaces with too many runs for a comparison with a Gaussian process; else none."""
     runs = max(len(surface.data.values) for surface in surfaces)
-    return (
-        [f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"]
-        if runs > MOST_RIVALLED
-        else []
-    )
+    sentence = f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"
+    return [Note("remark", sentence)] if runs > MOST_RIVALLED else []
 
 
 def independent_values(runs: Runs) -> Whole:
@@ -184,7 +182,8 @@ def reference_runs(study: Study) -> Runs | None:
     shared = [name for name in study.figures if name in sheet]
     table = read_runs(study.with_responses(shared or study.figures), path)
     missing = [name for name in study.figures if name not in shared]
-    notes = [f"{path} has no column of {', '.join(missing)}, which {are(len(missing))} not compared"] if missing else []
+    sentence = f"{path} has no column of {', '.join(missing)}, which {are(len(missing))} not compared"
+    notes = [Note("table", sentence)] if missing else []
     rows = list(range(len(table.coded)))
     order = []
     for point in design_of(study).coded:

@@ -36,6 +36,7 @@ from doe.workflow.input_sets import (
 )
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
@@ -90,7 +91,7 @@ class Uncertainty:
     outputs: Mapping[str, OutputRange]
     sets: Sets
     seed: int
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 @one_thread
@@ -171,9 +172,10 @@ def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets
     return replace(case, outputs=names), kept
 
 
-def _idle_notes(idle: Mapping[str, float]) -> list[str]:
+def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
     return [
-        f"{name}: is {value:.5g} in every input set, for no unknown input changes it" for name, value in idle.items()
+        Note("remark", f"{name}: is {value:.5g} in every input set, for no unknown input changes it")
+        for name, value in idle.items()
     ]
 
 
@@ -203,35 +205,39 @@ def _output(case: Case, nominal: Quantity, spread: Spread, fitted: Emulated, fre
 
 
 def _notes(
-    case_notes: Collection[str], sets: Sets, outputs: Mapping[str, OutputRange], count: int, target: float
-) -> tuple[str, ...]:
+    case_notes: Collection[Note], sets: Sets, outputs: Mapping[str, OutputRange], count: int, target: float
+) -> Notes:
     notes = [*case_notes]
     lost_sets = len(sets.failures) + len(sets.impossible)
     if lost_sets:
         cause = (*map(str, sets.failures), *sets.impossible)[0]
-        notes.append(f"{counted(lost_sets, 'input set')} gave no result and {are(lost_sets)} left out: {cause}")
+        lost = f"{counted(lost_sets, 'input set')} gave no result and {are(lost_sets)} left out: {cause}"
+        notes.append(Note("lost-runs", lost))
     for name, output in outputs.items():
         spread = output.spread
+        sentence = ""
         if spread.hidden:
-            notes.append(
+            sentence = (
                 f"{name}: simulation noise exceeds the effect of the inputs; raise numerics.replicates or "
                 "numerics.turns in uncertain.set"
             )
         elif not spread.by_emulator:
-            notes.append(
+            sentence = (
                 f"{name}: its emulator predicts too little (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to "
                 "give the shares of inputs"
             )
         elif output.explained < WHOLE:
-            notes.append(
+            sentence = (
                 f"{name}: the inputs named explain {100.0 * output.explained:.0f} % of its variance; the rest is other "
                 "inputs and the error of the emulator"
             )
+        notes += [Note("emulator", sentence)] if sentence else []
         if spread.relative_error > target and not spread.hidden:
-            notes.append(
+            sentence = (
                 f"{name}: after {count} input sets the standard error of an end of its range is "
                 f"{100.0 * spread.relative_error:.0f} % of its width"
             )
+            notes.append(Note("emulator", sentence))
     return tuple(notes)
 
 

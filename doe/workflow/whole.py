@@ -42,6 +42,7 @@ from doe.workflow.confirmation import (
     verdict_of,
     whirl_sentence,
 )
+from doe.workflow.dangers import worse_notes
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.first_look import first_look
 from doe.workflow.front import OutOfReachError, check_goals, find_front, known_tolerances, with_survival
@@ -56,6 +57,7 @@ from doe.workflow.surfaces import PublishedComparison, compare_with_published, f
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
@@ -162,25 +164,27 @@ def _widest_half_widths(study: Study) -> Array:
 
 def solve_chains(
     study: Study, pick: Array, tolerances: PickTolerances | None
-) -> tuple[dict[str, ChainResult], list[str]]:
+) -> tuple[dict[str, ChainResult], list[Note]]:
     """Every chain by name at the picked point (k,), and notes on chains without a solution."""
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
-    solved, notes = {}, []
+    solved, notes = {}, list[Note]()
     for number, chain in enumerate(study.file.chain):
         if (place := study.factors.index(chain.factor)) in study.inactive:
-            notes.append(f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories")
+            sentence = f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories"
+            notes.append(Note("chain", sentence))
             continue
         limit, half_width = half_widths[place], chain.half_width_mm
         if half_width is not None and half_width > limit:
-            notes.append(
+            sentence = (
                 f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
                 "the gains are kept as [tolerances] asks; narrow it, or demand less there"
             )
+            notes.append(Note("chain", sentence))
         try:
             parts = _chain(study, number, pick, half_widths)
             solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
         except InputError as error:
-            notes += error.faults
+            notes += [Note("missed-chain", fault) for fault in error.faults]
     return solved, notes
 
 
@@ -244,7 +248,7 @@ class StudyResult:
     published_comparisons: list[PublishedComparison]
     reference_values: Array | None
     failures: tuple[Failure, ...]
-    notes: tuple[str, ...]
+    notes: Notes
     cost: Mapping[str, float]
     duty: DutyAnswer | None = None
 
@@ -343,6 +347,13 @@ class StudyResult:
         return verdict_of(self.limits)
 
     @property
+    def every_note(self) -> Notes:
+        """The dangers of the pick first, then those of its runs and of the baseline's, then all other notes."""
+        pick = (*self.obstacles.notes, *worse_notes(self.gains["pick"]))
+        runs = (note.about(f"at the {name}") for name in ("pick", "baseline") for note in self.confirmed[name].dangers)
+        return (*pick, *runs, *self.notes)
+
+    @property
     def whirl_sentence(self) -> str:
         """A warning that the whirl with a goal is that of a trembling cage; else empty."""
         return whirl_sentence(self.study, self.confirmed)
@@ -429,7 +440,7 @@ def run_study(
         failures=tuple(
             failure for step in (runs, searched, robustness, selection) if step for failure in step.failures
         ),
-        notes=(*notes, *([] if searched else advice(study, surfaces)), *runs.notes),
+        notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study, surfaces))), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
@@ -443,15 +454,18 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
     return surfaces, front
 
 
-def _searched(study: Study, runs: Runs, simulations: Simulations, clock: "_Clock") -> tuple[Adaptive | None, list[str]]:
+def _searched(
+    study: Study, runs: Runs, simulations: Simulations, clock: "_Clock"
+) -> tuple[Adaptive | None, list[Note]]:
     """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
     try:
         return find_adaptive(study, runs, simulations), []
     except OutOfReachError:
-        return None, [
+        sentence = (
             "the adaptive search ended without a front, because nothing that it predicts is likely to keep all limits; the pick is "
             "that of the surfaces"
-        ]
+        )
+        return None, [Note("advice", sentence)]
     finally:
         clock.lap("adaptive_s")
 

@@ -88,7 +88,7 @@ def valued(term: str, runs: Mapping[str, Any]) -> tuple[float, float]:
     for key in path.split("/"):
         value = value[key]
     if pattern:
-        found = re.search(pattern, value if isinstance(value, str) else "\n".join(value))
+        found = re.search(pattern, value if isinstance(value, str) else "\n".join(note["text"] for note in value))
         return float(found[1]) if found else math.nan, 0.0
     if isinstance(value, Mapping):
         return value["value"], math.hypot(value["statistical_error"], value["numerical_error"])

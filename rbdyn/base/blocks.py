@@ -1,9 +1,11 @@
 """Blocks of a report: one tree that terminal and HTML render. Text is plain: a renderer escapes it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Literal, Self
+from typing import Any, Literal, Self
+
+from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level, ranked, verdict
 
 
 class Detail(IntEnum):
@@ -19,14 +21,14 @@ class Detail(IntEnum):
         return cls.LEAST if quiet else cls.ALL if verbose else cls.USUAL
 
 
-Role = Literal["", "statement", "warning", "small"]
-# First word of a warning in every rendering: no reader depends on a colour.
-WARNING = "Warning"
+Role = Literal["", "statement", "danger", "warning", "small"]
+# First word of bad news in every rendering: no reader depends on a colour.
+ALARMS = {"danger": "Danger", "warning": "Warning"}
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences; a "statement" is good news, a "warning" bad news or an open verdict, "small" is small print."""
+    """Sentences; a "statement" is good news, a "danger" or "warning" bad news or an open verdict, "small" is small print."""
 
     text: str
     role: Role = ""
@@ -34,11 +36,32 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Note:
-    """A remark on the validity of the result, such as a limit of the model."""
+class Verdict:
+    """Every danger among the notes of a result, or, where dangers are ``judged``, that there is none; renderings begin with it."""
 
-    text: str
+    notes: Notes
+    judged: bool = True
+    detail: Detail = Detail.LEAST
+
+    @property
+    def paragraphs(self) -> list[Paragraph]:
+        """The verdict first."""
+        further = of_level(condensed(self.notes), DANGER)[1:]
+        role: Role = "danger" if of_level(self.notes, DANGER) else ""
+        return [Paragraph(verdict(self.notes), role), *(Paragraph(note, "danger") for note in further)]
+
+
+@dataclass(frozen=True)
+class Remarks:
+    """The notes of a result that are no dangers, the worst first; below full detail the first of them, merged."""
+
+    notes: Notes
     detail: Detail = Detail.USUAL
+
+    @property
+    def listed(self) -> list[Note]:
+        """Every one."""
+        return [note for note in ranked(self.notes) if note.level != DANGER]
 
 
 @dataclass(frozen=True)
@@ -141,7 +164,7 @@ class Widget:
     detail: Detail = Detail.LEAST
 
 
-Block = Paragraph | Note | Heading | Bullets | Table | Tiles | Figures | Widget
+Block = Paragraph | Verdict | Remarks | Heading | Bullets | Table | Tiles | Figures | Widget
 
 
 @dataclass(frozen=True)
@@ -153,9 +176,10 @@ class Section:
     blocks: Sequence[Block]
 
 
-def notes(texts: Iterable[str], detail: Detail = Detail.USUAL) -> list[Block]:
-    """One note for each text."""
-    return [Note(text, detail=detail) for text in texts]
+def with_notes(notes: Iterable[Note | Mapping[str, Any]], blocks: Iterable[Block], judged: bool = True) -> list[Block]:
+    """The blocks between the verdict of ``notes``, or of their JSON forms, and those of them that are no dangers."""
+    every = tuple(map(Note.of, notes))
+    return [Verdict(every, judged), *blocks, Remarks(every)]
 
 
 def says(block: Block) -> bool:
@@ -163,6 +187,8 @@ def says(block: Block) -> bool:
     match block:
         case Table(rows=content) | Bullets(items=content) | Tiles(tiles=content) | Figures(pictures=content):
             return bool(content)
-        case Paragraph(text=content) | Note(text=content) | Heading(text=content):
+        case Paragraph(text=content) | Heading(text=content) | Remarks(listed=content):
             return bool(content)
+        case Verdict(notes=content, judged=judged):
+            return judged or bool(of_level(content, DANGER))
     return True

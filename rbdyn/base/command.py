@@ -9,7 +9,7 @@ import shlex
 import string
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -21,6 +21,8 @@ from typer.core import TyperCommand, TyperGroup
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.loading import INTERRUPTED
+from rbdyn.base.notes import DANGER, Note, condensed, of_level
+from rbdyn.base.records import plain
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
 
@@ -108,11 +110,19 @@ def hand_over(
 ) -> None:
     """Print the ``record`` as JSON, else let ``answer`` print and list the ``files`` written to the ``folder``."""
     if as_json:
-        print_json(record())
+        printed = plain(record())
+        print_json(printed)
+        alarm(printed.get("notes", ()))
         return
     answer()
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
+
+
+def alarm(notes: Iterable[Note | Mapping[str, Any]]) -> None:
+    """Print every danger among notes or their JSON forms on standard error."""
+    for note in of_level(condensed(map(Note.of, notes)), DANGER):
+        print(f"danger: {escaped(note)}", file=sys.stderr)
 
 
 @contextmanager
@@ -260,7 +270,7 @@ Force = Annotated[bool, flag("--force", says="Write over files in the folder tha
 OutFile = Annotated[Path | None, valued("FILE", "Write it to this file.", "standard output", "--out")]
 ForceFile = Annotated[bool, flag("--force", says="Write over the file of --out.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes but dangers.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
 
 

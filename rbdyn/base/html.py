@@ -5,23 +5,24 @@ from html import escape
 from itertools import groupby
 
 from rbdyn.base.blocks import (
-    WARNING,
+    ALARMS,
     Block,
     Bullets,
     Figures,
     Heading,
-    Note,
     Paragraph,
+    Remarks,
     Section,
     Table,
     Tile,
     Tiles,
+    Verdict,
     Widget,
     says,
 )
 
 # Classes of the style sheet by the role of a paragraph.
-CLASSES = {"": "", "statement": ' class="statement"', "warning": ' class="warning"', "small": ' class="note"'}
+CLASSES = {"": "", "small": ' class="note"'} | {role: f' class="{role}"' for role in ("statement", "danger", "warning")}
 
 
 def section(part: Section, widget: Callable[[str], str] = lambda name: "") -> str:
@@ -41,10 +42,12 @@ def render(block: Block) -> str:
     """HTML of a block without scripts. Raises TypeError for a widget."""
     match block:
         case Paragraph(text, role):
-            word = f"<strong>{WARNING}:</strong> " if role == "warning" else ""
+            word = f"<strong>{ALARMS[role]}:</strong> " if role in ALARMS else ""
             return f"<p{CLASSES[role]}>{word}{prose(text)}</p>"
-        case Note(text):
-            return f"<p>{prose(text)}</p>"
+        case Verdict(paragraphs=paragraphs):
+            return "".join(map(render, paragraphs))
+        case Remarks(listed=listed):
+            return "".join(f"<p>{note.level.capitalize()}: {prose(note)}</p>" for note in listed)
         case Heading(text):
             return f"<h3>{escape(text)}</h3>"
         case Bullets(items):

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rbdyn.base import html
-from rbdyn.base.blocks import Block, Figures, Section, Table
+from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict, says
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import Identity, identity_line, identity_table
 from rbdyn.base.vector import vector_copies
@@ -86,16 +86,16 @@ def page(
 
 
 def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
-    """Page of a result: its blocks at every detail with long tables folded, its pictures (SVG by name), its identity."""
-    blocks = [_folded(block) for block in blocks]
+    """Page of a result: its verdict, its blocks at every detail with long tables folded, its pictures (SVG by name), its identity."""
+    opening = "".join(html.render(block) for block in blocks if isinstance(block, Verdict) and says(block))
+    blocks = [_folded(block) for block in blocks if not isinstance(block, Verdict)]
     drawn = [Figures([picture], name) for name, picture in pictures.items()]
-    line = identity_line(identity)
     parts = [
-        Section("result", "Result", [line, *blocks]),
+        Section("result", "Result", [identity_line(identity), *blocks]),
         Section("pictures", "Pictures", drawn),
         identity_section(identity),
     ]
-    return page(identity.title, identity.title, [part for part in parts if part.blocks])
+    return page(identity.title, identity.title, [part for part in parts if part.blocks], notice=opening)
 
 
 def _folded(block: Block) -> Block:

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
+from rbdyn.base.notes import Note
 from rbdyn.base.words import Brief
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def json_fields(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[s
 
 def plain(value: Any) -> Any:
     """JSON form of a value, which shares nothing with it; arrays become lists."""
-    if isinstance(value, Record):
+    if isinstance(value, Record | Note):
         return value.as_dict()
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
@@ -131,6 +132,8 @@ def restore(kind: Any, value: Any) -> Any:
         return {key: restore(kinds[1], item) for key, item in value.items()}
     elif origin in (list, tuple) and isinstance(value, list):
         return origin(restore(kinds[0], item) for item in value)
+    elif kind is Note:
+        return Note.of(value)
     elif isinstance(kind, type) and issubclass(kind, Record) and isinstance(value, dict):
         return kind.from_dict(value)
     elif type(value) is kind or (kind is float and type(value) is int):

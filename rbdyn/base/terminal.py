@@ -4,12 +4,12 @@ import io
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from textwrap import shorten, wrap
 from typing import NamedTuple
 
-from rbdyn.base.blocks import WARNING, Block, Bullets, Detail, Heading, Note, Paragraph, Table, Tiles, says
+from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Tiles, Verdict, says
+from rbdyn.base.notes import CODES, DANGER, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
 
@@ -17,8 +17,7 @@ from rbdyn.base.words import counted
 PADDING, FRAME = 3, 1
 # Longest cell that is never broken, unless it is a value with its error.
 SHORT = 20
-NOTE = "note: "
-# Notes that are shown below full detail.
+# Notes that are shown below full detail, dangers among them.
 MOST_NOTES = 5
 # Width of tables in a file or a pipe.
 WIDE = 160
@@ -36,7 +35,7 @@ def show(blocks: Iterable[Block], detail: Detail = Detail.USUAL) -> None:
 def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | None = None, bold: bool = False) -> str:
     """Text of the blocks up to a level of detail, each on lines of its own, without pictures.
 
-    Below full detail there are at most `MOST_NOTES` notes, a line each.
+    The verdict comes first. Below full detail there are at most `MOST_NOTES` notes.
 
     width : columns of the terminal; None for a file, whose sentences are one line each.
     bold : whether headings, captions and warnings are in bold type.
@@ -44,27 +43,24 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
     page = Page(width, bold)
     shown = [block for block in blocks if block.detail <= detail and says(block)]
     written = ""
-    for block in shown if detail == Detail.ALL else _few_notes(shown, page):
+    for block in sorted(shown, key=lambda block: not isinstance(block, Verdict)):
         titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
-        written += ("\n" if titled and written and not written.endswith("\n\n") else "") + _render(block, page)
+        written += ("\n" if titled and written and not written.endswith("\n\n") else "") + (
+            _few_notes(block, page) if isinstance(block, Remarks) and detail < Detail.ALL else _render(block, page)
+        )
     return written
 
 
-def _few_notes(blocks: Sequence[Block], page: "Page") -> list[Block]:
-    """The blocks with the first notes, each cut to a line of the page, and where the others are."""
-    texts = [block.text for block in blocks if isinstance(block, Note)]
-    first = {text: page.line(text) for text in texts[:MOST_NOTES]}
-    left, cut = len(texts) - len(first), any(line != text for text, line in first.items())
-    if not left and not cut:
-        return list(blocks)
-    last = max(place for place, block in enumerate(blocks) if isinstance(block, Note) and block.text in first)
-    before = [_cut(block, first) for block in blocks[: last + 1] if not isinstance(block, Note) or block.text in first]
+def _few_notes(block: Remarks, page: "Page") -> str:
+    """The first notes, merged and cut, without general ones, and where the others are."""
+    every = condensed(block.listed)
+    room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)), 0)
+    first = [note for note in every if not CODES[note.code].general][:room]
+    lines = [f"{note.level}: {note}" for note in first]
+    short = [page.short(line) for line in lines]
+    left = len(every) - len(first)
     where = f"{counted(left, 'more note')} in the report (--out)" if left else "notes in full: in the report (--out)"
-    return [*before, Paragraph(where), *(block for block in blocks[last + 1 :] if not isinstance(block, Note))]
-
-
-def _cut(block: Block, lines: Mapping[str, str]) -> Block:
-    return replace(block, text=lines[block.text]) if isinstance(block, Note) else block
+    return "".join(map(page.lines, [*short, *([where] if left or short != lines else [])]))
 
 
 class Page(NamedTuple):
@@ -81,9 +77,9 @@ class Page(NamedTuple):
         broken = (wrap(part, self.width, break_long_words=False, break_on_hyphens=False) for part in text.split("\n"))
         return "".join(f"{line}\n" for lines in broken for line in lines or [""])
 
-    def line(self, text: str) -> str:
+    def short(self, text: str) -> str:
         """As much of a note as fits in a line of the page."""
-        return text if self.width is None else shorten(text, max(self.width - len(NOTE), 1), placeholder=" …")
+        return text if self.width is None else shorten(text, max(self.width, len("warning …")), placeholder=" …")
 
     def title(self, text: str) -> str:
         """A heading or a caption."""
@@ -92,12 +88,12 @@ class Page(NamedTuple):
 
 def _render(block: Block, page: Page) -> str:
     match block:
-        case Paragraph(text, "warning"):
-            return page.title(f"{WARNING}: {text}")
-        case Paragraph(text):
-            return page.lines(text)
-        case Note(text):
-            return page.lines(f"{NOTE}{text}")
+        case Paragraph(text, role):
+            return page.title(f"{ALARMS[role]}: {text}") if role in ALARMS else page.lines(text)
+        case Verdict(paragraphs=paragraphs):
+            return "".join(_render(paragraph, page) for paragraph in paragraphs)
+        case Remarks(listed=listed):
+            return "".join(page.lines(f"{note.level}: {note}") for note in listed)
         case Heading(text):
             return page.title(text)
         case Bullets(items):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.base import command
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
@@ -138,6 +138,8 @@ def simulate(
             result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), out, written
         )
     if result.status != "ok":
+        if not as_json:
+            command.alarm(result.notes)
         raise typer.Exit(command.FAILED)
 
 
@@ -216,7 +218,8 @@ def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     spent = f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}"
-    return [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks() if duty else [])]
+    answer = [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks() if duty else [])]
+    return with_notes((*mapped.notes, *(duty.notes if duty else ())), answer)
 
 
 def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[str]:

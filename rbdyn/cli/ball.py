@@ -15,6 +15,7 @@ from rbdyn.base.command import (
     Quiet,
     SceneFile,
     Set,
+    alarm,
     folder_option,
     guarded,
     hand_over,
@@ -25,6 +26,7 @@ from rbdyn.base.command import (
 from rbdyn.base.faults import InputError
 from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_line, identity_of
+from rbdyn.base.notes import status_notes
 from rbdyn.base.page import REPORT_FILES, write_with_report
 from rbdyn.base.terminal import show
 
@@ -111,7 +113,9 @@ def ball(
             files,
         )
     if not result.is_equilibrium:
-        if not as_json:
+        if as_json:
+            alarm(status_notes(result.status))
+        else:
             subject = "no equilibrium" if result.thermal is None else "temperatures"
             print(f"{subject}: {result.status}", file=sys.stderr)
         raise typer.Exit(FAILED)

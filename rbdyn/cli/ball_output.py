@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_notes
+from rbdyn.base.notes import status_notes
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, other_ranges, range_ends, shown
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
@@ -19,7 +20,7 @@ def blocks(result: BallResult) -> list[Block]:
     temperatures of the search for steady ones."""
     if not result.is_equilibrium:
         thermal = result.thermal or {}
-        return [_search_table(thermal)] if "path_heat_W" in thermal else []
+        return with_notes(status_notes(result.status), [_search_table(thermal)] if "path_heat_W" in thermal else [])
     titles = {name: f"{name} row" if name else "" for name in result.row_reports}
     rows: list[Block] = []
     for name, row in result.row_reports.items():
@@ -42,14 +43,9 @@ def blocks(result: BallResult) -> list[Block]:
         sentences.append(_runout(result.runout))
     from rbdyn.compiled.kernel import compiler_notes
 
-    return [
-        *rows,
-        Heading("whole bearing" if sentences and any(titles.values()) else ""),
-        *map(Paragraph, sentences),
-        *tables,
-        *notes(result.notes or ()),
-        *notes(compiler_notes(), Detail.ALL),
-    ]
+    whole = Heading("whole bearing" if sentences and any(titles.values()) else "")
+    answer = [*rows, whole, *map(Paragraph, sentences), *tables]
+    return with_notes((*(result.notes or ()), *compiler_notes()), answer)
 
 
 def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":

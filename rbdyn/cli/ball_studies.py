@@ -9,13 +9,13 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.command import FAILED, checkpoint_message, hand_over, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
-from rbdyn.base.records import save_table
+from rbdyn.base.records import plain, save_table
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted, label, shown, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
@@ -73,8 +73,7 @@ def sweep_blocks(result: "SweepResult") -> list[Block]:
     """The points, what they cost and the notes."""
     points = counted(len(result.statuses), "point")
     spent = f"{points} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
-    remarks = (f"{result.where(note['points'])}: {note['note']}" for note in result.notes)
-    return [points_table(result), Paragraph(spent), *notes(remarks)]
+    return with_notes(result.placed_notes, [points_table(result), Paragraph(spent)])
 
 
 def points_table(result: "SweepResult") -> Table:
@@ -152,7 +151,7 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
         "points": points,
         "least_stress": _best(scan, "least_stress", si),
         "longest_life": _best(scan, "longest_life", si),
-        "notes": [*scan.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+        "notes": plain((*scan.notes, *table.placed_notes)),
     }, table
 
 
@@ -282,7 +281,7 @@ def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
         )
         for title, point in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
     ]
-    return [points_table(table), *best, *notes(record["notes"])]
+    return with_notes(record["notes"], [points_table(table), *best])
 
 
 def _limits(record: dict[str, Any]) -> list[Block]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.base import command
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
@@ -77,7 +77,7 @@ def blocks(found: "Comparison") -> list[Block]:
     """What differs and by how much, first in a sentence; the inputs, the figures, the parts, notes."""
     sides = [f"{place}: {side.name}" for place, side in (("A", found.a), ("B", found.b))]
     failed = [] if not found.failed else [Paragraph(f"{found.status}.", "warning")]
-    return [
+    compared: list[Block] = [
         *map(Paragraph, sides),
         *failed,
         Paragraph(statement(found), "statement"),
@@ -85,8 +85,8 @@ def blocks(found: "Comparison") -> list[Block]:
         _figure_table("Figures", found.figures if _in_common(found) else {}),
         Paragraph(_part_sentence(found.parts), detail=Detail.USUAL),
         _figure_table("Parts", found.parts, Detail.ALL),
-        *notes(found.notes),
     ]
+    return with_notes(found.notes, compared, judged=False)
 
 
 # Verdicts in the order in which they are said, and most figures that a sentence names of each.

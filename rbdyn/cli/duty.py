@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Paragraph, Table, with_notes
 from rbdyn.base.faults import key_path
-from rbdyn.base.records import finite, save_table
+from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.words import quantity, shown, with_error
+from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
@@ -41,7 +43,7 @@ class MapDuty:
     points: Sequence[DutyPoint]
     scenes: Sequence[Scene]
     life: "DutyLife"
-    notes: Sequence[str]
+    notes: Notes
 
     @property
     def marks(self) -> dict[str, tuple[float, float]]:
@@ -67,7 +69,7 @@ class MapDuty:
 
     def as_record(self) -> dict[str, Any]:
         """JSON of the duty."""
-        return {"points": self.rows, "life": self.life.as_record(), "notes": list(self.notes)}
+        return {"points": self.rows, "life": self.life.as_record(), "notes": plain(self.notes)}
 
     def table(self) -> "pd.DataFrame":
         """A row a point; units in the names."""
@@ -76,8 +78,8 @@ class MapDuty:
         return pd.DataFrame(self.rows)
 
     def blocks(self) -> list[Block]:
-        """The points with their lives, the life over the duty, and notes."""
-        return [*duty_blocks(self.rows, self.life.as_record()), *notes(self.notes)]
+        """The points with their lives, and the life over the duty."""
+        return duty_blocks(self.rows, self.life.as_record())
 
 
 def duty_blocks(points: Sequence[Mapping[str, Any]], life: Mapping[str, float | None]) -> list[Block]:
@@ -118,27 +120,38 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
     points = read_duty(path)
     scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
     life = roller_duty_life(scenes, shares_of_time(points))
-    return MapDuty(points, scenes, life, _notes(points, scenes, speeds_rpm, loads_N))
+    notes = (
+        *life_notes(life.hours, sum(point.share for point in points)),
+        *_notes(points, scenes, speeds_rpm, loads_N),
+    )
+    return MapDuty(points, scenes, life, notes)
+
+
+def life_notes(life: float, hours: float) -> Notes:
+    """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
+    if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
+        return ()
+    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)
 
 
 def _notes(
     points: Sequence[DutyPoint], scenes: Sequence[Scene], speeds: Sequence[float], loads: Sequence[float]
-) -> list[str]:
-    """Sentences on points off the map, and on keys that the map keeps at the values of the scene."""
-    notes = []
+) -> Notes:
+    """Notes on points off the map, and on keys that the map keeps at the values of the scene."""
+    notes = list[Note]()
     for point, scene in zip(points, scenes, strict=True):
         speed, load = _place(scene)
         if not (speeds[0] <= speed <= speeds[-1] and loads[0] <= load <= loads[-1]):
-            notes.append(
+            sentence = (
                 f"duty {point.name!r}: {speed:g} rpm and {load:g} N are off the map, so its mark is at the edge; widen --speed "
                 "or --load"
             )
+            notes.append(Note("off-map", sentence))
         others = [".".join(path) for text in point.set if (path := key_path(text)) and ".".join(path) not in AXES]
         if others:
-            notes.append(
-                f"duty {point.name!r}: sets {', '.join(others)} too, which the map keeps at the scene's values"
-            )
-    return notes
+            sentence = f"duty {point.name!r}: sets {', '.join(others)} too, which the map keeps at the scene's values"
+            notes.append(Note("off-map", sentence))
+    return tuple(notes)
 
 
 def _place(scene: Scene) -> tuple[float, float]:
@@ -146,18 +159,16 @@ def _place(scene: Scene) -> tuple[float, float]:
 
 
 def simulated_blocks(found: "DutySimulation") -> list[Block]:
-    """Points that failed, the worst points in words, figures and clearances in operation at each point, lives, notes."""
-    failures = {point.name: point.status.removeprefix("failed: ") for point in found.failed}
+    """The verdict, the worst points in words, figures and clearances in operation at each point, lives, notes."""
     names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
-    return [
-        *(Paragraph(f"{name} failed: {reason}", "warning") for name, reason in failures.items()),
+    blocks = [
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
         Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
-        *notes(found.notes),
     ]
+    return with_notes(found.notes, blocks)
 
 
 def _point_table(caption: str, found: "DutySimulation", columns: Mapping[str, tuple[str, float]]) -> Table:

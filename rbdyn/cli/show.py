@@ -10,9 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rbdyn.base.blocks import Block, Detail, Table, notes
+from rbdyn.base.blocks import Block, Detail, Table, with_notes
 from rbdyn.base.faults import refuse
-from rbdyn.base.records import save_table
+from rbdyn.base.notes import DANGER, Note, Notes, of_level
+from rbdyn.base.records import plain, save_table
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from rbdyn.base.pace import Notice
     from rbdyn.dynamics.motion import History, Largest, Race, Spectrum
 
-FORMAT = "rbdyn.orbit/1"
+FORMAT = "rbdyn.orbit/2"
 SHOWN_TURNS = 20.0
 LYAPUNOV_TURNS = 100.0
 # Fewer samples show no motion.
@@ -43,15 +44,17 @@ class Request:
     replicate: int
 
     @property
-    def notes(self) -> list[str]:
-        """A note where the motion may differ from that of the result."""
+    def notes(self) -> Notes:
+        """Dangers of the result, and a note where the motion may differ from its own."""
+        dangers = tuple(of_level(self.result.notes, DANGER))
         now = versions()
         then = self.result.versions
         other = [name for name in now if then.get(name) != now[name]]
         if not other:
-            return []
+            return dangers
         change = ", ".join(f"{name} {then.get(name, 'unknown')} then and {now[name]} now" for name in other)
-        return [f"this motion may differ from that of the result, which was computed with other versions: {change}"]
+        sentence = f"this motion may differ from that of the result, which was computed with other versions: {change}"
+        return *dangers, Note("versions", sentence)
 
 
 def request_of(path: Path, turns: float | None, replicate: int) -> Request:
@@ -107,7 +110,7 @@ def write(
 
         files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
         (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
-    record = {**_record(request, motion), "notes": request.notes, "versions": versions()}
+    record = {**_record(request, motion), "notes": plain(request.notes), "versions": versions()}
     if lyapunov:
         from rbdyn.dynamics.motion import lyapunov_exponent
 
@@ -201,7 +204,8 @@ def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
 def blocks(record: dict[str, Any]) -> list[Block]:
     """The main figures; in full detail also the peaks of the spectra; notes."""
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
-    return [Table(title, ("figure", "value"), _figures(record)), *_spectra(record["spectra"]), *notes(record["notes"])]
+    figures = Table(title, ("figure", "value"), _figures(record))
+    return with_notes(record["notes"], [figures, *_spectra(record["spectra"])])
 
 
 def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, notes
+from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
 from rbdyn.dynamics.figure_names import POWERS
@@ -18,7 +18,7 @@ TRACE_TURNS = 10.0
 
 
 def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
-    """Figures with their errors, the target, loads and balance, races, clearances, life, friction, losses, cost, notes, inputs.
+    """The verdict, figures with their errors, the target, loads and balance, races, clearances, life, friction, losses, notes, inputs, cost.
 
     ``folder``: where the result is saved, for what to do next.
     """
@@ -28,6 +28,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
     costs = [(label(key), shown(float(value))) for key, value in result.cost.items()]
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
+        Verdict(result.notes),
         _table(figures),
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
@@ -37,8 +38,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
         Paragraph(_life_sentence(result)),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
         *_losses(result),
-        *notes(result.notes),
-        *notes(compiler_notes(), Detail.ALL),
+        Remarks((*result.notes, *compiler_notes())),
         _inputs(result),
         Table("Effective samples", ("figure", "samples"), samples, detail=Detail.ALL),
         Table("Cost", ("", ""), costs, detail=Detail.ALL),

@@ -39,6 +39,7 @@ from llvmlite.binding import get_host_cpu_features
 from numba import njit, types
 
 from rbdyn.base.digests import compiled_digest, content_of, user_cache, with_digest
+from rbdyn.base.notes import Note, Notes
 
 # Environment variable that selects numba's own njit.
 STOCK = "RBDYN_STOCK_NUMBA"
@@ -95,13 +96,13 @@ def working_parts() -> tuple[ModuleType | None, str]:
     return parts, ""
 
 
-def compiler_notes() -> tuple[str, ...]:
+def compiler_notes() -> Notes:
     """A sentence where stock numba compiles, for verbose output."""
     sentence = (
-        f"stock numba {numba.__version__} compiles ({WHY_STOCK}): the results are the same, "
+        f"compiler: stock numba {numba.__version__} compiles ({WHY_STOCK}): the results are the same, "
         "the first run takes more than twice as long"
     )
-    return (sentence,) if WHY_STOCK else ()
+    return (Note("method", sentence),) if WHY_STOCK else ()
 
 
 def _test_once(self_test: Callable[[], None]) -> None:

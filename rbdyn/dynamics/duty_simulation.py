@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.intervals import errors_of_differences
-from rbdyn.base.notes import Note, merged
+from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
 from rbdyn.base.words import counted
@@ -67,7 +67,7 @@ class DutySimulation(SavedRecord, kw_only=True):
     points: tuple[SimulatedPoint, ...]
     worst: dict[str, Worst]
     life: dict[str, float | None] | None
-    notes: tuple[str, ...]
+    notes: Notes
     wall_s: float = keyed("cost", "wall_s")
     seed: int
     versions: dict[str, str]
@@ -134,7 +134,7 @@ def simulate_duty(
         points=points,
         worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
         life=None if life is None else life.as_record(),
-        notes=tuple(_notes(results)),
+        notes=_notes(results),
         wall_s=time.perf_counter() - started,
         seed=scene.numerics.seed,
         versions=versions(),
@@ -175,12 +175,12 @@ def _hot(scene: Scene, result: SimulationResult | str) -> Scene | None:
     return simulated_scene(result) if result.status == "ok" else None
 
 
-def _notes(results: Mapping[str, SimulationResult | str]) -> list[str]:
+def _notes(results: Mapping[str, SimulationResult | str]) -> Notes:
     """Points that failed, with the reason; then the notes of the others, those of all points once."""
     ran = {name: result for name, result in results.items() if isinstance(result, SimulationResult)}
     reasons = {name: result for name, result in results.items() if isinstance(result, str)}
     reasons |= {name: full_status(result) for name, result in ran.items() if result.status != "ok"}
-    return [
-        *(Note("point_failed", f"{name}: {reason}") for name, reason in reasons.items()),
+    return (
+        *(Note("point", f"{name} failed: {reason.removeprefix('failed: ')}") for name, reason in reasons.items()),
         *merged({name: result.notes for name, result in ran.items()}),
-    ]
+    )

@@ -14,6 +14,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, RunError
+from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Pace, Stop
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
@@ -308,22 +309,27 @@ def stiffness_cost(runs: Sequence[Replicate]) -> dict[str, float]:
     }
 
 
-def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> tuple[str, ...]:
+def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> Notes:
     """Notes on stiffness and method."""
     cost = stiffness_cost(runs)
     if cost["implicit_runs"] and scene.numerics.method == "auto":
-        return (
+        sentence = (
             f"method: {cost['implicit_runs']:g} of {len(runs)} runs by the linearly implicit one, because stability would limit "
-            "explicit steps and a trial showed it to be cheaper",
+            "explicit steps and a trial showed it to be cheaper"
         )
+        return (Note("method", sentence),)
     turns = sum(float(run.durations.sum()) for run in runs) / scene.turn_s
     steps = sum(run.accepted_steps + run.rejected_steps for run in runs)
     if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return ()
     limit = (
-        f"stability, not accuracy, limits {100.0 * cost['held_by_stability']:.0f} % of the steps: the fastest motion takes "
+        f"method: stability, not accuracy, limits {100.0 * cost['held_by_stability']:.0f} % of the steps: the fastest motion takes "
         f"{1.0 / cost['eigenvalue_1_s']:.2g} s, a shaft turn {scene.turn_s:.2g} s; looser tolerances save nothing"
     )
     if scene.numerics.method in EXPLICIT:
-        return (f"{limit}; let numerics.method = 'auto' try the implicit method, or soften the stiffest law",)
-    return (f"{limit}; soften the stiffest law (traction slope, film floor, light cage)",)
+        return (
+            Note(
+                "method", f"{limit}; let numerics.method = 'auto' try the implicit method, or soften the stiffest law"
+            ),
+        )
+    return (Note("method", f"{limit}; soften the stiffest law (traction slope, film floor, light cage)"),)

@@ -13,6 +13,7 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 from rbdyn.base.faults import RunError
+from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all
 from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
@@ -42,7 +43,7 @@ class Ensemble:
     since: int
     fault: str | None
     transient_turns: float | None
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 # Factor by which a run that has not settled gets longer.
@@ -174,25 +175,27 @@ def fits(scene: Scene, turns: float) -> bool:
     return batches_of(scene).count(turns) <= scene.numerics.most_batches
 
 
-def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> tuple[str, ...]:
+def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> Notes:
     """Notes on the length of the runs and on the turns that count."""
     numerics, turn_s = scene.numerics, scene.turn_s
-    notes, counted = [], runs[0].duration / turn_s
+    notes, counted = list[Note](), runs[0].duration / turn_s
     if stage.lengthened:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
-        notes.append(
+        sentence = (
             f"length: figures drifted: {dropped + counted:.4g} shaft turns per replicate instead of "
             f"{numerics.warm_up_turns + numerics.turns:.4g}; the last {counted:.4g} are counted (numerics.extend = false "
             "forbids it)"
         )
+        notes.append(Note("lengthened", sentence))
     if scene.operation.schedule is None and not settled(runs, since):
         fix = (
             "raise numerics.extend_limit" if scene.extends else "lengthen numerics.turns or set numerics.extend = true"
         )
         if not fits(scene, grown(scene, stage)):
             fix = "take fewer replicates: there is no memory for longer ones"
-        notes.append(
+        sentence = (
             f"transient: figures still drift over the {counted:.4g} turns counted, or differ by how replicates start, so no "
             f"statistical error is known; {fix}"
         )
+        notes.append(Note("drift", sentence))
     return tuple(notes)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
@@ -19,6 +20,7 @@ from rbdyn.dynamics.parameters.validity import (
     friction_notes,
     heat_notes,
     left_out_notes,
+    limit_notes,
     race_notes,
     race_report,
     slip_notes,
@@ -141,8 +143,30 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
     pulses: dict[str, Any] = pulse_figures(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
+    # The first concern the input, the next the figures of this run, the last what the model leaves out.
+    notes: Notes = (
+        *limit_notes(scene),
+        *scene.unit_notes,
+        *scene.catalogue_notes,
+        *_balance_notes(scene, power_gap),
+        *ensemble.notes,
+        *error_notes(
+            scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
+        ),
+        *whirl_notes(scene, orbit),
+        *pulse_notes(scene, pulses),
+        *heat_notes(scene, figures["power_loss_W"].value),
+        *friction_notes(maker),
+        *race_notes(scene, races),
+        *slip_notes(scene, figures["cage_slip"].value),
+        *_model_notes(scene),
+        *left_out_notes(scene, figures["power_loss_W"].value),
+        *scene.section_notes,
+        *scene.lubricant.estimates,
+        *stiffness_notes(scene, runs),
+    )
     return SimulationResult(
-        status="ok",
+        status=status_of(notes),
         **figures,
         power_balance={"relative_gap": power_gap},
         power_terms_W=terms,
@@ -167,27 +191,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
-        # The first concern the input, the next the figures of this run, the last what the model leaves out.
-        notes=(
-            *scene.unit_notes,
-            *scene.catalogue_notes,
-            *_balance_notes(scene, power_gap),
-            *ensemble.notes,
-            *error_notes(
-                scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
-            ),
-            *whirl_notes(scene, orbit),
-            *pulse_notes(scene, pulses),
-            *heat_notes(scene, figures["power_loss_W"].value),
-            *friction_notes(maker),
-            *race_notes(scene, races),
-            *slip_notes(scene, figures["cage_slip"].value),
-            *_model_notes(scene),
-            *left_out_notes(scene, figures["power_loss_W"].value),
-            *scene.section_notes,
-            *scene.lubricant.estimates,
-            *stiffness_notes(scene, runs),
-        ),
+        notes=notes,
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
@@ -220,28 +224,32 @@ def _parts(clearance: OperatingClearance | None) -> dict[str, float] | None:
     }
 
 
-def _balance_notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
+def _balance_notes(scene: Scene, power_gap: float) -> Notes:
     if power_gap <= LARGEST_POWER_GAP:
         return ()
-    return (
-        f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
-        "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold",
+    sentence = (
+        f"power balance: closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
+        "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
     )
+    return (Note("power-balance", sentence),)
 
 
-def _model_notes(scene: Scene) -> tuple[str, ...]:
+def _model_notes(scene: Scene) -> Notes:
     """What the chosen laws miss."""
-    notes = []
+    notes = list[Note]()
     if cutoff := scene.numerics.whirl_cutoff_hz:
-        notes.append(f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)")
+        sentence = f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)"
+        notes.append(Note("definition", sentence))
     if scene.traction.model == "four_constant":
-        notes.append(
+        sentence = (
             "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and skidding is "
             "under-predicted"
         )
+        notes.append(Note("left-out", sentence))
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
-        notes.append(
+        sentence = (
             "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
             "traction.rheology_oil to suit it"
         )
+        notes.append(Note("remark", sentence))
     return tuple(notes)

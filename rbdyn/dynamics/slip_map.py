@@ -5,6 +5,7 @@ cause, and the others go on. A file may keep finished points, so that an interru
 """
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +14,16 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
+from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
 from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.words import counted
+from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
 from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
@@ -33,17 +37,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.map/1"
+RACES = ("inner", "outer")
 FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
 
 
 class Point(Record):
-    """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on."""
+    """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on. ``notes``: on its limits."""
 
     inner_speed_rpm: float
     radial_load_N: float  # noqa: N815
     status: str
     figures: dict[str, Quantity] = spread()
     power_gap: float | None = keyed("power_balance", "relative_gap")
+    notes: Notes | None = None
 
 
 class SlipMap(Record):
@@ -59,11 +65,23 @@ class SlipMap(Record):
     wall_s: float = keyed("cost", "wall_s")
     seed: int
     versions: dict[str, str] = derived(lambda self: versions())
+    notes: Notes = derived(lambda self: self._notes())
 
     @property
     def failed(self) -> list[Point]:
-        """Points without figures."""
-        return [point for point in self.points if not point.figures]
+        """Points without figures, or with those of no bearing."""
+        return [point for point in self.points if point.status != "ok"]
+
+    def _notes(self) -> Notes:
+        """Notes of the points, each code once, with the number of its points and the last of them."""
+        last = {note.code: (note, point) for point in self.points for note in point.notes or ()}
+        count = Counter(code for point in self.points for code in {note.code for note in point.notes or ()})
+        return tuple(
+            note.about(
+                f"at {point.inner_speed_rpm:g} rpm and {point.radial_load_N:g} N; at {count[code]} of {len(self.points)} points"
+            )
+            for code, (note, point) in last.items()
+        )
 
     def table(self) -> "pd.DataFrame":
         """A row a point; figures with their 95 % errors."""
@@ -138,7 +156,14 @@ class Series:
         figures = quantities(self.scene, runs, companions, share)
         power_gap = max(run.power_gap for run in runs)
         parts = part_figures(self.scene, runs, companions, share)
-        return Point(speed, load, "ok", {name: figures[name] for name in FIGURES} | parts, power_gap)
+        peaks = {race: figure.value for race in RACES if (figure := parts.get(f"{race}_max_pressure_MPa"))}
+        notes = (
+            *limit_notes(self.scene),
+            *(note for race, peak in peaks.items() for note in pressure_notes(1e6 * peak, ROLLERS, race)),
+            *heat_notes(self.scene, figures["power_loss_W"].value),
+        )
+        shown = {name: figures[name] for name in FIGURES} | parts
+        return Point(speed, load, status_of(notes), shown, power_gap, notes or None)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
         return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]

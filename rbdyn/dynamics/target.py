@@ -18,6 +18,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.notes import Note
 from rbdyn.base.pace import Notice
 from rbdyn.base.words import counted
 from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
@@ -324,11 +325,13 @@ def _along(rtol: float, ladder: Array, values: Array) -> float:
     return math.exp(float(y[end] + slope * (place - x[end])))
 
 
-def _shortfall(target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice) -> str:
+def _shortfall(target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice) -> Note:
     """Note on the figure that missed the target most, and on what limits it."""
     unknown = [name for name, error in errors.items() if error is None]
     if unknown:
-        return f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
+        return Note(
+            "target", f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
+        )
     worst = max(errors, key=lambda name: errors[name] or 0.0)
     figure = quantities_of(result)[worst]
     statistical, numerical = figure.statistical_error or 0.0, figure.numerical_error or 0.0
@@ -336,7 +339,8 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
         limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"
     else:
         limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
-    return (
+    sentence = (
         f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; ask "
         "for less, or run longer by numerics.turns and numerics.replicates"
     )
+    return Note("target", sentence)

@@ -20,6 +20,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.heat import (
@@ -327,7 +328,7 @@ def _result(
     }
     return replace(
         result,
-        status="ok" if status == "steady" else status,
+        status=result.status if status == "steady" else status,
         temperatures_C=temperatures,
         part_figures=at_temperatures_with_errors(scene, result.part_figures or {}, temperatures),
         thermal=record,
@@ -389,19 +390,15 @@ def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
     return "; ".join(excesses)
 
 
-def _without_computed(notes: Sequence[str], scene: Scene, hot: Scene) -> list[str]:
+def _without_computed(notes: Notes, scene: Scene, hot: Scene) -> list[Note]:
     """Notes without those that take a computed temperature for one in another unit."""
     computed = set(hot.unit_notes) - set(scene.unit_notes)
     return [note for note in notes if note not in computed]
 
 
-def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> tuple[str, ...]:
+def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> Notes:
     """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
-    notes = [] if status == "steady" else [f"temperatures: {status}: {reason}"]
-    if ranges is not None and ranges.unsteady > 0.0:
-        notes.append(
-            f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
-        )
+    notes = [*status_notes(f"{status}: {reason}"), *(() if ranges is None else ranges.notes)]
     thermal, mounting = scene.thermal, scene.mounting
     assert thermal is not None and mounting is not None
     return (*notes, *heat_notes(thermal, scene.lubricant, mounting, ring_width(scene)), *flow_notes(hot))

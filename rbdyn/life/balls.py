@@ -14,9 +14,12 @@ import math
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import MethodError
+from rbdyn.base.faults import RPM, MethodError
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning
+
+# Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
+FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 
 # lambda of a single row, the reduction of practice against theory (ISO/TR 1281-1), and the theory's constant [N, mm].
 REDUCTION = 0.95

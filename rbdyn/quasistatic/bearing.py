@@ -14,7 +14,10 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import counted
+from rbdyn.life.balls import FASTEST
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic import finite_search, full_system
 from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_record, solve_double_decker
@@ -26,21 +29,22 @@ from rbdyn.quasistatic.result import (
     ball_records,
     displacement_record,
     film_record,
+    notes_of,
     overloads,
     reference_capacities,
     remarks,
     row_report,
-    sentences,
     stiffness_record,
     tipping,
 )
 from rbdyn.quasistatic.row.ball import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
-from rbdyn.quasistatic.row.model import RowModel, constraint_of, load_of, row_of
+from rbdyn.quasistatic.row.model import RowModel, clearance_of, constraint_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.notes import clearance_notes, speed_notes
 
 # Solvers by the names in a scene: ``solver(row, control, load, constraint, start) -> Solution``.
 SOLVERS: dict[str, Callable[..., Solution]] = {
@@ -98,16 +102,27 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
-    notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
+    notes = [*_limit_notes(scene, model), *(() if scene.lubricant is None else scene.lubricant.estimates)]
+    notes += notes_of([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
-        notes.append(
-            f"this raceway control has {counted(len(others), 'other root')} under the same load, see other_roots; this one is "
-            "reached from one common cage speed"
+        sentence = (
+            f"raceway control: has {counted(len(others), 'other root')} under the same load, see other_roots; this one is reached "
+            "from one common cage speed"
         )
-    figures = {"report": report, **grown, "other_roots": others, "notes": notes}
+        notes.append(Note("other-roots", sentence))
+    figures = {"report": report, **grown, "other_roots": others, "notes": tuple(notes)}
     return replace(base, **figures, rows=(solution,), ratings=(rating,))
+
+
+def _limit_notes(scene: SingleRowScene, model: RowModel) -> Notes:
+    """Notes on the radial clearance of a deep groove bearing in operation, and on a speed far above the usual ones."""
+    bearing, (inner, outer) = scene.bearing, scene.operation.speeds
+    plays = {}
+    if bearing.kind == "deep_groove_ball" and scene.mounting is not None:
+        drawn = clearance_of(row_of(scene.model_copy(update={"mounting": None, "thermal": None})).row)[0]
+        plays["radial"] = OperatingClearance(drawn, clearance_of(model.row)[0] - drawn, 0.0, 0.0)
+    return (*clearance_notes(plays), *speed_notes(inner - outer, bearing.pitch_diameter, None, FASTEST[bearing.kind]))
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
@@ -154,8 +169,8 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
         if why := overloads(row.figures[np.newaxis], [rating]):
             return replace(base, status=f"{name} row {why[0]}")
         layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
-        notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
-    notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
+        notes += notes_of(remarks(row.figures[np.newaxis], [rating], name))
+    notes += notes_of([tipping(solution.displacement[np.newaxis, 3:], scene)])
     races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
     grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(
@@ -168,7 +183,7 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
         inner=layers["inner"],
         outer=layers["outer"],
     )
-    return replace(base, report=report, **grown, notes=notes, rows=rows, ratings=ratings)
+    return replace(base, report=report, **grown, notes=tuple(notes), rows=rows, ratings=ratings)
 
 
 def _base_result(scene: BallScene, status: str, seconds: float) -> BallResult:

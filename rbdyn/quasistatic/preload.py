@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, validated
+from rbdyn.base.notes import Note, Notes
 from rbdyn.life import turning_rings
 from rbdyn.quasistatic.result import Rating, overloads, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
@@ -58,7 +59,7 @@ class Scan:
     points: tuple[Point, ...]
     least_stress: Point
     longest_life: Point
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 def point_of(value: float, case: Case, start: Solution | None = None) -> Point:
@@ -120,26 +121,26 @@ def scan(case_at: Callable[[float], Case], values: Sequence[float], name: str, u
     return Scan(tuple(points), least, longest, notes)
 
 
-def _notes(
-    points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float
-) -> tuple[str, ...]:
-    notes = []
+def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> Notes:
+    notes = list[Note]()
     span = points[-1].value - points[0].value
     for goal, point in (("least peak stress", least), ("longest life", longest)):
         for end, word in ((points[0].value, "lower"), (points[-1].value, "upper")):
             if abs(point.value - end) <= 1e-3 * span:
-                notes.append(
-                    f"the {goal} is at the {word} end of the range, {name} {scale * end:.4g} {unit}, without an optimum "
+                sentence = (
+                    f"{goal}: is at the {word} end of the range, {name} {scale * end:.4g} {unit}, without an optimum "
                     "inside; widen the range or accept the end"
                 )
+                notes.append(Note("optimum", sentence))
     loss = 1.0 - least.million_turns / longest.million_turns
     rise = longest.peak_pressure / least.peak_pressure - 1.0
     apart = abs(least.value - longest.value) > SAME_PLACE * span
     if apart and (loss > SAME_VALUE or rise > SAME_VALUE):
-        notes.append(
+        sentence = (
             f"the optima differ: {name} {scale * least.value:.4g} {unit} for least stress costs {100.0 * loss:.3g} % of the "
             f"life, {scale * longest.value:.4g} {unit} for longest life {100.0 * rise:.3g} % more stress"
         )
+        notes.append(Note("optimum", sentence))
     return tuple(notes)
 
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, outside_json, spread
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio
-from rbdyn.contact.hertz_line import BALLS, dent_sentence
+from rbdyn.contact.hertz_line import BALLS, SHAKEDOWN, dent_sentence, overload_sentence
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning, turning_rings
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL, dynamic_capacity, rated_capacities, row_life
@@ -78,16 +79,17 @@ class Rating(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """A warning: its subject in a word, the mask of the points (n,) that it is about, and its sentence for each point."""
+    """A note: its code, its subject in a word, the mask of the points (n,) that it is about, and its sentence for each point."""
 
+    code: str
     word: str
     where: Mask
     say: Callable[[int], str]
     row: str = ""
 
-    def sentence(self, place: int) -> str:
-        """The sentence for a point, with the row of balls in a bearing of two rows."""
-        return self.row + self.say(place)
+    def note(self, place: int) -> Note:
+        """The note for a point, with the row of balls in a bearing of two rows."""
+        return Note(self.code, self.row + self.say(place))
 
 
 def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
@@ -100,7 +102,7 @@ def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
 
 
 def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
-    """Points with a contact ellipse too long for its groove, and a sentence for each."""
+    """Points with a contact ellipse too long for its groove or a pressure above shakedown, and a sentence for each."""
     causes: dict[int, str] = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         loads = balls[:, :, place]
@@ -116,6 +118,9 @@ def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
                 f"overloaded: the ball at {azimuth:.0f} deg would carry {load:.4g} N on the {race} race over "
                 f"{length:.3g} mm in a groove of {radius:.3g} mm radius; reduce the load",
             )
+    for race, peaks in pressures(balls, ratings).items():
+        for k in np.flatnonzero(peaks > SHAKEDOWN[BALLS]).tolist():
+            causes.setdefault(k, f"overloaded: {race} race by {overload_sentence(float(peaks[k]), BALLS)}")
     return causes
 
 
@@ -153,7 +158,7 @@ def climbing(balls: Array, ratings: Sequence[Rating], race: Race, row: str) -> R
         )
 
     steep = np.abs(balls[:, :, INNER_ANGLE]).max(axis=1) > STEEPEST
-    return Remark(f"{row}{race} shoulder", (beyond > 0.0) & ~steep, sentence, row)
+    return Remark("shoulder", f"{row}{race} shoulder", (beyond > 0.0) & ~steep, sentence, row)
 
 
 def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
@@ -189,24 +194,24 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
     needed, (inner, outer) = needed_friction(balls, ratings), pressures(balls, ratings).values()
     # fmt: off
     listed = [
-        ("unloaded", clear == size, lambda k:
+        ("loose-ring", "unloaded", clear == size, lambda k:
             "no ball touches the inner race, so the position of the ring is undetermined; load the ring or reduce the clearance"),
-        ("clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
-        ("inner dent", inner > BALLS, lambda k: dent_sentence(float(inner[k]), BALLS, "inner")),
-        ("outer dent", outer > BALLS, lambda k: dent_sentence(float(outer[k]), BALLS, "outer")),
-        ("steep angle", steep, lambda k:
+        ("clear-balls", "clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
+        ("dent", "inner dent", inner > BALLS, lambda k: dent_sentence(float(inner[k]), BALLS, "inner")),
+        ("dent", "outer dent", outer > BALLS, lambda k: dent_sentence(float(outer[k]), BALLS, "outer")),
+        ("no-shoulder", "steep angle", steep, lambda k:
             f"inner angles reach {steepest[k]:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
             "preload it axially or reduce the speed"),
-        ("negative angle", shouldered & (turned > 0) & ~steep, lambda k:
+        ("no-shoulder", "negative angle", shouldered & (turned > 0) & ~steep, lambda k:
             f"{turned[k]} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
             "thrust or pair the bearing"),
-        ("gyroscopic slip", needed > OILED_FRICTION, lambda k:
+        ("gyroscopic-slip", "gyroscopic slip", needed > OILED_FRICTION, lambda k:
             f"the gyroscopic moment needs a friction coefficient of {needed[k]:.2f}, more than oil gives: the balls slip "
             "about its axis; raise the load or reduce the speed"),
     ]
     # fmt: on
     over = [climbing(balls, ratings, race, row) for race in RACES]
-    return [*(Remark(row + word, where, say, row) for word, where, say in listed), *over]
+    return [*(Remark(code, row + word, where, say, row) for code, word, where, say in listed), *over]
 
 
 def tipping(tilts: Array, scene: BallScene) -> Remark:
@@ -214,15 +219,15 @@ def tipping(tilts: Array, scene: BallScene) -> Remark:
     rigid = np.array([value is not None for value in scene.operation.displacements[3:]])
     tilt = np.hypot(*np.where(rigid, 0.0, tilts).T)
     # fmt: off
-    return Remark("tipped ring", tilt > TIPPED, lambda k:
+    return Remark("tipped-ring", "tipped ring", tilt > TIPPED, lambda k:
         f"the free ring tips by {1e3 * tilt[k]:.2g} mrad ({math.degrees(tilt[k]) * 60.0:.0f} arc minutes), more than a ring can on "
         "a shaft; set operation.tilt = 'fixed' if a shaft holds the ring")
     # fmt: on
 
 
-def sentences(entries: Sequence[Remark]) -> list[str]:
-    """Sentences of the remarks on the first equilibrium."""
-    return [remark.sentence(0) for remark in entries if remark.where[0]]
+def notes_of(entries: Sequence[Remark]) -> list[Note]:
+    """Notes of the remarks on the first equilibrium."""
+    return [remark.note(0) for remark in entries if remark.where[0]]
 
 
 class RowReport(Record):
@@ -290,7 +295,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     loaded result or without an equilibrium. ``ratings``: data of their pressures and lives.
     """
 
-    FORMAT = "rbdyn.ball/1"
+    FORMAT = "rbdyn.ball/2"
     WHAT = "equilibrium"
     status: str
     raceway_control: str
@@ -299,7 +304,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     ring_growth_um: dict[str, float] | None = None
     fits: dict[str, Any] | None = None
     other_roots: list[dict[str, Any]] | None = None
-    notes: list[str] | None = None
+    notes: Notes | None = None
     cost: dict[str, float]
     versions: dict[str, str]
     scene: dict[str, Any]

@@ -24,6 +24,7 @@ from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, number_list, refuse, validated
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.words import counted
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-FORMAT = "rbdyn.sweep/2"
+FORMAT = "rbdyn.sweep/3"
 # Points of a stored line: writing a line takes as long as solving a few points.
 ROW = 100
 MOST_POINTS = 100_000
@@ -66,8 +67,8 @@ class SweepResult:
 
     ``keys``: values of each key. ``columns``: figures of the points, units in the names, NaN without an equilibrium;
     ``statuses`` state the cause. ``figures``: those of the balls in SI by row of balls, as pairs (points, (points, Z, 6)), one
-    for each number Z of balls; empty in a loaded sweep. ``notes``: the topic ("about"), the "note" of its first point, and all
-    its "points", counted from 0 in the order of the table. ``cold``: number of points not started from their neighbour.
+    for each number Z of balls; empty in a loaded sweep. ``notes``: the JSON form of the note of its first point, its topic
+    ("about"), and all its "points", counted from 0 in the order of the table. ``cold``: number of points not started from their neighbour.
     ``wall_s``: wall time.
     """
 
@@ -116,6 +117,11 @@ class SweepResult:
     def grid(self, column: str) -> Array:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
         return self.columns[column].reshape(self.shape)
+
+    @property
+    def placed_notes(self) -> Notes:
+        """Each note with its number of points and the first of them."""
+        return tuple(Note.of(note).about(self.where(note["points"])) for note in self.notes)
 
     def table(self) -> "pd.DataFrame":
         """A row a point: keys, figures, status, and the topics of its notes."""
@@ -282,7 +288,7 @@ def sweep(
 def notes_by_topic(
     entries: Sequence[tuple[int, Remark]], visited: Whole, statuses: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Notes by topic: the sentence of the first point in the table, and all points, counted from 0.
+    """Notes by topic: that of the first point in the table, and all points, counted from 0.
 
     ``entries``: remarks, each with the place of its first point on the walk. ``visited``: place in the table of each point
     of the walk.
@@ -295,7 +301,8 @@ def notes_by_topic(
     notes = []
     for word, group in groups.items():
         _, k, remark = min(group, key=lambda one: one[0])
-        notes.append({"about": word, "note": remark.sentence(k), "points": sorted(place for place, _, _ in group)})
+        points = sorted(place for place, _, _ in group)
+        notes.append({**remark.note(k).as_dict(), "about": word, "points": points})
     return notes
 
 
@@ -322,8 +329,8 @@ class PointRecord(NamedTuple):
 
     def as_text(self) -> str:
         """JSON, every number with all its digits."""
-        sentences = [(one.word, one.sentence(0)) for one in self.remarks]
-        return json.dumps(self._replace(remarks=sentences), default=np.ndarray.tolist)  # type: ignore[arg-type]
+        notes = [(one.code, one.word, one.note(0)) for one in self.remarks]
+        return json.dumps(self._replace(remarks=notes), default=np.ndarray.tolist)  # type: ignore[arg-type]
 
     @classmethod
     def from_text(cls, text: str) -> Self:
@@ -333,7 +340,10 @@ class PointRecord(NamedTuple):
             status,
             figures,
             {name: np.array(values) for name, values in balls.items()},
-            [Remark(word, np.array([True]), partial(lambda sentence, _: sentence, note)) for word, note in remarks],
+            [
+                Remark(code, word, np.array([True]), partial(lambda sentence, _: sentence, text))
+                for code, word, text in remarks
+            ],
             tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
             cold,
         )
@@ -389,6 +399,8 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
         notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
+    limits = (note for note in result.notes or () if note.code in ("seizure", "fast", "overspeed"))
+    notes += [Remark(note.code, note.code, np.array([True]), partial(lambda note, _: note, note)) for note in limits]
     figures = {name: float(value[0]) for name, value in columns.items()}
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]

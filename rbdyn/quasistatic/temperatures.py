@@ -15,11 +15,12 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError
+from rbdyn.base.notes import Note, Notes
+from rbdyn.life.balls import FASTEST
 from rbdyn.life.friction import ANGULAR_GEOMETRY, DEEP_GROOVE_GEOMETRY, starvation_factor
 from rbdyn.quasistatic.heat import Heat, at_temperatures, balance, term_shares
 from rbdyn.quasistatic.result import BallResult
-from rbdyn.quasistatic.row.model import row_of
-from rbdyn.quasistatic.row.ring import Row
+from rbdyn.quasistatic.row.model import clearance_of, row_of
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling
@@ -32,8 +33,6 @@ from rbdyn.thermal.network import NODES, carried_off
 TOLERANCE, DIFFERENCE = 1e-9, 0.01
 # Deviation from the balance of an input set of a range [K].
 RANGE_TOLERANCE = 0.1
-# Largest n d_m of bearings at their reference speed in SKF's catalogue [m/s]: 1.2 and 0.7 million mm/min.
-FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 # SKF's friction over the heat of ISO 15312 at the reference speeds of 8 deep groove and 6 angular contact bearings of series 60 to
 # 64, 72 and 73 in that catalogue.
 LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}
@@ -107,7 +106,7 @@ def with_temperatures(
         report=hot.report if steady else None,
         temperatures_C=nodes,
         thermal=_record(scene, search, found, ranges) | {"status": status} | ({} if steady else {"reason": reason}),
-        notes=[*_notes(scene, found, ranges), *(hot.notes or [])] if hot.is_equilibrium else None,
+        notes=(*_notes(scene, found, ranges), *(hot.notes or ())) if hot.is_equilibrium else None,
         rows=hot.rows if steady else (),
         scene=scene.model_dump(mode="json"),
     )
@@ -176,12 +175,6 @@ def _record(scene: SingleRowScene, search: Search, found: Heat, ranges: Ranges |
     }
 
 
-def clearance_of(row: Row) -> tuple[float, float]:
-    """Diametral clearance [m] of a row with its growth, and its unloaded contact angle [rad], 0 for an interference."""
-    reach, radial = float(row.inner_reach[0] + row.outer_reach[0]), float(row.radial[0])
-    return 2.0 * (reach - radial), math.acos(min(radial / reach, 1.0))
-
-
 def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
     """Diametral clearance and unloaded contact angle, drawn and in operation."""
     drawn = row_of(scene.model_copy(update={"mounting": None, "thermal": None}))
@@ -192,33 +185,33 @@ def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
     }
 
 
-def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> list[str]:
+def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
     thermal, lubricant, hot = scene.thermal, scene.lubricant, found.scene.lubricant
     assert mounting is not None and mounting.width is not None
     assert thermal is not None and lubricant is not None and hot is not None
-    notes = [
+    level = (
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
         "range includes"
-    ]
+    )
+    notes = [Note("left-out", level)]
     fast = abs(inner - outer) * 0.5 * (mounting.bore + mounting.outside_diameter)
     if fast > FASTEST[kind]:
-        notes.append(
+        sentence = (
             f"temperatures: n d_m = {1e-3 * fast / RPM:.2g} million mm/min is above the reference speeds of such bearings, where SKF's "
             "friction was not verified"
             + ("; at 1.4 million it was 2.9 times the loss in NASA TP-2275" if kind == "angular_contact_ball" else "")
         )
+        notes.append(Note("unverified", sentence))
     oil = hot.in_service
     sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
     rest = starvation_factor(GEOMETRIES[kind], *sizes, lubricant.supply)
     if rest < STARVED:
-        notes.append(
+        sentence = (
             f"temperatures: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
             "too low; take a thinner oil or warm it"
         )
-    if ranges is not None and ranges.unsteady > 0.0:
-        notes.append(
-            f"temperatures: {100.0 * ranges.unsteady:.0f} % of the input sets ({', '.join(ranges.inputs)}) have no steady state"
-        )
-    return [*notes, *heat_notes(thermal, lubricant, mounting, mounting.width)]
+        notes.append(Note("starved", sentence))
+    notes += [] if ranges is None else ranges.notes
+    return (*notes, *heat_notes(thermal, lubricant, mounting, mounting.width))

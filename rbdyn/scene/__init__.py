@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast
 from pydantic import BaseModel, Field, model_validator
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.notes import Notes
 from rbdyn.properties.materials import Material, Oil, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import (
@@ -356,20 +357,20 @@ class Scene(SceneFile):
         return dict(zip(("radial", "guide", "pocket"), plays, strict=True))
 
     @property
-    def unit_notes(self) -> tuple[str, ...]:
+    def unit_notes(self) -> Notes:
         """Sentences on values that look like another unit."""
         cage, stiffness = self.material("cage"), self.model.pocket_bar_stiffness_N_m
         return unit_notes(self.bearing, self.cage, self.lubricant, self.mounting, cage, stiffness)
 
     @property
-    def section_notes(self) -> tuple[str, ...]:
+    def section_notes(self) -> Notes:
         """A sentence on the stiffness of the cage's bars, where it follows from their section."""
         if STIFFNESS in self._tables.get("model", {}):
             return ()
         return section_notes(self.bearing, self.cage, self.model.pocket_bar_stiffness_N_m)
 
     @property
-    def catalogue_notes(self) -> tuple[str, ...]:
+    def catalogue_notes(self) -> Notes:
         """A sentence on dimensions that contradict the designation; none without a designation."""
         return catalogue_notes(self.bearing, self.mounting)
 

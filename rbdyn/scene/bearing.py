@@ -21,6 +21,7 @@ from rbdyn.base.faults import (
     Sparse,
     Strict,
 )
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import counted
 from rbdyn.properties.catalogue import ROLLERS, envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, SOFTEST_METAL, Material
@@ -431,9 +432,10 @@ def section_misfits(bearing: Bearing, cage: Cage) -> Iterator[str]:
         )
 
 
-def section_notes(bearing: Bearing, cage: Cage, stiffness: float | str) -> tuple[str, ...]:
+def section_notes(bearing: Bearing, cage: Cage, stiffness: float | str) -> Notes:
     """A sentence on the stiffness [N/m] by the section, with its error; none where the scene states no section."""
     if section_of(bearing, cage) is None or isinstance(stiffness, str):
         return ()
     low, high = (100.0 * (factor - 1.0) for factor in STIFFNESS_ERROR)
-    return (f"cage: the section gives bars of {stiffness:.3g} N/m (model.{STIFFNESS}), {low:+.0f} to {high:+.0f} %",)
+    sentence = f"cage: the section gives bars of {stiffness:.3g} N/m (model.{STIFFNESS}), {low:+.0f} to {high:+.0f} %"
+    return (Note("estimate", sentence),)

@@ -20,6 +20,7 @@ from rbdyn.base.faults import (
     Share,
     Sparse,
 )
+from rbdyn.base.notes import Note, Notes
 from rbdyn.properties.materials import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -170,10 +171,10 @@ class Lubricant(Consistent, Sparse):
         return fluid if self.density_kg_m3 is None else fluid._replace(density=self.density_kg_m3)
 
     @property
-    def estimates(self) -> tuple[str, ...]:
+    def estimates(self) -> Notes:
         """A sentence on the estimated properties of the oil; none where its name gives all."""
         if self.oil == "MIL-L-85734":
-            return ("lubricant: MIL-L-85734 is treated as MIL-L-23699, an oil of the same class",)
+            return (Note("estimate", "lubricant: MIL-L-85734 is treated as MIL-L-23699, an oil of the same class"),)
         if self.oil in OILS:
             return ()
         oil, parts, graded = self.in_service, [], self.oil.startswith(GRADE)
@@ -190,7 +191,12 @@ class Lubricant(Consistent, Sparse):
         if graded and self.density_kg_m3 is None:
             parts.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
         parts.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
-        return (f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(parts)}",)
+        return (
+            Note(
+                "estimate",
+                f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(parts)}",
+            ),
+        )
 
     @property
     def in_service(self) -> Oil:

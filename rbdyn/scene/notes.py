@@ -3,6 +3,10 @@
 import math
 from collections.abc import Iterable, Mapping
 
+from rbdyn.base.faults import RPM
+from rbdyn.base.notes import Note, Notes
+from rbdyn.life.rollers import REFERENCE_SPEED
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.properties.catalogue import Designation, Envelope, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage
@@ -47,7 +51,7 @@ def unit_notes(
     mounting: Mounting | None,
     cage_material: Material,
     bar_stiffness: float | str,
-) -> tuple[str, ...]:
+) -> Notes:
     """One sentence for each suspicious value.
 
     ``cage_material``: its density gives a usual mass of the cage, its modulus a usual stiffness of bars; ``bar_stiffness`` [N/m]
@@ -72,7 +76,7 @@ def unit_notes(
     return _notes(usual)
 
 
-def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: float) -> tuple[str, ...]:
+def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: float) -> Notes:
     """One sentence for each suspicious value of a heat balance with rings of a ``width`` [m]."""
     outside, wide = mounting.outside_diameter_mm, 1e3 * width
     return _notes(
@@ -85,7 +89,7 @@ def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: floa
     )
 
 
-def _notes(usual: Iterable[Usual]) -> tuple[str, ...]:
+def _notes(usual: Iterable[Usual]) -> Notes:
     """The sentences on values outside their usual range."""
     return tuple(
         _note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1]
@@ -124,7 +128,7 @@ def _of_section(bearing: Bearing, cage: Cage) -> list[Usual]:
     ]
 
 
-def _note(key: str, value: float, low: float, high: float) -> str:
+def _note(key: str, value: float, low: float, high: float) -> Note:
     """The sentence on a value outside its usual range, with the probable unit."""
     unit = next((unit for unit in FACTORS if key.endswith(f"_{unit}")), "")
     candidates = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
@@ -132,7 +136,7 @@ def _note(key: str, value: float, low: float, high: float) -> str:
     likely = {other: number for other, number in candidates.items() if low <= number <= high}
     other = _nearest(likely, low, high)
     fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
-    return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}"
+    return Note("unit", f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}")
 
 
 def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:
@@ -140,6 +144,58 @@ def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None
     if len(likely) < 2:
         return next(iter(likely), None)
     return min(likely, key=lambda other: abs(math.log(likely[other] ** 2 / (low * high))))
+
+
+# Share of a drawn clearance below which its rest in operation counts as nearly lost, and that below which a cage is to be looked at:
+# the temperatures that take it are known within some 10 K, and so are the parts of a sum of changes.
+NEARLY_LOST, MOSTLY_LOST = 0.1, 0.5
+# Speeds over the reference speed, of bearings by designation: limiting speeds of a catalogue are 1 to 1.5 times it. Of others the
+# product of speed and pitch diameter [m/s]: usual ones at their reference speed twice over, and the 3 million mm/min up to which
+# special bearings were tested.
+FAST_LISTED, FAST_USUAL, FASTEST = (1.0, 2.0), 2.0, 3.0e3 * RPM
+
+
+def clearance_notes(clearances: Mapping[str, OperatingClearance | None]) -> Notes:
+    """Notes on diametral ``clearances`` [m], by name, that are negative, nearly lost or, of a cage, mostly lost in operation."""
+    notes = []
+    for name, play in clearances.items():
+        if play is None or play.operating >= (MOSTLY_LOST if name != "radial" else NEARLY_LOST) * max(play.drawn, 0.0):
+            continue
+        lost = play.operating < NEARLY_LOST * max(play.drawn, 0.0)
+        subject = "seizure: " if lost else ""
+        sentence = (
+            f"{subject}{name} clearance in operation {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um drawn: fits "
+            f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; widen it or "
+            "check the temperatures"
+        )
+        notes.append(Note("seizure" if lost else "clearance", sentence))
+    return tuple(notes)
+
+
+def speed_notes(speed: float, pitch_diameter: float, reference: float | None, usual: float = REFERENCE_SPEED) -> Notes:
+    """A note on a ``speed`` above the ``reference`` speed [rad/s] of a listed bearing, or far above that of a usual one.
+
+    ``usual``: reference speed times pitch diameter [m/s] of such bearings.
+    """
+    name = "reference speed"
+    if reference is not None:
+        fast, limit = (factor * reference for factor in FAST_LISTED)
+    else:
+        fast, limit = FAST_USUAL * usual / pitch_diameter, FASTEST / pitch_diameter
+        name = "usual reference speed"
+    speed = abs(speed)
+    if speed <= fast:
+        return ()
+    base = reference or usual / pitch_diameter
+    sentence = f"{speed / RPM:.0f} rpm is {speed / base:.2g} times the {name} of {base / RPM:.3g} rpm"
+    if speed <= limit:
+        return (
+            Note(
+                "fast", f"speed: {sentence}, so the bearing needs more cooling than usual; check the heat by [thermal]"
+            ),
+        )
+    beyond = "every limiting speed of a catalogue" if reference is not None else "the fastest tests of special bearings"
+    return (Note("overspeed", f"overspeed: {sentence}, beyond {beyond}; reduce the speed or take a smaller bearing"),)
 
 
 # Relative tolerances of sizes in the catalogue, of an estimated roller (series 10 within 10 %) and of its pitch circle.
@@ -154,7 +210,7 @@ def catalogue_entry(bearing: Bearing) -> tuple[Designation, Envelope] | None:
     return designation, envelope(designation)
 
 
-def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> tuple[str, ...]:
+def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> Notes:
     """One note on all dimensions that contradict the catalogue; none where the scene states no designation."""
     entry = catalogue_entry(bearing)
     if entry is None:
@@ -188,8 +244,9 @@ def catalogue_notes(bearing: Bearing, mounting: Mounting | None) -> tuple[str, .
     if not differences:
         return ()
     return (
-        (
+        Note(
+            "designation",
             f"bearing.designation = {bearing.designation!r}: its catalogue sizes disagree with {', '.join(differences)}; "
-            "correct the designation or these keys"
+            "correct the designation or these keys",
         ),
     )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.notes import Note, Notes
 from rbdyn.thermal.heat import TERMS
 from rbdyn.thermal.losses import HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
@@ -43,6 +44,14 @@ class Ranges(NamedTuple):
     figures: dict[str, tuple[float, float, float]]
     inputs: tuple[str, ...]
     unsteady: float
+
+    @property
+    def notes(self) -> Notes:
+        """A note where some sets have no steady state."""
+        if self.unsteady == 0.0:
+            return ()
+        share = f"{100.0 * self.unsteady:.0f} % of the input sets ({', '.join(self.inputs)})"
+        return (Note("undecided", f"temperatures: {share} have no steady state"),)
 
     def as_dict(self) -> dict[str, Any]:
         """Keys of the JSON of a balance."""

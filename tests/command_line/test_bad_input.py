@@ -279,7 +279,7 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[" * 5000, "[]", '{"format": 3}', '{"format": "rbdyn.simulation/4", "status": 1}']
+    "text", ["", "[" * 5000, "[]", '{"format": 3}', '{"format": "rbdyn.simulation/5", "status": 1}']
 )
 @pytest.mark.parametrize("load", [SimulationResult.load, BallResult.load])
 def test_a_broken_result_is_one_sentence(tmp_path, load, text):
@@ -289,7 +289,7 @@ def test_a_broken_result_is_one_sentence(tmp_path, load, text):
 
 
 def test_a_number_of_text_in_a_result_is_refused(tmp_path):
-    data = {"format": "rbdyn.simulation/4", "scene": 5}
+    data = {"format": "rbdyn.simulation/5", "scene": 5}
     (tmp_path / "result.json").write_text(json.dumps(data))
     assert "not a whole simulation result" in faults_of(SimulationResult.load, tmp_path / "result.json")[0]
 

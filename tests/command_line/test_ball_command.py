@@ -129,8 +129,8 @@ def test_command_line_studies_write_tables_and_pictures(tmp_path):
     assert [point["outer_stress_MPa"] for point in record["points"]] == pytest.approx(
         table["outer_pressure_MPa"], rel=1e-8
     )
-    dented = "3 points, the first at preload_N = 0: "
-    assert any(note.startswith(dented) and "MPa of ISO 76" in note for note in record["notes"])
+    dents = [note["text"] for note in record["notes"] if note["code"] == "dent"]
+    assert all(text.endswith(" (3 points, the first at preload_N = 0)") for text in dents) and len(dents) == 2
     assert table["notes"].str.contains("inner dent").all()
 
 
@@ -154,8 +154,12 @@ def test_invariant_a_held_ring_tells_the_moment_that_holds_it():
     same = found("operation.tilt='free'", f"operation.moment_Nm=[0.0, {moment['y']!r}]")
     assert same.displacement == pytest.approx(held.displacement, rel=1e-8, abs=1e-13)
     free = found("operation.tilt='free'")
-    (note,) = free.as_dict()["notes"]
-    assert note.startswith("the free ring tips by 3.1 mrad (11 arc minutes)") and "operation.tilt = 'fixed'" in note
+    (note,) = free.notes
+    assert (
+        note.code == "tipped-ring"
+        and note.startswith("the free ring tips by 3.1 mrad (11 arc minutes)")
+        and "operation.tilt = 'fixed'" in note
+    )
     assert free.as_dict()["life"]["L10_Mrev"] < 0.5 * held.as_dict()["life"]["L10_Mrev"]
     assert found("operation.tilt='free'", "operation.prescribed.tilt_y_mrad=2.0").as_dict()["notes"] == []
 
@@ -199,7 +203,11 @@ def test_unit_values_of_the_command_line():
 
 
 def test_command_line_prints_notes_of_points_unless_quiet():
-    """Command line: each note stands once, with how many points it is about and where the first is; none with --quiet."""
+    """Command line: each note stands once, with how many points it is about and where the first is; dangers alone with --quiet."""
     arguments = ["ball", str(SINGLE), "--sweep", "operation.axial_load_N=100,20000,40000"]
     loud, quiet = (CliRunner().invoke(app, [*arguments, *more]).stdout for more in ((), ("--quiet",)))
-    assert "note: 2 points, the first at operation.axial_load_N = 20000: " in loud and "note" not in quiet
+    assert loud.startswith("Danger: outer race: dented by 4370 MPa") and quiet.startswith(
+        "Danger: outer race: dented by"
+    )
+    assert " (2 points, the first at operation.axial_load_N = 20000)" in loud
+    assert "warning: " in loud and "warning: " not in quiet and "note" not in quiet

@@ -63,7 +63,7 @@ def test_show_writes_pictures_samples_and_figures(saved, shown):
 def test_show_figures(shown):
     """Show: the figures that were asked for, in their places and of a sensible size."""
     record = shown[1]
-    assert (record["format"], record["status"], record["turns"], record["replicate"]) == ("rbdyn.orbit/1", "ok", 4, 1)
+    assert (record["format"], record["status"], record["turns"], record["replicate"]) == ("rbdyn.orbit/2", "ok", 4, 1)
     assert record["notes"] == [] and record["pocket_bar_stiffness_N_m"] == 5e7
     assert 9000.0 < record["cage_speed_rpm"] < 10000.0
     quantiles = list(record["whirl_ratio_quantiles"].values())
@@ -166,7 +166,7 @@ def test_show_bad_input(command, saved, tmp_path):
 def test_show_other_versions(saved, tmp_path):
     """Show: a result of other versions is shown with a warning."""
     record = json.loads((saved / "result.json").read_text())
-    assert request_of(saved, None, 1).notes == []
+    assert request_of(saved, None, 1).notes == ()
     record["versions"]["numba"] = "0.1"
     (tmp_path / "result.json").write_text(json.dumps(record))
     (note,) = request_of(tmp_path, None, 1).notes

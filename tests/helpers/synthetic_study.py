@@ -85,7 +85,7 @@ def summary() -> dict[str, Any]:
     }
     chosen = {"radial_clearance_mm": 0.0225, "guide_clearance_mm": 0.185, "pocket_clearance_mm": 0.235}
     return {
-        "format": "doe.study/1",
+        "format": "doe.study/2",
         "status": "ok",
         "asked": {
             "title": "Clearances of a made-up bearing",
@@ -158,7 +158,7 @@ def summary() -> dict[str, Any]:
                 "rank_correlation": 0.7, "verdict": f"{RESPONSES[0]}: our mean is 0.45 of theirs.", "why": "They leave out mass.",
             }
         },
-        "notes": ["traction: one set of constants"],
+        "notes": [{"level": "note", "code": "traction-law", "text": "traction: one set of constants"}],
         "failures": [{"cause": "step budget used up", "runs": [13, 15]}],
         "cost": {"design_s": 31.5, "total_s": 36.1},
         "versions": {"rbdyn": "0.1.0"},

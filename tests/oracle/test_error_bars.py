@@ -166,7 +166,7 @@ def test_unit_notes_name_the_figure_and_the_mend(outer):
     )
     assert error_notes(outer, figures, None) == []
     (biased,) = error_notes(outer, {**figures, "power_loss_W": Quantity(100.0, 0.1, 2.0, 40.0)}, None)
-    assert "power loss may be off by 2 %" in biased and "numerics.rtol = 0.01 to 0.001" in biased
+    assert "power loss: may be off by 2 %" in biased and "numerics.rtol = 0.01 to 0.001" in biased
     (bound,) = error_notes(outer, {**figures, "power_loss_W": Quantity(100.0, 0.1, 2.0, 40.0)}, None, 1e-6)
     assert "numerics.rtol = 0.01 to 1e-06" in bound
     (scattered,) = error_notes(outer, {**figures, "impact_force_N": Quantity(100.0, 4.0, 6.0, 40.0)}, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,8 @@ from doe.workflow.runs import _distinct_notes
 from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
+from rbdyn.base.notes import Note
+from rbdyn.base.records import plain
 from rbdyn.cli.app import app
 
 ORDER = (
@@ -62,12 +65,16 @@ def roles(record: dict) -> dict[str, str]:
 @pytest.mark.parametrize("width", [60, 80, 100])
 def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
     """What an engineer acts on comes first, in this order, and the comparison with a table is left to the report."""
-    record = limited() | {"notes": [f"{number}: {'word ' * 30}" for number in range(9)]}
+    every = [
+        Note("unit" if number % 2 else "remark", f"{number}: {number * 'word '}{'word ' * 30}") for number in range(9)
+    ]
+    record = limited() | {"notes": plain([*every, Note("left-out", "general")])}
     text = terminal.text(blocks(record), width=width)
     places = [text.index(words) for words in ORDER]
-    assert text.startswith("made-up bearing; 24000 rpm; 2026-01-31")
+    lines = text.splitlines()
+    assert lines[0] == "No danger found; 4 warnings" and lines[1].startswith("made-up bearing; 24000 rpm; 2026-01-31")
     assert places == sorted(places)
-    assert "4 more notes in the report" in text and "published table" not in text
+    assert "5 more notes in the report" in text and "published table" not in text
     assert width < 80 or len(text.splitlines()) <= 50
     assert "Levels" in terminal.text(blocks(record), Detail.ALL) and "Compared with the published" in html_report(
         record
@@ -205,28 +212,37 @@ def test_a_simulation_begins_with_bearing_point_and_date(monkeypatch):
 
     monkeypatch.setattr("rbdyn.dynamics.simulate.simulate", simulate)
     shown = CliRunner().invoke(app, ["simulate", str(EXAMPLE)]).stdout
-    bearing, point, day = shown.splitlines()[0].split("; ")
-    assert bearing == "cylindrical roller bearing, 10 rollers 9 x 5 mm, pitch diameter 43.5 mm"
+    verdict, first, *_ = shown.splitlines()
+    bearing, point, day = first.split("; ")
+    assert (
+        verdict == "No danger found"
+        and bearing == "cylindrical roller bearing, 10 rollers 9 x 5 mm, pitch diameter 43.5 mm"
+    )
     assert point == "24000 rpm, 1300 N radial, MIL-L-7808 at 100 °C" and date.fromisoformat(day)
     assert shown.index("power loss [W]") < shown.index("race loads")
 
 
 def test_balls_have_their_figures_before_the_table_of_all_balls():
     shown = CliRunner().invoke(app, ["ball", str(ROOT / "examples" / "angular_contact_ball.toml")]).stdout
-    assert shown.startswith("angular contact ball bearing, ")
+    assert shown.splitlines()[1].startswith("angular contact ball bearing, ")
     assert shown.index("life L10r") < shown.index("stiffness: ") < shown.index("azimuth")
 
 
 def test_notes_of_runs_stand_in_the_order_of_their_mean_place():
     """Unit: what comes first where it occurs stays first, though the first run lacks it; numbers make no difference."""
+    drifted, dent, heat = Note("drift", "drifted"), Note("dent", "dented by 5 MPa"), Note("heat", "too hot")
+    whirl, left_out = (partial(Note, "jitter"), partial(Note, "left-out"))
     runs = [
-        ("whirl: 0.8 um", "left out: 13 W"),
-        ("drifted", "whirl: 0.7 um", "left out: 14 W"),
-        ("whirl: 0.8 um", "left out: 13 W"),
+        (heat, whirl("whirl: 0.8 um"), left_out("left out: 13 W")),
+        (heat, drifted, dent, whirl("whirl: 0.7 um"), left_out("left out: 14 W")),
+        (heat, whirl("whirl: 0.8 um"), left_out("left out: 13 W")),
     ]
     notes = _distinct_notes(runs)
+    assert [note.level for note in notes] == ["danger", "warning", "note", "warning", "note"]
     assert notes == [
+        "too hot",
         "drifted",
         "whirl: 0.8 um (in 3 of 3 runs; figures of the first)",
+        "dented by 5 MPa (in 1 of 3 runs)",
         "left out: 13 W (in 3 of 3 runs; figures of the first)",
     ]

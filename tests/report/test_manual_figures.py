@@ -24,7 +24,7 @@ def test_a_stale_figure_is_found():
     """Report: a figure counts as stale beyond half of its last digit and the errors of both."""
     run = {
         "power_loss_W": {"value": 239.4, "statistical_error": 0.12, "numerical_error": 0.03},
-        "notes": ["loss of 13 W"],
+        "notes": [{"text": "loss of 13 W"}],
     }
     assert manual_figures.valued("a:power_loss_W", {"a": run}) == pytest.approx((239.4, 0.1237), abs=1e-4)
     assert manual_figures.valued("a:power_loss_W - b:power_loss_W", {"a": run, "b": run})[0] == 0.0

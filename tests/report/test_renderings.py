@@ -12,7 +12,9 @@ from doe.report.files import answer_text, blocks
 from doe.report.page import html_report, sections
 from rbdyn.base import html as page
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Bullets, Detail, Heading, Note, Paragraph, Section, Table, Tile, Tiles
+from rbdyn.base.blocks import Bullets, Detail, Heading, Paragraph, Remarks, Section, Table, Tile, Tiles, with_notes
+from rbdyn.base.notes import Note
+from rbdyn.base.records import plain
 
 NUMBER = re.compile(r"[-+±]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PICTURE = re.compile(r"<figure.*?</figure>|<details class=\"controls\".*?</details>", re.DOTALL)
@@ -84,7 +86,7 @@ def test_no_key_stands_in_what_people_read():
 def test_every_block_is_rendered_twice_and_details_are_for_who_asks():
     """Unit: each kind of block on the terminal and as HTML; quietly no notes, only verbosely all."""
     tree = [
-        Paragraph("A verdict of 5 %.", "statement"), Note("a limit of 1.5"), Heading("Parts"), Bullets(["one of 2"]),
+        Paragraph("A verdict of 5 %.", "statement"), Remarks((Note("remark", "a limit of 1.5"),)), Heading("Parts"), Bullets(["one of 2"]),
         Table("Sizes", ("part", "size"), [("ring & <b>", "1.0 ± 0.2")], "in mm", detail=Detail.ALL),
         Tiles("Clearances", "pick", [Tile("guide", "0.185", "mm", [("baseline", "0.150")])]),
     ]  # fmt: skip
@@ -112,14 +114,40 @@ def test_bad_news_has_a_word_and_a_class_of_its_own():
     assert terminal.text([block], width=80, bold=True).startswith("\033[1mWarning: ")
 
 
+def long_notes(count: int, code: str = "unit") -> tuple[Note, ...]:
+    """Long notes that say different things."""
+    return tuple(Note(code, f"{number}: {number * 'more '}{'word ' * 30}end") for number in range(count))
+
+
 def test_a_screen_has_five_notes_of_a_line_each_and_says_where_the_others_are():
-    """Unit: below full detail the first five, cut at the width; a file has them whole; at full detail all."""
-    tree = [Paragraph("before"), *(Note(f"{number}: {'word ' * 30}end") for number in range(8)), Paragraph("after")]
+    """Unit: below full detail the first five, cut; a file has them whole; at full detail all; general ones in files alone."""
+    tree = [Paragraph("before"), Remarks((Note("left-out", "general"), *long_notes(8))), Paragraph("after")]
     lines = terminal.text(tree, width=80).splitlines()
-    assert [line[:7] for line in lines[1:6]] == [f"note: {number}" for number in range(5)]
+    assert [line[:10] for line in lines[1:6]] == [f"warning: {number}" for number in range(5)]
     assert all(len(line) <= 80 and line.endswith("…") for line in lines[1:6])
-    assert lines[6].startswith("3 more notes in the report") and lines[7:] == ["after"]
+    assert lines[6].startswith("4 more notes in the report") and lines[7:] == ["after"]
     whole = terminal.text(tree)
-    assert whole.count("end\n") == 5 and "3 more notes in the report" in whole
-    assert terminal.text(tree, Detail.ALL, 80).count("end") == 8
-    assert "more note" not in terminal.text(tree[:6]) and "in full" in terminal.text(tree[:3], width=80)
+    assert whole.count("end\n") == 5 and "4 more notes in the report" in whole and "general" not in whole
+    assert terminal.text(tree, Detail.ALL, 80).count("end") == 8 and "note: general" in "".join(map(page.render, tree))
+    assert "in full" in terminal.text([Remarks(long_notes(3))], width=80)
+    assert "report" not in terminal.text([Remarks(long_notes(3))])
+
+
+def test_dangers_come_first_even_quietly_and_take_the_place_of_notes():
+    """Unit: every danger before anything else in all renderings; of six notes five are shown, the dangers among them."""
+    notes = (
+        Note("dent", "inner race: dented by 5 MPa"),
+        Note("dent", "outer race: dented by 4 MPa"),
+        Note("heat", "hot"),
+    )
+    notes = (*long_notes(5), *notes)
+    tree = with_notes([*plain(notes[:3]), *notes[3:]], [Heading("answer")])
+    quiet = terminal.text([Paragraph("bearing"), *tree], Detail.LEAST).splitlines()
+    assert (
+        quiet[:2] == ["Danger: hot", "Danger: inner race: dented by 5 MPa; likewise outer race"]
+        and "warning" not in quiet[-1]
+    )
+    assert terminal.text(tree).count("warning:") == 3 and "2 more notes" in terminal.text(tree)
+    assert 'class="danger"' in page.render(tree[0])
+    assert terminal.text(with_notes((), [])) == "No danger found\n"
+    assert terminal.text(with_notes(long_notes(2), [])).startswith("No danger found; 2 warnings\n")

@@ -111,7 +111,9 @@ def test_unit_races_tell_dents_and_thin_films(make_scene, outer):
     sound = {"max_pressure_MPa": 3999.0, "lambda_ratio": 1.01}
     assert race_notes(outer, {"inner": sound, "outer": sound}) == ()
     (note,) = race_notes(outer, {"inner": sound, "outer": sound | {"max_pressure_MPa": 4001.0}})
-    assert note.startswith("4001 MPa on the outer race are more than the 4000 MPa of ISO 76") and "rollers" in note
+    assert note.startswith("outer race: dented by 4001 MPa, more than the 4000 MPa of ISO 76") and "rollers" in note
+    dents = [race_notes(outer, {"inner": {"max_pressure_MPa": pressure}})[0].code for pressure in (5311.0, 5313.0)]
+    assert dents == ["dent", "overload"]
     thin = {"inner": sound | {"lambda_ratio": 0.4}, "outer": sound | {"lambda_ratio": 0.3}}
     (note,) = race_notes(outer, thin)
     assert "lambda is 0.3 on the outer race" in note and "traction.friction = 'mixed'" in note
@@ -127,7 +129,7 @@ def test_unit_heat_that_no_oil_carries_off(outer):
     limit = 3.3 * 2.0 * math.pi * 43.5 * 5.0
     assert heat_notes(outer, 0.99 * limit) == ()
     (note,) = heat_notes(outer, 1.01 * limit)
-    assert "no bearing sheds them" in note and f"{1.01 * limit / 2700.0:.2g} L/min" in note
+    assert note.code == "heat" and "no bearing sheds them" in note and f"{1.01 * limit / 2700.0:.2g} L/min" in note
     assert "lubricant.temperature_C = 100" in note
 
 

@@ -12,7 +12,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text as terminal_text
 from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.app import map_blocks
-from rbdyn.cli.duty import map_duty
+from rbdyn.cli.duty import life_notes, map_duty
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import FIGURES, Point, SlipMap
 from rbdyn.result import Quantity
@@ -59,10 +59,13 @@ def test_unit_points_have_their_lives_and_notes(outer, path):
     for row, scene in zip(duty.rows, duty.scenes, strict=True):
         assert row["L10_h"] == static_life(scene).hours(*scene.operation.speeds)
     assert sum(row["damage_share"] for row in duty.rows) == pytest.approx(1.0)
-    assert duty.notes == [
+    assert duty.notes == (
         "duty 'cruise': sets lubricant.temperature_C too, which the map keeps at the scene's values",
         "duty 'take-off': 30000 rpm and 1300 N are off the map, so its mark is at the edge; widen --speed or --load",
-    ]
+    )
+    assert (
+        life_notes(900.0, 1000.0)[0].code == "short-life" and life_notes(900.0, 1.0) == life_notes(1001.0, 1000.0) == ()
+    )
 
 
 def test_unit_map_files_with_a_duty(outer, path, mapped, tmp_path, drawn):

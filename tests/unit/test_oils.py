@@ -242,7 +242,7 @@ def test_unit_oils_of_balls_are_told_too(deep_groove):
     from rbdyn import equilibrium
 
     deep_groove["lubricant"] = {"oil": "ISO VG 68", "temperature_C": 70.0}
-    (note,) = (note for note in equilibrium(BallScene.from_dict(deep_groove)).as_dict()["notes"] if "lubricant" in note)
+    (note,) = (note for note in equilibrium(BallScene.from_dict(deep_groove)).notes if "lubricant" in note)
     assert "ISO VG 68 (mineral) is estimated at 70 C" in note
 
 

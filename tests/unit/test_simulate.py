@@ -124,7 +124,7 @@ def test_unit_json_keys_and_values(outer_result):
     """Unit: keys, their form, and plain JSON without NaN."""
     record = json.loads(json.dumps(outer_result.as_dict(), allow_nan=False))
     assert record.keys() >= KEYS
-    assert (record["format"], record["status"]) == ("rbdyn.simulation/4", "ok")
+    assert (record["format"], record["status"]) == ("rbdyn.simulation/5", "ok")
     for name in QUANTITIES:
         keys = {"value", "statistical_error", "numerical_error", "effective_samples", "degrees_of_freedom"}
         assert record[name].keys() == keys

@@ -110,7 +110,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     share = found["chosen"]["share"]
     assert 0.0 < share <= 1.0 and chosen.shares.sum() == pytest.approx(1.0)
     assert f"it is the pick in {100.0 * share:.0f} of 100 draws of the simulation's errors" in outcome.pick.reason
-    assert not any("--adaptive" in note for note in record["notes"])
+    assert not any("--adaptive" in note["text"] for note in record["notes"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == found["foretold_points"]

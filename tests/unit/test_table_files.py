@@ -146,7 +146,7 @@ def test_the_example_as_german_excel_writes_it_has_the_same_fit_bit_for_bit(tmp_
     expected = json.loads(doe("fit", STUDY, "--data", TABLE, "--json").stdout)
     for name, manner in written_abroad(tmp_path).items():
         shown = json.loads(doe("fit", STUDY, "--data", tmp_path / name, "--json").stdout)
-        assert shown.pop("notes") == [f"{tmp_path / name}: {manner}"]
+        assert shown.pop("notes") == [{"level": "note", "code": "table", "text": f"{tmp_path / name}: {manner}"}]
         assert shown == expected
 
 
@@ -270,7 +270,7 @@ def test_a_front_stands_on_all_rows_that_each_response_has(tmp_path):
     table.to_csv(tmp_path / "t.csv", sep=";", decimal=",", index=False)
     shown = doe("front", STUDY, "--data", tmp_path / "t.csv", "--json")
     record = json.loads(shown.stdout)
-    assert record["notes"] == [
+    assert [note["text"] for note in record["notes"]] == [
         f"{tmp_path / 't.csv'}: read with semicolons and decimal commas",
         f"{tmp_path / 't.csv'}: power_loss_W has no value in row 5; it does without that row, which serves the others",
     ]

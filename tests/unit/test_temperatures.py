@@ -149,7 +149,11 @@ def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
         notice=None,
     )
     assert result.status == "seizure" == result.thermal["status"]
-    assert "the cage seizes" in result.thermal["reason"] and result.notes[0].startswith("temperatures: seizure:")
+    assert (
+        "the cage seizes" in result.thermal["reason"]
+        and result.notes[0].startswith("seizure: ")
+        and result.notes[0].code == "seizure"
+    )
     assert result.temperatures_C["oil"].error is None
     assert result.clearance_um["guide"]["operating"] > 6.0
 

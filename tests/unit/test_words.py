@@ -8,6 +8,7 @@ import pytest
 from conftest import EXAMPLE
 from instant_runs import instant_result
 
+from rbdyn.base.notes import Note
 from rbdyn.base.words import are, counted
 from rbdyn.scene import Scene
 
@@ -36,7 +37,7 @@ def test_unit_result_of_one_note_counts_one_note():
     """Unit: what a notebook shows of a result."""
     from dataclasses import replace
 
-    result = replace(instant_result(Scene.load(EXAMPLE)), notes=("only this",), replicates=1)
+    result = replace(instant_result(Scene.load(EXAMPLE)), notes=(Note("remark", "only this"),), replicates=1)
     shown = repr(result) + result._repr_html_()
     assert "1 note" in shown and "1 replicate," in shown
     assert not re.search(r"\b1 (notes|replicates)", shown)

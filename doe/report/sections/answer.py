@@ -52,7 +52,7 @@ from doe.workflow.runs import region_of
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Role, Section, Table, Tile, Tiles
+from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
@@ -83,7 +83,6 @@ def first_screen(summary: Record) -> list[Block]:
     identity = part(summary, "identity")
     return [
         *([identity_line(Identity.from_dict(identity))] if identity else ()),
-        *_obstacles(summary),
         *_clearances(summary),
         *_judged(summary),
         *_gained(summary),
@@ -91,12 +90,6 @@ def first_screen(summary: Record) -> list[Block]:
         *_parts_to_make(summary),
         *_reasons(summary),
     ]
-
-
-def _obstacles(summary: Record) -> list[Block]:
-    """What keeps the study from its demands, and what would have to change; nothing where it meets them."""
-    first, *others = part(summary, "obstacles", "sentences") or [""]
-    return [Paragraph(first, "warning"), Bullets(others)]
 
 
 def _judged(summary: Record) -> list[Block]:

@@ -16,11 +16,11 @@ from doe.unknown.posterior import contraction_words
 from doe.workflow.calibration import CALIBRATED, Calibration
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
+from rbdyn.base.blocks import Block, Bullets, Paragraph, Table, with_notes
 from rbdyn.base.identity import Identity
 from rbdyn.base.pace import duration
 from rbdyn.base.page import REPORT, with_report
-from rbdyn.base.records import save_table
+from rbdyn.base.records import plain, save_table
 from rbdyn.base.storage import digest_of, intact, sign
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown
@@ -28,7 +28,7 @@ from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
-FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
+FORMAT, POSTERIOR = "doe.calibration/2", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
 FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
@@ -93,7 +93,7 @@ def record_of(calibration: Calibration, made_of: str) -> dict[str, Any]:
         "screened": calibration.screened,
         "runs": calibration.runs,
         "seed": calibration.case.scene.calibrate.seed,
-        "notes": list(calibration.notes),
+        "notes": plain(calibration.notes),
     }  # fmt: skip
 
 
@@ -200,7 +200,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         for name, explanation in record["outputs"].items()
         if explanation["evidence"] is not None
     ]
-    return [
+    answer: list[Block] = [
         Paragraph(verdict_words(record), "statement" if calibrated else "warning"),
         Bullets([] if calibrated else _hidden(record)),
         Table(caption, header, inputs, text_columns=(1, 2, 5)),
@@ -208,8 +208,8 @@ def blocks(record: dict[str, Any]) -> list[Block]:
         Bullets([*_prediction_quality(record["held_out"]), *_outliers(record)]),
         Paragraph(_screened(record["screened"])),
         Paragraph(_cost_words(record["cost"]) if "cost" in record else "", "small"),
-        *(Note(note, Detail.LEAST) for note in record["notes"]),
     ]
+    return with_notes(record["notes"], answer, judged=False)
 
 
 def verdict_words(record: Mapping[str, Any]) -> str:

@@ -11,7 +11,8 @@ from typing import Any
 
 from doe.dimension_chain.links import size_text
 from doe.pareto.manufacture import Interval, percent
-from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Note, Paragraph, Table, says
+from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, says
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import improvement, label, quantity, shown, with_error
 
 Record = Mapping[str, Any]
@@ -159,6 +160,11 @@ def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
     return [_without_unit(_spelt(block, words), ratios) for block in blocks if says(block)]
 
 
+def notes_of(summary: Record) -> Notes:
+    """Notes of a record."""
+    return tuple(map(Note.of, part(summary, "notes") or ()))
+
+
 def is_ratio(summary: Record, name: str) -> bool:
     """Whether a response is the worst ratio to the baseline over a duty."""
     return bool(part(summary, "duty", "aggregate", name) == "worst_relative")
@@ -200,7 +206,9 @@ def _spelt(block: Block, words: Mapping[str, str]) -> Block:
         return text
 
     match block:
-        case Paragraph(text) | Note(text):
+        case Verdict(notes=notes) | Remarks(notes=notes):
+            return replace(block, notes=tuple(Note(note.code, spelt(note)) for note in notes))
+        case Paragraph(text):
             return replace(block, text=spelt(text))
         case Bullets(items):
             return replace(block, items=[spelt(item) for item in items])

@@ -14,14 +14,14 @@ from doe.unknown.decision import Better
 from doe.unknown.propagation import CONFIDENCE, Share
 from doe.workflow.robust import Decider, Robust, RobustFront
 from doe.workflow.uncertainty import OutputRange, Uncertainty
-from rbdyn.base.blocks import Block, Bullets, Detail, Note, Paragraph, Table
-from rbdyn.base.records import save_table
+from rbdyn.base.blocks import Block, Bullets, Paragraph, Table, with_notes
+from rbdyn.base.records import plain, save_table
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 from rbdyn.scene.unknown import is_number
 
-FORMAT = "doe.uncertainty/1"
+FORMAT = "doe.uncertainty/2"
 # Most inputs that a sentence names, and the least share of one.
 NAMED, WORTH = 2, 0.1
 
@@ -41,7 +41,7 @@ def uncertainty_record(uncertainty: Uncertainty) -> dict[str, Any]:
         "runs": len(sets.outputs),
         "failed": len(sets.failures) + len(sets.impossible),
         "seed": uncertainty.seed,
-        "notes": list(uncertainty.notes),
+        "notes": plain(uncertainty.notes),
     }
 
 
@@ -101,13 +101,13 @@ def uncertainty_blocks(uncertainty: Uncertainty) -> list[Block]:
             f"{counted(len(uncertainty.screened), 'further input')} varied in every set, but no emulator includes them: "
             f"none alone causes more than {100.0 * uncertainty.screened[most]:.2g} % of an output's variance ({most})."
         )
-    return [
+    answer: list[Block] = [
         Bullets([range_sentence(name, output) for name, output in uncertainty.outputs.items()]),
         Table(caption, header, [*rows, floor]),
         Table("Variance of a single run by cause [%]", sources, parts),
         Paragraph(screened),
-        *(Note(note, Detail.LEAST) for note in uncertainty.notes),
     ]
+    return with_notes(uncertainty.notes, answer, judged=False)
 
 
 def _by_key(output: OutputRange) -> dict[str, Share]:

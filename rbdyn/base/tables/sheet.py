@@ -14,6 +14,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, one_line, refuse
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
 from rbdyn.base.tables.decimal_marks import Marks
 from rbdyn.base.tables.table_file import TableFile, read_table_file
@@ -132,9 +133,9 @@ class Sheet:
         return self.file.rows
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Notes:
         """A note on how the table was read, where that is not UTF-8 with commas and decimal points."""
-        return (f"{self.path}: {self.file.manner}",) if self.file.manner else ()
+        return (Note("table", f"{self.path}: {self.file.manner}"),) if self.file.manner else ()
 
     @cached_property
     def places(self) -> dict[str, int]:

@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
 
+from rbdyn.base.notes import CODES
 from rbdyn.base.words import filled_page
 from rbdyn.cli.manual.drawings import roller_bearing
 from rbdyn.plots.sketches import Sketch
@@ -196,11 +197,21 @@ def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
         "commands": commands_of,
         "equations": lambda part: equations(trees, part.package),
         "library": lambda part: library(trees, part.package),
+        "notes": lambda part: [code_table()] if part is parts[0] else [],
     }
     for path in sorted((path for part in parts for path in part.prose.glob("*.md")), key=lambda path: path.name):
         name = path.stem.partition("_")[2]
         more = (block for part in parts for block in generated[name](part)) if name in generated else ()
         yield name, "\n\n".join((path.read_text(encoding="utf-8"), *more))
+
+
+def code_table() -> str:
+    """Every code of a note with its level and meaning."""
+    rows = (
+        f"| `{name}` | {code.level}{', general' if code.general else ''} | {code.meaning} |"
+        for name, code in CODES.items()
+    )
+    return "\n".join(("| code | level | meaning |", "|---|---|---|", *rows))
 
 
 def rendered(text: str, chapter: str, sketches: Mapping[str, Sketch] | None = None) -> tuple[list[Heading], str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.base.notes import Notes
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, POWERS, ROLLING, RollerBearing
@@ -195,7 +196,7 @@ def _rolling_force(hot: Scene, loads: LoadDistribution, distance: float | None) 
     return total
 
 
-def flow_notes(hot: Scene) -> tuple[str, ...]:
+def flow_notes(hot: Scene) -> Notes:
     """Notes where the oil fraction that follows from a flow is a guess; none without a flow."""
     flow, geometry = hot.lubricant.oil_flow, hot.geometry
     if flow is None or hot.mounting is None:

@@ -10,15 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.faults import RPM
+from rbdyn.base.notes import Note, Notes
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
-from rbdyn.contact.hertz_line import ROLLERS, dent_sentence, palmgren
+from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_report, oil_layer, race_contact_law, rolling_contacts
 from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
-from rbdyn.scene.notes import catalogue_entry
+from rbdyn.scene.notes import catalogue_entry, clearance_notes, speed_notes
 from rbdyn.scene.unknown import documented_of
 
 # Film over roughness below which asperities bear part of the load.
@@ -56,18 +57,19 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     return report
 
 
-def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> Notes:
     """Notes where ``races`` of a report exceed their laws: dents, and films too thin for the friction of a full one."""
     pressures = {name: 1e6 * race["max_pressure_MPa"] for name, race in races.items()}
-    notes = [dent_sentence(most, ROLLERS, name) for name, most in pressures.items() if most > ROLLERS]
+    notes = [note for name, most in pressures.items() for note in pressure_notes(most, ROLLERS, name)]
     law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
-        notes.append(
+        sentence = (
             f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the "
             "friction is that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the "
             "roughnesses"
         )
+        notes.append(Note("thin-film", sentence))
     return tuple(notes)
 
 
@@ -110,20 +112,21 @@ def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] |
     }
 
 
-def friction_notes(check: dict[str, Any] | None) -> tuple[str, ...]:
+def friction_notes(check: dict[str, Any] | None) -> Notes:
     """A note where the simulated power loss is far from SKF's."""
     ratio = None if check is None else check["ratio"]
     low, high = USUAL_RATIO
     if check is None or ratio is None or low <= ratio <= high:
         return ()
-    return (
+    sentence = (
         f"power loss: {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}; "
-        "compare the power terms, the oil and lubricant.supply",
+        "compare the power terms, the oil and lubricant.supply"
     )
+    return (Note("maker-loss", sentence),)
 
 
-# Share of the power loss from which a note states a power that was left out.
-NOTED_SHARE = 0.03
+# Shares of the power loss from which a note states a power that was left out, and from which it is a warning.
+NOTED_SHARE, LARGE_SHARE = 0.03, 0.2
 # An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2].
 # Ten times as much is beyond any cooling. Oil absorbs 27 W/K at a litre a minute (SKF), over at most some 100 K [W min/L].
 JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
@@ -266,24 +269,34 @@ LEFT_OUT = (
 )
 
 
-def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
+def left_out_notes(scene: Scene, power_loss: float) -> Notes:
     """Notes on effects that the model leaves out and that matter in this scene, of the simulated ``power_loss`` [W]."""
-    notes = []
+    notes = list[Note]()
     for item in LEFT_OUT:
         if item.power is not None:
             power = item.power(scene)
             if power > NOTED_SHARE * power_loss > 0.0:
                 share = power / power_loss
                 size = f"{100.0 * share:.2g} % of" if share < 1.0 else f"{share:.2g} times as much as"
-                notes.append(
+                code = "omission" if share > LARGE_SHARE else "left-out"
+                sentence = (
                     f"left out: {item.name}, by an estimate {power:.2g} W ({size} the power loss); {item.changes}"
                 )
+                notes.append(Note(code, sentence))
         elif item.matters is not None and item.matters(scene):
-            notes.append(f"left out: {item.name}; {item.changes}")
+            notes.append(Note("left-out", f"left out: {item.name}; {item.changes}"))
     return tuple(notes)
 
 
-def light_load_notes(scene: Scene) -> tuple[str, ...]:
+def limit_notes(scene: Scene) -> Notes:
+    """Notes on clearances in operation that are nearly lost, and on a speed beyond the limits of such bearings."""
+    inner, outer = scene.operation.speeds
+    listed = catalogue_entry(scene.bearing)
+    reference = None if listed is None or listed[1].reference_speed is None else listed[1].reference_speed * RPM
+    return (*clearance_notes(scene.clearances), *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference))
+
+
+def light_load_notes(scene: Scene) -> Notes:
     """A note where even the largest load is below the minimum load of a maker, with every maker's rule.
 
     A designation gives the factor k_r and the reference speed of SKF's rule, and the mean diameter of bore and outside.
@@ -304,13 +317,14 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
         return ()
     rising = sorted(rules.items(), key=lambda item: item[1])
     loads = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
-    return (
+    sentence = (
         f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {loads}; no rule is "
-        "safe; see cage_slip",
+        "safe; see cage_slip"
     )
+    return (Note("light-load", sentence),)
 
 
-def film_drive_notes(scene: Scene) -> tuple[str, ...]:
+def film_drive_notes(scene: Scene) -> Notes:
     """A note where the load is so small that oil films, and no longer loaded contacts, drive the rollers."""
     load, capacity = scene.operation.largest_load_N, scene.bearing.rated_capacity
     if load >= FILM_DRIVEN * capacity:
@@ -326,41 +340,40 @@ def film_drive_notes(scene: Scene) -> tuple[str, ...]:
                 if layer > 0.0
                 else "are missing, for no loaded inner contact feeds them by lubricant.inlet_distance"
             )
-        return (
-            f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, which at open contacts {films}; "
-            "compare it over the range of that key",
-        )
-    return (
-        f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, of which those at open inner "
-        "contacts are left out; set model.open_contact_film = true",
-    )
+        films = f"which at open contacts {films}; compare it over the range of that key"
+    else:
+        films = "of which those at open inner contacts are left out; set model.open_contact_film = true"
+    sentence = f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, {films}"
+    return (Note("oil-drag", sentence),)
 
 
-def traction_law_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+def traction_law_notes(scene: Scene, slip: float) -> Notes:
     """A note where the cage slips so much that the form of the traction law decides how slip changes with a clearance or the oil."""
     laws = {law for entry in documented_of(scene) if entry.key == LAW for law in entry.values or ()}
     others = sorted(laws - {scene.traction.model})
     if slip < NOTED_SLIP or scene.traction.model == "off" or not others:
         return ()
-    return (
+    sentence = (
         f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}', and so does its change with temperature "
-        f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key",
+        f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key"
     )
+    return (Note("traction-law", sentence),)
 
 
-def slip_notes(scene: Scene, slip: float) -> tuple[str, ...]:
+def slip_notes(scene: Scene, slip: float) -> Notes:
     """Notes on what a cage ``slip`` rests on: the traction law, oil films, and a load below what makers ask for."""
     return (*traction_law_notes(scene, slip), *film_drive_notes(scene), *light_load_notes(scene))
 
 
-def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
+def heat_notes(scene: Scene, power_loss: float) -> Notes:
     """A note where a power loss [W] is more than any oil carries off; the model leaves out the temperatures that it causes."""
     drawing, oil = scene.bearing, scene.lubricant
     heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter * drawing.roller_length)
     if heat <= TOO_HOT * JET_COOLED:
         return ()
-    return (
-        f"power loss: {power_loss:.3g} W are {heat / JET_COOLED:.2g} times what a jet has carried off such a surface and take "
+    sentence = (
+        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface and takes "
         f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
-        f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s",
+        f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s"
     )
+    return (Note("heat", sentence),)

@@ -36,6 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import GROUPS
 from rbdyn.dynamics.statistics import metrics
@@ -106,7 +107,7 @@ class Start(NamedTuple):
 
     first: int
     turns: float | None
-    notes: tuple[str, ...]
+    notes: Notes
 
 
 def start_of_counting(scene: Scene, runs: Runs) -> Start:
@@ -118,8 +119,10 @@ def start_of_counting(scene: Scene, runs: Runs) -> Start:
     transient = max(transients, default=None)  # the longest; None where the run is too short to decide
     if transient is None:
         fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
-        note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"
-        return Start(run.first, None, (note,))
+        sentence = (
+            f"transient: the run is too short to show it: {fewest:g} shaft turns are needed; lengthen numerics.turns"
+        )
+        return Start(run.first, None, (Note("drift", sentence),))
     turns = round(float(run.durations[:transient].sum()) / scene.turn_s, 6)
     if numerics.discard_turns == "auto":
         # At least one impact window counts.
@@ -322,19 +325,20 @@ def quantities(
 
 def error_notes(
     scene: Scene, figures: dict[str, Quantity], fault: str | None, tighter: float | None = None
-) -> list[str]:
+) -> list[Note]:
     """Notes on errors that are large or uncertain, each with its fix.
 
     ``tighter``: the tolerance that removes a numerical error; a tenth of the scene's unless given.
     """
-    notes = [] if fault is None else [f"numerical error: not estimated; {fault}"]
+    notes = [] if fault is None else [Note("numerical-error", f"numerical error: not estimated; {fault}")]
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
-        notes.append(
+        sentence = (
             f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it ({listed}); "
             "raise numerics.turns or numerics.replicates"
         )
+        notes.append(Note("few-samples", sentence))
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name], tighter))]
 
 
@@ -342,7 +346,7 @@ def _enough(figure: Quantity) -> bool:
     return figure.effective_samples >= FEW_SAMPLES or figure.statistical_error == 0.0
 
 
-def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> str | None:
+def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> Note | None:
     error, statistical, size = figure.numerical_error, figure.statistical_error, abs(figure.value)
     if error is None or statistical is None or size == 0.0:
         return None
@@ -352,8 +356,7 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | 
     rtol, percent = scene.numerics.rtol, f"{100.0 * error / size:.2g} %"
     if biased:
         tolerance = f"{tighter or 0.1 * rtol:.1g}"
-        return f"numerical error: {name} may be off by {percent}; tighten numerics.rtol = {rtol:g} to {tolerance}"
-    return (
-        f"numerical error: {name} may be off by {percent}; it is mostly scatter, so raise numerics.turns or "
-        "numerics.replicates"
-    )
+        fix = f"); tighten numerics.rtol = {rtol:g} to {tolerance}"
+    else:
+        fix = ", mostly scatter); raise numerics.turns or numerics.replicates"
+    return Note("numerical-error", f"{name}: may be off by {percent} (numerical error{fix}")

@@ -44,6 +44,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import LightContact, light_contact
@@ -301,7 +302,7 @@ def pulse_figures(scene: Scene, runs: Runs, companions: Runs, share: float) -> d
     }
 
 
-def pulse_notes(scene: Scene, pulses: Mapping[str, Quantity]) -> tuple[str, ...]:
+def pulse_notes(scene: Scene, pulses: Mapping[str, Quantity]) -> Notes:
     """A note on how pulses are defined, and one where their heights show the bandwidth."""
     numerics = scene.numerics
     if not pulses or numerics.pulse_bandwidth_hz is None:
@@ -312,25 +313,24 @@ def pulse_notes(scene: Scene, pulses: Mapping[str, Quantity]) -> tuple[str, ...]
     )
     height, impulse = pulses["pulse_height_N"].value, pulses["pulse_impulse_N_s"].value
     if height == 0.0:
-        return (f"{definition}; none is so high, so lower numerics.pulse_threshold_N",)
+        return (Note("few-samples", f"{definition}; none is so high, so lower numerics.pulse_threshold_N"),)
     if as_short_as_the_filter(height, impulse, numerics.pulse_bandwidth_hz):
-        return (
-            definition,
-            "pulses: as short as the bandwidth allows, so their height shows the impulse, not the stiffness",
-        )
-    return (definition,)
+        short = "pulses: as short as the bandwidth allows, so their height shows the impulse, not the stiffness"
+        return Note("definition", definition), Note("remark", short)
+    return (Note("definition", definition),)
 
 
-def whirl_notes(scene: Scene, share: Quantity | None) -> tuple[str, ...]:
+def whirl_notes(scene: Scene, share: Quantity | None) -> Notes:
     """A note where the whirl deviation ratio shows a jitter, no whirl."""
     play = scene.cage_play_m
     if share is None or play is None or share.value >= JITTER:
         return ()
     clearance = "radial play in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
-    return (
+    sentence = (
         "whirl deviation ratio: that of a jitter, for the cage does not whirl; its orbit has a radius of "
-        f"{1e6 * play * share.value:.2g} um, {share.value:.2g} of the {clearance}",
+        f"{1e6 * play * share.value:.2g} um, {share.value:.2g} of the {clearance}"
     )
+    return (Note("jitter", sentence),)
 
 
 FACTOR = 10.0

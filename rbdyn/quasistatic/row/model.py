@@ -131,3 +131,9 @@ def load_of(scene: BallScene) -> Array:
 def constraint_of(scene: BallScene) -> Array:
     """Prescribed displacements [m, rad], NaN where the load rules."""
     return np.array(scene.operation.displacements, float)
+
+
+def clearance_of(row: Row) -> tuple[float, float]:
+    """Diametral clearance [m] of a row with its growth, and its unloaded contact angle [rad], 0 for an interference."""
+    reach, radial = float(row.inner_reach[0] + row.outer_reach[0]), float(row.radial[0])
+    return 2.0 * (reach - radial), math.acos(min(radial / reach, 1.0))
