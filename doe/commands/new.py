@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.command import Json, flag, guarded, plain_number, print_json, valued
+from rbdyn.base.command import Json, flag, guarded, notice, plain_number, print_json, valued
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
+    from doe.study_file import Study
     from rbdyn.scene import Scene
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
@@ -28,9 +30,12 @@ RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
 FACTOR = """[[factor]]
 name = "{name}"
 key = "{table}.{name}"
-centre = {centre} # as the scene has it
-step = {step:.6g} # {percent:g} % of it
+centre = {centre} # {source}
+step = {step:.6g} # {width}
 resolution = 0.001 # of the drawing
+"""
+BASELINE = """[baseline] # the original design, over which gains count
+{values}
 """
 TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
 """
@@ -45,13 +50,14 @@ Limits = dict[str, dict[str, float]]
 
 
 class Factor(NamedTuple):
-    """A clearance that a study varies: name, table of the scene, value [mm], step [mm] and its share of the value."""
+    """A clearance that a study varies: name, table of the scene, value and step [mm], and where these two come from."""
 
     name: str
     table: str
     centre: float
     step: float
-    share: float
+    source: str
+    width: str
 
 
 def new(
@@ -82,22 +88,34 @@ def new(
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
         from doe.workflow.front import check_goals
+        from doe.workflow.region import region_that_runs
         from doe.workflow.whole import check_study
         from rbdyn.base.command import fill_template
         from rbdyn.base.faults import read_toml, validated
-        from rbdyn.scene import Scene, rollers_only
+        from rbdyn.scene import DrawnScene, rollers_only
 
         bounds = limits_of(limit or [])
-        scene = rollers_only(Scene.load(path))
+        scene = rollers_only(DrawnScene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
-        sections = _sections(scene, read_toml(path), tolerances, chains)
-        sections |= {"responses": _responses(bounds), "duty": _duty(duty, scene)}
-        for name, section in sections.items():
-            template = template.replace(f"{{{name}}}", section)
-        text = fill_template(template, {"quoted": json.dumps(str(path))})
-        data = tomllib.loads(text)
-        study = Study(Path("study.toml"), validated(StudyFile, data, f"study of {path}"))
+        sections = {"responses": _responses(bounds), "duty": _duty(duty, scene), "baseline": ""}
+        factors = _factors(read_toml(path))
+
+        def written(factors: list[Factor]) -> tuple[str, dict[str, Any], Study]:
+            text = template
+            for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
+                text = text.replace(f"{{{name}}}", section)
+            text = fill_template(text, {"quoted": json.dumps(str(path))})
+            data = tomllib.loads(text)
+            return text, data, Study(Path("study.toml"), validated(StudyFile, data, f"study of {path}"))
+
+        text, data, study = written(factors)
         check_goals(study)
+        with tempfile.TemporaryDirectory() as folder:
+            moved = region_that_runs(study, Path(folder), notice=notice(False), kept=1.0).study
+        if moved is not study:
+            if (moved.baseline != moved.centre).any():
+                sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))
+            text, data, study = written(_moved(factors, moved))
         check_study(study)
         if as_json:
             print_json(data)
@@ -155,9 +173,8 @@ def _response(name: str, limits: Mapping[str, float]) -> str:
     return "\n".join(["[[response]]", f'name = "{name}"', *bounds, 'model = "quadratic"', goal, ""])
 
 
-def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bool) -> dict[str, str]:
+def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: bool) -> dict[str, str]:
     """Factors of the study, and what it says of their parts."""
-    factors = _factors(data)
     if not tolerances and not chains:
         return {"factors": "\n".join(map(_factor_text, factors)), "parts": HINT}
     from doe.commands.new_parts import chain_text, manufacture_of, tolerances_text
@@ -184,7 +201,7 @@ def _duty(path: Path | None, scene: "Scene") -> str:
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:
-    text = FACTOR.format(**factor._asdict(), percent=100.0 * factor.share)
+    text = FACTOR.format(**factor._asdict())
     return (
         text
         if manufacture is None
@@ -201,5 +218,20 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
         if centre is None or (landless and name == "guide_clearance_mm"):
             continue
         step = max(round(share * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
-        factors.append(Factor(name, table, float(centre), step, share))
+        factors.append(Factor(name, table, float(centre), step, "as the scene has it", f"{100.0 * share:g} % of it"))
     return factors
+
+
+def _moved(factors: list[Factor], study: "Study") -> list[Factor]:
+    """The factors with the region of a study that runs."""
+    moved = list[Factor]()
+    for factor, ours in zip(factors, study.file.factor, strict=True):
+        if (factor.centre, factor.step) != (ours.centre, ours.step):
+            source = f"the scene has {factor.centre:g}: moved to where the bearing runs"
+            factor = factor._replace(centre=ours.centre, step=ours.step, source=source, width="of the region that runs")
+        moved.append(factor)
+    return moved
+
+
+def _assigned(values: Mapping[str, float]) -> list[str]:
+    return [f"{name} = {value!r}" for name, value in values.items()]

@@ -61,6 +61,7 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     from doe.report.identity import study_identity
     from doe.report.sections.design import design_record, design_tables
     from doe.study_file import Study
+    from doe.workflow.region import region_that_runs
     from doe.workflow.runs import augment_notes, design_of, evaluation
     from doe.workflow.whole import check_study
 
@@ -68,10 +69,13 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     with step_folder(folder, "design", ("design",), force) as output:
         study = Study.load(path)
         # Without a scene the runs are made elsewhere, and only the design itself is checked.
+        notes: tuple[str, ...] = ()
         if study.file.scene and study.path_of(study.scene.file).exists():
+            with Effort().folder(folder) as store:
+                study, notes = region_that_runs(study, store)
             check_study(study)
         points = design_of(study)
-        notes = augment_notes(study)
+        notes += augment_notes(study)
         output.claim(path)
         record = design_record(study, points, evaluation(study, points)) | ({"notes": list(notes)} if notes else {})
         answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
@@ -170,7 +174,7 @@ def fit(
         study, notes = _study_or_table(study_path, table, factors, responses, model)
         output.claim(study.path, *_read_later(study, table))
         stack.enter_context(registered(study.path, folder))
-        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         surfaces = with_rivals(surfaces)
         remarks = [*reading, *notes, *unrivalled(surfaces)]
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
@@ -224,21 +228,25 @@ def _read_later(study: "Study", data: Path | None) -> list[Path]:
 
 def _surfaces(
     study: "Study", data: Path | None, out: Path | None, effort: Effort
-) -> "tuple[list[Surface], tuple[str, ...]]":
-    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
+) -> "tuple[Study, list[Surface], tuple[str, ...]]":
+    """The study with its region, surfaces of it, of a table or of simulated runs, and notes on both.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
+    from doe.workflow.region import region_that_runs
     from doe.workflow.runs import read_runs, run_design
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
         runs = read_runs(study, data)
-        return fit_surfaces(study, runs), runs.notes
+        return study, fit_surfaces(study, runs), runs.notes
     with effort.folder(out) as folder:
+        study, notes = region_that_runs(
+            study, folder, effort.workers, effort.scheduler, effort.retry, effort.progress, effort.notice
+        )
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
-        return fit_surfaces(study, runs), ()
+        return study, fit_surfaces(study, runs), notes
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -318,7 +326,7 @@ def front(
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
         output.claim(path, *_read_later(study, table))
-        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
         record = front_record(study, surfaces, pareto) | ({"notes": list(reading)} if reading else {})
         if values is not None:

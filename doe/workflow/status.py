@@ -21,6 +21,7 @@ from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, S
 from doe.study_file import Study
 from doe.study_file.sections import Front
 from doe.study_file.workbook import split_path
+from doe.workflow.region import region_in_store
 from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
@@ -187,16 +188,17 @@ class Content:
 
 def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status`` for a study. It only reads, even while the study runs. Raises InputError."""
-    ordered = ordered_runs(study)
+    region = region_in_store(study, folder)
+    ordered = ordered_runs(region)
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     content = Content.of(folder, points)
-    works, agenda = dict(design_works(study)), content.agenda
+    works, agenda = dict(design_works(region)), content.agenda
     stated_options = agenda.options if agenda else {}
     options = {name: stated_options.get(name, False) for name in ("adaptive", "robust")}
     answered = bool(finished_record(folder, inputs_digest(study, **options))) if agenda else _has_answer(study, folder)
     if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
         # The study as it is now has no agenda.
-        new_agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
+        new_agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(region, **options))
         agenda = replace(new_agenda, measured=agenda.measured, crowd=agenda.crowd) if agenda else new_agenda
     _count_design(agenda.stages, works, content.outcomes)
     if not agenda.measured.number:

@@ -43,6 +43,7 @@ from doe.workflow.confirmation import (
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.front import check_goals, find_front, with_survival
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
+from doe.workflow.region import region_that_runs
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
 from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
@@ -342,6 +343,9 @@ def run_study(
     check_goals(study)
     if robust := robust or declares_unknowns(study):
         check_robust(study)
+    notice = None if agenda is None else agenda.notice
+    region = region_that_runs(study, folder, workers, scheduler, retry, progress, notice)
+    study = region.study
     reference = check_study(study, adaptive)
     clock.plan(study_stages(study, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
@@ -364,7 +368,7 @@ def run_study(
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
-    notes += [*augment_notes(study), *(reference.notes if reference else ())]
+    notes += [*region.notes, *augment_notes(study), *(reference.notes if reference else ())]
     step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,

@@ -16,7 +16,14 @@ class Level(StrEnum):
 
 
 # Level of each code.
-CODES: dict[str, Level] = {"seizure": Level.DANGER, "remark": Level.NOTE}
+CODES: dict[str, Level] = {
+    "seizure": Level.DANGER,
+    "nearly lost": Level.DANGER,
+    "too hot": Level.DANGER,
+    "region": Level.WARNING,
+    "failed runs": Level.WARNING,
+    "remark": Level.NOTE,
+}
 
 
 class Note(str):

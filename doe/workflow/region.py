@@ -1,0 +1,421 @@
+"""The region of a study where its bearings run: clearances in operation at every point of the design and of the duty.
+
+Nothing is simulated for it but, where the scene has a heat balance, its centre by short runs: their temperatures hold for all
+points. A region that reaches below the floor of a clearance (``rbdyn.mounting.cage.RunningClearance.floor``) moves upward, and a
+sentence says so. The file of the study stays as it is; its runs, fits and picks have the region that runs.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from doe import clearance
+from doe.clearance import Simulations, points_of
+from doe.duty import over_duty
+from doe.running.runner import Progress
+from doe.running.store import Failure, Store
+from doe.study_file import Study
+from doe.study_file.sections import Factor
+from doe.workflow.runs import STORE, actual_of, design_of
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, RunError, refuse
+from rbdyn.base.forecast import Notice
+from rbdyn.base.notes import Note
+from rbdyn.base.words import quantity
+from rbdyn.mounting.cage import RunningClearance
+from rbdyn.result import SimulationResult
+from rbdyn.scene import DrawnScene, Scene
+from rbdyn.scene.lubricant import HOTTEST_C
+from rbdyn.scene.thermal import Temperatures, ceilings, part_temperatures
+
+# Share of its width that a stated region keeps at least: it is narrowed that far, and moves beyond.
+KEPT = 0.5
+# Most points of a design whose clearances are looked at.
+MOST_POINTS = 200
+# A run that is long enough for temperatures within 1 K, and ceilings that judge later.
+BALANCE = (
+    "numerics.turns=5", "numerics.discard_turns=5", "numerics.replicates=2", "numerics.companion=false", "numerics.extend=false",
+    f"thermal.oil_ceiling_C={HOTTEST_C:g}", "thermal.cage_ceiling_C=1000",
+)  # fmt: skip
+# Wider clearances [K of difference between parts] with which the balance is tried where the centre itself seizes.
+WIDER_K = (0.0, 60.0, 120.0)
+# Share of all that is taken from which a cause is named.
+NAMED = 0.2
+# Moves until every clearance stays above its floor: each changes what is taken of the others by next to nothing.
+MOST_MOVES = 3
+
+# Results of short runs of scenes with these labels, None for a run that is not known.
+Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[SimulationResult | Failure | None]]
+# Temperatures of the parts by point of the duty, "" without one.
+Heat = Mapping[str, Temperatures]
+
+
+class Region(NamedTuple):
+    """The study with the region in which its bearings run, and what was changed for it."""
+
+    study: Study
+    notes: tuple[Note, ...] = ()
+
+
+class Taken(NamedTuple):
+    """A clearance at the point of the design and of the duty (``place``) that takes most of it, and its floor [m]."""
+
+    running: RunningClearance
+    place: str
+    floor: float
+
+    @property
+    def needed(self) -> float:
+        """Least value of the drawing that leaves the floor [m]."""
+        return self.floor + self.running.play.drawn - self.running.play.operating
+
+    @property
+    def at(self) -> str:
+        """The place in words, to begin a sentence's part."""
+        return f"at {self.place} " if self.place else ""
+
+    @property
+    def causes(self) -> str:
+        """What takes of it, in words."""
+        play = self.running.play
+        changes = {"fits": play.fit, "heat": play.temperature, "rotation": play.rotation}
+        taken = play.drawn - play.operating
+        names = [name for name, change in changes.items() if -change > NAMED * abs(taken)]
+        takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
+        rest = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
+        return (
+            f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {rest}" if taken > 0.0 and names else rest
+        )
+
+
+def region_that_runs(
+    study: Study,
+    folder: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Callable[[str], Progress] | None = None,
+    notice: Notice = None,
+    kept: float = KEPT,
+) -> Region:
+    """The region of a study that runs, with a heat balance from the store in ``folder`` or simulated there.
+
+    ``notice(sentence)`` hears of it at once. ``kept``: share of its width that a region keeps at least. Raises InputError for a
+    region that nothing can move, RunError where its centre has no steady temperatures.
+    """
+
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
+        with Store(folder / STORE, study.path.stem) as store:
+            follow = _silent if progress is None else progress
+            simulations = Simulations(store, workers, scheduler, retry, follow)
+            return simulations.run(list(scenes), labels, follow("heat balance"))
+
+    region = moved_region(study, balance, kept)
+    if notice is not None:
+        for note in region.notes:
+            notice(note)
+    return region
+
+
+def region_in_store(study: Study, folder: Path) -> Study:
+    """The study with the region that runs, as far as the runs in the store of ``folder`` tell; nothing is simulated."""
+
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
+        points = points_of(scenes, labels)
+        if not (folder / STORE).exists():
+            return [None] * len(points)
+        with Store(folder / STORE, read_only=True) as store:
+            outcomes = store.outcomes(points, clearance.sound)
+        found = [outcomes.get(point.key) for point in points]
+        return [
+            outcome if outcome is None or isinstance(outcome, Failure) else SimulationResult.from_dict(outcome)
+            for outcome in found
+        ]
+
+    return moved_region(study, balance).study
+
+
+def _silent(title: str) -> Progress:
+    return lambda done, total: None
+
+
+def moved_region(study: Study, balance: Balances, kept: float = KEPT) -> Region:
+    """The study with its region moved to where every clearance stays above its floor at every point of the duty."""
+    if not _has_mounting(study):
+        return Region(study)
+    original, (heat, notes) = study, _heat(study, balance)
+    if heat is None:
+        return Region(study)
+    stays = study.file.reference is not None or study.file.design.augment is not None
+    for _ in range(MOST_MOVES):
+        worst = _worst(study, heat)
+        short = {key: taken for key, taken in worst.items() if _low_mm(study, taken) < 1e3 * taken.needed - 1e-6}
+        movable = {} if stays else {key: taken for key, taken in short.items() if _place(study, key) is not None}
+        if not movable:
+            break
+        study = _moved(study, movable, kept)
+    notes += [
+        _moved_note(original, study, key, taken)
+        for key, taken in _worst(original, heat).items()
+        if _differs(original, study, key)
+    ]
+    notes += [_lost_note(study, taken, heat) for key, taken in short.items() if key not in movable]
+    if study is original:
+        return Region(study, tuple(notes))
+    study, baseline_notes = _with_baseline(original, study, heat)
+    return Region(study, (*notes, *baseline_notes))
+
+
+def _has_mounting(study: Study) -> bool:
+    """Whether anything changes the clearances of the drawing."""
+    return "mounting" in clearance.read_scene(study) or any(text.startswith("mounting.") for text in study.scene.set)
+
+
+def _place(study: Study, key: str) -> int | None:
+    """Place of the factor with this key of the scene; None where it is no factor."""
+    return next((place for place, factor in enumerate(study.file.factor) if factor.key == key), None)
+
+
+def _ends(study: Study, place: int) -> tuple[float, float]:
+    """Ends of the region of a factor, in its units."""
+    half = design_of(study).reach * study.step[place]
+    return float(study.centre[place] - half), float(study.centre[place] + half)
+
+
+def _low_mm(study: Study, taken: Taken) -> float:
+    """Lowest value of a clearance on the drawings of the region [mm]."""
+    place = _place(study, taken.running.key)
+    return 1e3 * taken.running.play.drawn if place is None else _ends(study, place)[0]
+
+
+def _differs(before: Study, after: Study, key: str) -> bool:
+    place = _place(before, key)
+    return place is not None and _ends(before, place) != _ends(after, place)
+
+
+def _running(study: Study, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
+    """Clearances in operation of a point (k,) of the design by point of the duty. Raises InputError for an impossible drawing."""
+    data = clearance.read_scene(study)
+    drawn = partial(clearance.scene_at, study, data, point, study.file.design.seed, kind=DrawnScene)
+    run = over_duty(study, lambda sets: drawn(overrides=[*study.scene.set, *sets]))
+    for place, scene in {"": run}.items() if isinstance(run, Scene) else run.scenes.items():
+        if (mounting := scene.mounting) is None:
+            continue
+        if scene.thermal is not None:
+            mounting = mounting.model_copy(update=part_temperatures(scene.thermal, heat[place]))
+        yield place, scene.running_clearances(mounting)
+
+
+def _worst(study: Study, heat: Heat) -> dict[str, Taken]:
+    """The place that takes most of each clearance, by its key, over all points of the designs at all categories."""
+    worst: dict[str, Taken] = {}
+    for levels in study.every_level:
+        variant = study.with_levels(levels)
+        points = np.unique(actual_of(variant, design_of(variant)), axis=0)
+        for point in points[:: -(-len(points) // MOST_POINTS)]:
+            for place, clearances in _running(variant, point, heat):
+                for running in clearances.values():
+                    taken = Taken(running, place, _floor(study, running))
+                    if running.key not in worst or taken.needed > worst[running.key].needed:
+                        worst[running.key] = taken
+    return worst
+
+
+def _floor(study: Study, running: RunningClearance) -> float:
+    """Floor of a clearance [m]; of a bearing that is meant to be preloaded, what the study states or none."""
+    if running.touching > -math.inf:
+        return running.floor
+    if "least_clearance_um" in study.file.adaptive.model_fields_set:
+        return 1e-6 * study.file.adaptive.least_clearance_um
+    place = _place(study, running.key)
+    drawn_mm = 1e3 * running.play.drawn if place is None else study.baseline[place]
+    return running.floor if drawn_mm > 0.0 else -math.inf
+
+
+def _heat(study: Study, balance: Balances) -> tuple[Heat | None, list[Note]]:
+    """Temperatures at the centre of the region by point of the duty, and where they are too high; None where they are not known.
+
+    Raises RunError where the bearing has no steady temperatures even with wider clearances.
+    """
+    scenes, found = _central(study, 0.0), dict[str, Temperatures]()
+    if all(scene.thermal is None for scene in scenes.values()):
+        return {}, []
+    causes = dict[str, str]()
+    for wider in WIDER_K:
+        try:
+            rest = {place: scene for place, scene in _central(study, wider, BALANCE).items() if place not in found}
+        except InputError:
+            # Even cold parts touch; the last try raises.
+            if wider == WIDER_K[-1]:
+                raise
+            continue
+        labels = [f"heat balance{f' at {place}' if place else ''}" for place in rest]
+        for place, result in zip(rest, balance(list(rest.values()), labels), strict=True):
+            if result is None:
+                return None, []
+            if isinstance(result, Failure):
+                causes[place] = result.cause
+            else:
+                nodes = result.temperatures_C or {}
+                found[place] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
+        if len(found) == len(scenes):
+            return found, [note for place, scene in scenes.items() for note in _too_hot(scene, place, found[place])]
+    raise RunError(
+        "; ".join(
+            f"the middle of the region has no steady temperatures{f' at {place}' if place else ''}: {cause}"
+            for place, cause in causes.items()
+            if place not in found
+        )
+        + ": no clearance changes that; more oil, a cooler inlet or less speed and load may"
+    )
+
+
+def _central(study: Study, wider: float, overrides: Sequence[str] = ()) -> dict[str, Scene]:
+    """Scenes of the centre of the region by point of the duty, with clearances for parts ``wider`` kelvin apart."""
+    point, data, more = study.centre.copy(), clearance.read_scene(study), list[str]()
+    kind = DrawnScene if not overrides else Scene
+    if wider:
+        cold = next(iter(_central(study, 0.0).values()))
+        assert cold.mounting is not None
+        for running in cold.running_clearances(cold.mounting).values():
+            value, place = 1e3 * (running.play.drawn + wider * running.growth), _place(study, running.key)
+            if place is None:
+                more.append(f"{running.key}={value!r}")
+            else:
+                point[place] = value
+    run = over_duty(
+        study,
+        lambda sets: clearance.scene_at(
+            study, data, point, study.file.design.seed, [*study.scene.set, *sets, *overrides, *more], kind
+        ),
+    )
+    return {"": run} if isinstance(run, Scene) else dict(run.scenes)
+
+
+def _too_hot(scene: Scene, place: str, nodes: Temperatures) -> Iterator[Note]:
+    """Notes on the oil and the cage above their ceilings."""
+    if scene.thermal is None:
+        return
+    parts = {"oil": nodes.oil, "cage": nodes.rollers + scene.thermal.cage_offset_K}
+    for part, ceiling in ceilings(scene).items():
+        if parts[part] > ceiling:
+            yield Note(
+                "too hot",
+                f"Too hot: the {part} reaches {parts[part]:.0f} C{f' at {place}' if place else ''} in the middle of the region, above "
+                f"its ceiling of {ceiling:g} C (thermal.{part}_ceiling_C).",
+            )
+
+
+def _moved(study: Study, short: Mapping[str, Taken], kept: float) -> Study:
+    """The study with the regions of these clearances moved. Raises InputError where one cannot move as far."""
+    factors, reach, faults = list(study.file.factor), design_of(study).reach, list[str]()
+    for key, taken in short.items():
+        place = _place(study, key)
+        assert place is not None
+        low, high = _ends(study, place)
+        factor, needed = factors[place], 1e3 * taken.needed
+        top = max(high, needed + kept * (high - low))
+        if factor.allowed is not None:
+            top = min(top, factor.allowed[1])
+        centre, step = _rounded(factor, needed, top, reach)
+        if step <= 0.0:
+            faults.append(
+                f"{study.path}: factor.allowed of {factor.name} = {factor.allowed}: its region has to begin at {needed:.4g}, because "
+                f"{taken.at}{taken.causes}; raise its upper end"
+            )
+            continue
+        factors[place] = factor.model_copy(update={"centre": centre, "step": step})
+    refuse(faults)
+    moved = replace(study, file=study.file.model_copy(update={"factor": factors}))
+    try:
+        for point in (moved.actual(np.full(len(factors), sign * reach)) for sign in (-1.0, 1.0)):
+            for _ in _running(moved, point, _Warm()):
+                pass
+    except InputError as error:
+        why = "; ".join(f"{taken.at}{taken.causes}" for taken in short.values())
+        raise InputError(
+            [f"{study.path}: the region has to move ({why}), but there {fault}" for fault in error.faults]
+        ) from None
+    return moved
+
+
+class _Warm(dict[str, Temperatures]):
+    """The same temperatures anywhere, for drawings whose clearances do not matter."""
+
+    def __missing__(self, place: str) -> Temperatures:
+        return Temperatures(*[70.0] * len(Temperatures._fields))
+
+
+def _rounded(factor: Factor, low: float, high: float, reach: float) -> tuple[float, float]:
+    """Centre and step of a region between two ends, rounded inward at the lower one, so that other bits of a temperature change neither."""
+    step = 0.5 * (high - low) / reach
+    if step <= 0.0:
+        return low, 0.0
+    coarse = factor.finest or 10.0 ** math.floor(math.log10(step) - 1.0)
+    fine = coarse if step >= 10.0 * coarse else 0.1 * coarse
+    step = round(math.floor(step / fine + 1e-9) * fine, 12)
+    return round(math.ceil((low + reach * step) / coarse - 1e-9) * coarse, 12), step
+
+
+def _moved_note(before: Study, after: Study, key: str, taken: Taken) -> Note:
+    """How the region of a factor moved, and why."""
+    place = _place(before, key)
+    assert place is not None
+    words, unit = quantity(before.factors[place])
+    (low, high), (new_low, new_high) = _ends(before, place), _ends(after, place)
+    verb = "moved" if new_high > high * (1.0 + 1e-9) else "was narrowed"
+    return Note(
+        "region",
+        f"The region of the {words} {verb} from {low:.3f}-{high:.3f} to {new_low:.3f}-{new_high:.3f} {unit}: {taken.at}{taken.causes}.",
+    )
+
+
+def _lost_note(study: Study, taken: Taken, heat: Heat) -> Note:
+    """A clearance below its floor that nothing moves. Raises InputError where it is lost in the middle of the region too."""
+    running, key = taken.running, taken.running.key
+    words, _ = quantity(key.rpartition(".")[2])
+    stays = _place(study, key) is not None
+    if any(clearances_seize(clearances, key) for _, clearances in _running(study, study.centre, heat)):
+        fix = "widen the factor's centre" if stays else f"widen it in {study.scene.file}, or make it a factor"
+        raise InputError([f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"])
+    why = "runs of a table keep its region where it is" if stays else "no factor moves it"
+    return Note(
+        "seizure" if running.seizes else "nearly lost",
+        f"{'Seizure' if running.seizes else 'Nearly lost'}: {words} in operation {1e6 * running.play.operating:.0f} um {taken.at}at "
+        f"the edge of the region, where {1e6 * taken.floor:.0f} um are its floor; {why}.",
+    )
+
+
+def clearances_seize(clearances: Mapping[str, RunningClearance], key: str) -> bool:
+    """Whether the clearance with this key is lost."""
+    return any(running.seizes for running in clearances.values() if running.key == key)
+
+
+def _with_baseline(original: Study, moved: Study, heat: Heat) -> tuple[Study, list[Note]]:
+    """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
+    first = original.with_levels(())
+    seized = [
+        (place, running)
+        for place, clearances in _running(first, original.baseline, heat)
+        for running in clearances.values()
+        if running.seizes
+    ]
+    baseline: dict[str, Any] = original.by_factor(original.baseline)
+    notes = []
+    if seized:
+        place, running = min(seized, key=lambda pair: pair[1].play.operating)
+        words, _ = quantity(running.key.rpartition(".")[2])
+        baseline = moved.by_factor(moved.centre)
+        notes.append(
+            Note(
+                "seizure",
+                f"Seizure: {words} of the original design in operation {1e6 * running.play.operating:.0f} um"
+                f"{f' at {place}' if place else ''}; gains are over the middle of the region instead.",
+            )
+        )
+    return replace(moved, file=moved.file.model_copy(update={"baseline": baseline})), notes
