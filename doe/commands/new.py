@@ -115,7 +115,7 @@ def new(
         if moved is not study:
             if (moved.baseline != moved.centre).any():
                 sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))
-            text, data, study = written(_moved(factors, moved))
+            text, data, study = written(_moved(factors, study, moved))
         check_study(study)
         if as_json:
             print_json(data)
@@ -222,14 +222,13 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
     return factors
 
 
-def _moved(factors: list[Factor], study: "Study") -> list[Factor]:
-    """The factors with the region of a study that runs."""
-    moved = list[Factor]()
-    for factor, ours in zip(factors, study.file.factor, strict=True):
-        if (factor.centre, factor.step) != (ours.centre, ours.step):
-            source = f"the scene has {factor.centre:g}: moved to where the bearing runs"
-            factor = factor._replace(centre=ours.centre, step=ours.step, source=source, width="of the region that runs")
-        moved.append(factor)
+def _moved(factors: list[Factor], before: "Study", after: "Study") -> list[Factor]:
+    """The factors with the region of the study ``after`` it moved."""
+    moved = []
+    for factor, old, new in zip(factors, before.file.factor, after.file.factor, strict=True):
+        source = f"the scene has {factor.centre:g}: moved to where the bearing runs"
+        changed = factor._replace(centre=new.centre, step=new.step, source=source)
+        moved.append(factor if new == old else changed)
     return moved
 
 

@@ -234,7 +234,7 @@ def _surfaces(
     Raises InputError, RunError, KeyboardInterrupt.
     """
     from doe.workflow.region import region_that_runs
-    from doe.workflow.runs import read_runs, run_design
+    from doe.workflow.runs import read_runs, run_design, with_remaining
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
@@ -246,7 +246,7 @@ def _surfaces(
         )
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
-        return study, fit_surfaces(study, runs), notes
+        return with_remaining(study, runs), fit_surfaces(study, runs), notes
 
 
 @dataclass(frozen=True, repr=False, eq=False)

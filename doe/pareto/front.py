@@ -21,7 +21,18 @@ from scipy import special
 
 from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
-from doe.pareto.search import Doubt, Judged, Objectives, check_search, dominates, growth, hypervolume, search
+from doe.pareto.search import (
+    Barred,
+    Doubt,
+    Judged,
+    Objectives,
+    barring,
+    check_search,
+    dominates,
+    growth,
+    hypervolume,
+    search,
+)
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 
@@ -164,6 +175,7 @@ def front(
     keep: int = 200,
     pick: Rule = "knee",
     doubt: Doubt | None = None,
+    barred: Barred | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -176,6 +188,7 @@ def front(
         worst of each cost, the knee and the picks.
     pick : rule of the pick.
     doubt : maps points (n, k) to the errors of their responses downwards and upwards (n, m), within which limits must hold.
+    barred : maps points (n, k) to how far they lie beyond where the search may go (n,), at most 0 within.
 
     Raises MethodError when the bounds are no box, a setting is out of range, or an objective is not finite; InfeasibleError
     when no evaluated point keeps all limits.
@@ -186,7 +199,9 @@ def front(
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
+    searched = search(
+        barring(partial(_judged, objectives, goals, doubt), barred), low, high, population, generations, seed
+    )
     points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]

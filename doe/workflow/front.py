@@ -59,7 +59,7 @@ def find_front(
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
-    doubt = SurfaceDoubt(study, surfaces, simulated)
+    doubt, remaining = SurfaceDoubt(study, surfaces, simulated), study.remaining
 
     def plain(share: float) -> ParetoFront:
         return front(
@@ -70,6 +70,7 @@ def find_front(
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
             doubt=lambda points: doubt.at_share(share)(study.coded(points)),
+            barred=None if remaining is None else lambda points: remaining.excess(study.coded(points)),
         )
 
     with named_faults(study, goals, lambda point: point, ""):
@@ -151,6 +152,7 @@ def _tolerance_aware(
         plain=Archive(study.coded(pareto.points), pareto.costs),
         plain_pick=pareto.pick,
         doubt=doubt,
+        barred=None if study.remaining is None else study.remaining.excess,
         **study.file.front.model_dump(include=SEARCH),
     )
 
@@ -161,7 +163,8 @@ def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], s
     try:
         yield
     except InfeasibleError as error:
-        by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
+        # Where runs failed, the last of the violations is that of no limit.
+        by_limit = zip(goals.limited, error.violations.tolist(), strict=False)
         broken_limits = [
             (study.responses[index], sense, limit, violation)
             for (index, sense, limit), violation in by_limit

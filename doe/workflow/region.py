@@ -26,7 +26,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.forecast import Notice
 from rbdyn.base.notes import Note
-from rbdyn.base.words import quantity
+from rbdyn.base.words import counted, quantity
 from rbdyn.mounting.cage import RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
@@ -44,6 +44,8 @@ BALANCE = (
 )  # fmt: skip
 # Wider clearances [K of difference between parts] with which the balance is tried where the centre itself seizes.
 WIDER_K = (0.0, 60.0, 120.0)
+# Difference of temperatures [K] by which a moved region stays above the floors: those at another centre differ a little.
+SPARE_K = 2.5
 # Share of all that is taken from which a cause is named.
 NAMED = 0.2
 # Moves until every clearance stays above its floor: each changes what is taken of the others by next to nothing.
@@ -73,6 +75,11 @@ class Taken(NamedTuple):
     def needed(self) -> float:
         """Least value of the drawing that leaves the floor [m]."""
         return self.floor + self.running.play.drawn - self.running.play.operating
+
+    @property
+    def target(self) -> float:
+        """Least value of the drawing that a moved region has [m]: the same with other temperatures is no reason to move again."""
+        return self.needed + SPARE_K * self.running.growth
 
     @property
     def at(self) -> str:
@@ -110,6 +117,10 @@ def region_that_runs(
     """
 
     def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
+        if notice is not None:
+            notice(
+                f"{counted(len(scenes), 'heat balance')} of the middle of the region by short runs, for all its clearances"
+            )
         with Store(folder / STORE, study.path.stem) as store:
             follow = _silent if progress is None else progress
             simulations = Simulations(store, workers, scheduler, retry, follow)
@@ -318,7 +329,7 @@ def _moved(study: Study, short: Mapping[str, Taken], kept: float) -> Study:
         place = _place(study, key)
         assert place is not None
         low, high = _ends(study, place)
-        factor, needed = factors[place], 1e3 * taken.needed
+        factor, needed = factors[place], 1e3 * taken.target
         top = max(high, needed + kept * (high - low))
         if factor.allowed is not None:
             top = min(top, factor.allowed[1])
@@ -382,7 +393,9 @@ def _lost_note(study: Study, taken: Taken, heat: Heat) -> Note:
     stays = _place(study, key) is not None
     if any(clearances_seize(clearances, key) for _, clearances in _running(study, study.centre, heat)):
         fix = "widen the factor's centre" if stays else f"widen it in {study.scene.file}, or make it a factor"
-        raise InputError([f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"])
+        raise InputError(
+            [f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"]
+        )
     why = "runs of a table keep its region where it is" if stays else "no factor moves it"
     return Note(
         "seizure" if running.seizes else "nearly lost",

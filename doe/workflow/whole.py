@@ -46,7 +46,17 @@ from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about
 from doe.workflow.region import region_that_runs
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge, robust_advice
-from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
+from doe.workflow.runs import (
+    STORE,
+    Runs,
+    augment_notes,
+    check_runs,
+    design_of,
+    ordered_runs,
+    region_of,
+    run_design,
+    with_remaining,
+)
 from doe.workflow.status import FRONT, TOLERANCES, inputs_digest, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
@@ -350,7 +360,7 @@ def run_study(
     clock.plan(study_stages(study, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
-    turns = runs.turns
+    study, turns = with_remaining(study, runs), runs.turns
     surfaces, surface_front = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
@@ -367,13 +377,13 @@ def run_study(
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
-    reference = reference and reference.only(runs.places)
+    reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
     notes += [*region.notes, *augment_notes(study), *(reference.notes if reference else ())]
     step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,
         inputs=inputs,
-        design=design_of(study),
+        design=runs.design or design_of(study),
         runs=runs,
         surfaces=surfaces,
         front=with_survival(study, surfaces, selection.front, confirmed),
@@ -387,7 +397,7 @@ def run_study(
         gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
-        published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
+        published_comparisons=[] if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *step_failures, *selection.failures),
         notes=(*notes, *_advice(study, surfaces, searched, robustness), *runs.notes),
@@ -416,7 +426,7 @@ def _with_its_categories(
     if searched.runs is not runs:
         surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
         surface_front = find_front(searched.study, surfaces)
-    return searched.study, searched.runs, surfaces, surface_front
+    return with_remaining(searched.study, searched.runs), searched.runs, surfaces, surface_front
 
 
 def _edge(
@@ -441,6 +451,11 @@ def _tolerances(
     neighbours = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
     draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
     return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
+
+
+def _compared(study: Study, runs: Runs, reference: Runs) -> list[PublishedComparison]:
+    """The runs beside those of the published table, which has no run added in place of a failed one."""
+    return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
