@@ -166,13 +166,17 @@ class Gain(Record):
         return self.error * float(times_wider(self.freedom, count))
 
 
+class LostPickError(RunError):
+    """The pick could not be simulated."""
+
+
 @one_thread
 def confirm(
     study: Study, choices: Mapping[str, Choice], simulations: Simulations
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
     """Simulate the baseline and the choices with fresh seeds. Returns the simulated points and the failures.
 
-    Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
+    Raises RunError where the baseline cannot be simulated, LostPickError where the pick cannot, InputError, KeyboardInterrupt.
     """
     points = {"baseline": Choice(study.baseline, "the original design"), **choices}
     runs = [
@@ -185,7 +189,7 @@ def confirm(
         if not isinstance(result, Failure):
             confirmed[name] = confirmed_from(study, choice, result)
         elif name in ("baseline", "pick"):
-            raise RunError(f"confirmation of the {result}")
+            raise (RunError if name == "baseline" else LostPickError)(f"confirmation of the {result}")
         else:
             failures.append(result)
     return confirmed, failures

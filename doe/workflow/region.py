@@ -118,9 +118,7 @@ def region_that_runs(
 
     def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
         if notice is not None:
-            notice(
-                f"{counted(len(scenes), 'heat balance')} of the middle of the region by short runs, for all its clearances"
-            )
+            notice(f"{counted(len(scenes), 'short heat balance')} of the middle of the region, for all its clearances")
         with Store(folder / STORE, study.path.stem) as store:
             follow = _silent if progress is None else progress
             simulations = Simulations(store, workers, scheduler, retry, follow)

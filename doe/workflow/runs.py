@@ -341,17 +341,11 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
     if failures:
         added = len(results) - planned
         instead = (
-            f" {counted(added, 'other run')} of what remains of the region {are(added)} in their place."
-            if added
-            else ""
+            f" {counted(added, 'other run')} in the rest of the region {are(added)} in their place." if added else ""
         )
+        left_out = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
         notes.insert(
-            0,
-            Note(
-                "failed runs",
-                f"{counted(len(failures), 'design run')} of {len(results)} failed: {sentence(failures)}.{instead} Surfaces are those of "
-                "the others, and front and pick stay where the nearest run went well.",
-            ),
+            0, Note("failed runs", f"{left_out}{instead} Front and pick stay where the nearest run went well.")
         )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
@@ -399,7 +393,7 @@ def _with_replacements(
     places[:, list(study.inactive)] = 0.0
     if design.region == "ball":
         places = places[np.linalg.norm(places, axis=1) <= design.extent + SAME_POINT]
-    candidates = _realised(study, places[remaining.holds(places)], design.reach)
+    candidates = _realised(study, places[remaining.excess(places) < -SAME_POINT], design.reach)
     if not len(candidates):
         return None
     lacking = len(design.coded) - len(rows) - design.kind.count("added")
