@@ -1,14 +1,16 @@
 """The region of a study where its bearings run: clearances in operation at every point of the design and of the duty.
 
-Nothing is simulated for it but, where the scene has a heat balance, its centre by short runs: their temperatures hold for all
-points. A region that reaches below the floor of a clearance (``rbdyn.mounting.cage.RunningClearance.floor``) moves upward, and a
-sentence says so. The file of the study stays as it is; its runs, fits and picks have the region that runs.
+A region that reaches below the floor of a clearance (``rbdyn.mounting.cage.RunningClearance.floor``) moves upward, and a sentence
+says so. The file of the study stays as it is; its runs, fits and picks have the region that runs.
+
+With stated temperatures nothing is simulated. With a heat balance short runs of the centre give the temperatures of all points. Where
+these leave few kelvin anywhere, the corner with the least clearances is balanced too, for a land or a pocket that closes heats
+itself: it takes more than at the centre, and may close altogether.
 """
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,7 +29,7 @@ from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.forecast import Notice
 from rbdyn.base.notes import Note
 from rbdyn.base.words import counted, quantity
-from rbdyn.mounting.cage import RunningClearance
+from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C
@@ -48,13 +50,17 @@ WIDER_K = (0.0, 60.0, 120.0)
 SPARE_K = 2.5
 # Share of all that is taken from which a cause is named.
 NAMED = 0.2
-# Moves until every clearance stays above its floor: each changes what is taken of the others by next to nothing.
-MOST_MOVES = 3
+# Difference of temperatures [K] between two parts that is left at a point of the duty, below which its least corner is balanced.
+FEW_K = 30.0
+# By how much more a region moves [K] where that corner seizes by its own heat.
+HOTTER_K = 10.0
+# Times that the region is looked at: it moves for its centre, then for its corner.
+MOST_LOOKS = 8
 
-# Results of short runs of scenes with these labels, None for a run that is not known.
-Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[SimulationResult | Failure | None]]
-# Temperatures of the parts by point of the duty, "" without one.
-Heat = Mapping[str, Temperatures]
+# Results of short runs of scenes with these labels.
+Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[SimulationResult | Failure]]
+# Temperatures of the parts that were found, by point of the duty, "" without one.
+Heat = Mapping[str, Sequence[Temperatures]]
 
 
 class Region(NamedTuple):
@@ -65,16 +71,21 @@ class Region(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """A clearance at the point of the design and of the duty (``place``) that takes most of it, and its floor [m]."""
+    """A clearance at the point of the design and of the duty (``place``) that takes most of it, and its floor [m].
+
+    ``hotter``: further difference of temperatures [K] that its own heat makes.
+    """
 
     running: RunningClearance
     place: str
     floor: float
+    hotter: float = 0.0
 
     @property
     def needed(self) -> float:
         """Least value of the drawing that leaves the floor [m]."""
-        return self.floor + self.running.play.drawn - self.running.play.operating
+        play = self.running.play
+        return self.floor + play.drawn - play.operating + self.hotter * self.running.growth
 
     @property
     def target(self) -> float:
@@ -95,6 +106,7 @@ class Taken(NamedTuple):
         names = [name for name, change in changes.items() if -change > NAMED * abs(taken)]
         takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
         rest = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
+        rest += " and heat itself until it closes" if self.hotter else ""
         return (
             f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {rest}" if taken > 0.0 and names else rest
         )
@@ -116,9 +128,9 @@ def region_that_runs(
     region that nothing can move, RunError where its centre has no steady temperatures.
     """
 
-    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
         if notice is not None:
-            notice(f"{counted(len(scenes), 'short heat balance')} of the middle of the region, for all its clearances")
+            notice(f"{counted(len(scenes), 'short run')} for the temperatures of {labels[0].partition(' at ')[0]}")
         with Store(folder / STORE, study.path.stem) as store:
             follow = _silent if progress is None else progress
             simulations = Simulations(store, workers, scheduler, retry, follow)
@@ -131,22 +143,28 @@ def region_that_runs(
     return region
 
 
-def region_in_store(study: Study, folder: Path) -> Study:
-    """The study with the region that runs, as far as the runs in the store of ``folder`` tell; nothing is simulated."""
+class _UnknownError(Exception):
+    """A run is not in the store."""
 
-    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure | None]:
+
+def region_in_store(study: Study, folder: Path) -> Study:
+    """The study with the region that runs, if the runs in the store of ``folder`` tell; nothing is simulated."""
+
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
         points = points_of(scenes, labels)
         if not (folder / STORE).exists():
-            return [None] * len(points)
+            raise _UnknownError
         with Store(folder / STORE, read_only=True) as store:
             outcomes = store.outcomes(points, clearance.sound)
-        found = [outcomes.get(point.key) for point in points]
-        return [
-            outcome if outcome is None or isinstance(outcome, Failure) else SimulationResult.from_dict(outcome)
-            for outcome in found
-        ]
+        if any(point.key not in outcomes for point in points):
+            raise _UnknownError
+        found = [outcomes[point.key] for point in points]
+        return [outcome if isinstance(outcome, Failure) else SimulationResult.from_dict(outcome) for outcome in found]
 
-    return moved_region(study, balance).study
+    try:
+        return moved_region(study, balance).study
+    except (_UnknownError, RunError):
+        return study
 
 
 def _silent(title: str) -> Progress:
@@ -158,26 +176,79 @@ def moved_region(study: Study, balance: Balances, kept: float = KEPT) -> Region:
     if not _has_mounting(study):
         return Region(study)
     original, (heat, notes) = study, _heat(study, balance)
-    if heat is None:
-        return Region(study)
     stays = study.file.reference is not None or study.file.design.augment is not None
-    for _ in range(MOST_MOVES):
-        worst = _worst(study, heat)
+    hotter, moves, seen = dict[str, float](), dict[str, Taken](), set[tuple[float, ...]]()
+    for _ in range(MOST_LOOKS):
+        worst = _worst(study, heat, hotter)
         short = {key: taken for key, taken in worst.items() if _low_mm(study, taken) < 1e3 * taken.needed - 1e-6}
         movable = {} if stays else {key: taken for key, taken in short.items() if _place(study, key) is not None}
-        if not movable:
+        if movable:
+            study, moves = _moved(study, movable, kept), moves | movable
+        elif stays or (corner := tuple(_corner(study, heat).tolist())) in seen:
             break
-        study = _moved(study, movable, kept)
-    notes += [
-        _moved_note(original, study, key, taken)
-        for key, taken in _worst(original, heat).items()
-        if _differs(original, study, key)
-    ]
+        else:
+            seen.add(corner)
+            _hear_of_corner(study, balance, np.array(corner), heat, hotter)
+    notes += [_moved_note(original, study, key, taken) for key, taken in moves.items()]
     notes += [_lost_note(study, taken, heat) for key, taken in short.items() if key not in movable]
-    if study is original:
+    if not moves:
         return Region(study, tuple(notes))
-    study, baseline_notes = _with_baseline(original, study, heat)
+    study, baseline_notes = _with_baseline(original, study, balance, heat)
     return Region(study, (*notes, *baseline_notes))
+
+
+def _corner(study: Study, heat: Heat) -> Array:
+    """The drawing (k,) with the least clearances of the region, other factors at their centre."""
+    corner = study.centre.copy()
+    for _, clearances in _running(study, corner, heat):
+        for running in clearances.values():
+            if (place := _place(study, running.key)) is not None:
+                corner[place] = _ends(study, place)[0]
+    return corner
+
+
+def _hear_of_corner(
+    study: Study, balance: Balances, corner: Array, heat: dict[str, list[Temperatures]], hotter: dict[str, float]
+) -> None:
+    """Add to ``heat`` the temperatures of the corner (k,) where few kelvin are left, or to ``hotter`` where it has none."""
+    ends = _endangered(study, corner, heat)
+    for name, outcome in _balanced(study, balance, corner, list(ends), "the least clearances").items():
+        if isinstance(outcome, Temperatures):
+            heat[name].append(outcome)
+        else:
+            lost = ends[name]
+            hotter[lost.key] = max(hotter.get(lost.key, 0.0), lost.kelvins_left - NEARLY_K + HOTTER_K)
+
+
+def _endangered(study: Study, point: Array, heat: Heat) -> dict[str, RunningClearance]:
+    """By point of the duty with a heat balance, the clearance of a drawing (k,) that the fewest kelvin close; of few enough alone."""
+    least: dict[str, RunningClearance] = {}
+    for name, clearances in _running(study, point, heat):
+        for running in clearances.values() if heat else ():
+            if running.kelvins_left < min(FEW_K, least[name].kelvins_left if name in least else FEW_K):
+                least[name] = running
+    return least
+
+
+def _balanced(
+    study: Study, balance: Balances, point: Array, names: Sequence[str], words: str
+) -> dict[str, Temperatures | str]:
+    """Temperatures of a drawing (k,) at these points of the duty by short runs, or why it has none; those undecided are left out."""
+    if not names:
+        return {}
+    found: dict[str, Temperatures | str] = {}
+    try:
+        scenes = _scenes(study, point, BALANCE)
+    except InputError as error:
+        return dict.fromkeys(names, str(error))
+    labels = [f"{words}{f' at {name}' if name else ''}" for name in names]
+    for name, result in zip(names, balance([scenes[name] for name in names], labels), strict=True):
+        if isinstance(result, SimulationResult):
+            nodes = result.temperatures_C or {}
+            found[name] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
+        elif not result.cause.startswith("undecided"):
+            found[name] = result.cause
+    return found
 
 
 def _has_mounting(study: Study) -> bool:
@@ -202,34 +273,40 @@ def _low_mm(study: Study, taken: Taken) -> float:
     return 1e3 * taken.running.play.drawn if place is None else _ends(study, place)[0]
 
 
-def _differs(before: Study, after: Study, key: str) -> bool:
-    place = _place(before, key)
-    return place is not None and _ends(before, place) != _ends(after, place)
+def _scenes(
+    study: Study, point: Array, overrides: Sequence[str] = (), kind: type[Scene] = Scene
+) -> Mapping[str, Scene]:
+    """Scenes of a drawing (k,) by point of the duty. Raises InputError for an impossible one."""
+    data, seed = clearance.read_scene(study), study.file.design.seed
+    run = over_duty(
+        study, lambda sets: clearance.scene_at(study, data, point, seed, [*study.scene.set, *sets, *overrides], kind)
+    )
+    return {"": run} if isinstance(run, Scene) else run.scenes
 
 
 def _running(study: Study, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
-    """Clearances in operation of a point (k,) of the design by point of the duty. Raises InputError for an impossible drawing."""
-    data = clearance.read_scene(study)
-    drawn = partial(clearance.scene_at, study, data, point, study.file.design.seed, kind=DrawnScene)
-    run = over_duty(study, lambda sets: drawn(overrides=[*study.scene.set, *sets]))
-    for place, scene in {"": run}.items() if isinstance(run, Scene) else run.scenes.items():
+    """Clearances in operation of a drawing (k,) by point of the duty, at each of the temperatures found there."""
+    for name, scene in _scenes(study, point, kind=DrawnScene).items():
         if (mounting := scene.mounting) is None:
             continue
-        if scene.thermal is not None:
-            mounting = mounting.model_copy(update=part_temperatures(scene.thermal, heat[place]))
-        yield place, scene.running_clearances(mounting)
+        if scene.thermal is None:
+            yield name, scene.running_clearances(mounting)
+            continue
+        for nodes in heat[name]:
+            hot = mounting.model_copy(update=part_temperatures(scene.thermal, nodes))
+            yield name, scene.running_clearances(hot)
 
 
-def _worst(study: Study, heat: Heat) -> dict[str, Taken]:
+def _worst(study: Study, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
     """The place that takes most of each clearance, by its key, over all points of the designs at all categories."""
     worst: dict[str, Taken] = {}
     for levels in study.every_level:
         variant = study.with_levels(levels)
         points = np.unique(actual_of(variant, design_of(variant)), axis=0)
         for point in points[:: -(-len(points) // MOST_POINTS)]:
-            for place, clearances in _running(variant, point, heat):
+            for name, clearances in _running(variant, point, heat):
                 for running in clearances.values():
-                    taken = Taken(running, place, _floor(study, running))
+                    taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
                     if running.key not in worst or taken.needed > worst[running.key].needed:
                         worst[running.key] = taken
     return worst
@@ -246,64 +323,47 @@ def _floor(study: Study, running: RunningClearance) -> float:
     return running.floor if drawn_mm > 0.0 else -math.inf
 
 
-def _heat(study: Study, balance: Balances) -> tuple[Heat | None, list[Note]]:
-    """Temperatures at the centre of the region by point of the duty, and where they are too high; None where they are not known.
+def _heat(study: Study, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note]]:
+    """Temperatures at the centre of the region by point of the duty, and where they are too high.
 
     Raises RunError where the bearing has no steady temperatures even with wider clearances.
     """
-    scenes, found = _central(study, 0.0), dict[str, Temperatures]()
+    scenes, heat, causes = (
+        _scenes(study, study.centre, kind=DrawnScene),
+        dict[str, list[Temperatures]](),
+        dict[str, str](),
+    )
     if all(scene.thermal is None for scene in scenes.values()):
         return {}, []
-    causes = dict[str, str]()
-    for wider in WIDER_K:
-        try:
-            rest = {place: scene for place, scene in _central(study, wider, BALANCE).items() if place not in found}
-        except InputError:
-            # Even cold parts touch; the last try raises.
-            if wider == WIDER_K[-1]:
-                raise
-            continue
-        labels = [f"heat balance{f' at {place}' if place else ''}" for place in rest]
-        for place, result in zip(rest, balance(list(rest.values()), labels), strict=True):
-            if result is None:
-                return None, []
-            if isinstance(result, Failure):
-                causes[place] = result.cause
+    for kelvins in WIDER_K:
+        rest = [name for name in scenes if name not in heat]
+        words = "the middle of the region" + (" with wider clearances" if kelvins else "")
+        found = _balanced(study, balance, _wider(study, scenes, kelvins), rest, words)
+        for name in rest:
+            outcome = found.get(name, "its temperatures are undecided")
+            if isinstance(outcome, Temperatures):
+                heat[name] = [outcome]
             else:
-                nodes = result.temperatures_C or {}
-                found[place] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
-        if len(found) == len(scenes):
-            return found, [note for place, scene in scenes.items() for note in _too_hot(scene, place, found[place])]
+                causes[name] = outcome
+        if len(heat) == len(scenes):
+            return heat, [note for name, scene in scenes.items() for note in _too_hot(scene, name, heat[name][0])]
     raise RunError(
         "; ".join(
-            f"the middle of the region has no steady temperatures{f' at {place}' if place else ''}: {cause}"
-            for place, cause in causes.items()
-            if place not in found
+            f"the middle of the region has no steady temperatures{f' at {name}' if name else ''}: {causes[name].rstrip('.')}"
+            for name in rest
         )
-        + ": no clearance changes that; more oil, a cooler inlet or less speed and load may"
+        + "; wider clearances do not change that: give more or cooler oil, or less speed and load"
     )
 
 
-def _central(study: Study, wider: float, overrides: Sequence[str] = ()) -> dict[str, Scene]:
-    """Scenes of the centre of the region by point of the duty, with clearances for parts ``wider`` kelvin apart."""
-    point, data, more = study.centre.copy(), clearance.read_scene(study), list[str]()
-    kind = DrawnScene if not overrides else Scene
-    if wider:
-        cold = next(iter(_central(study, 0.0).values()))
-        assert cold.mounting is not None
-        for running in cold.running_clearances(cold.mounting).values():
-            value, place = 1e3 * (running.play.drawn + wider * running.growth), _place(study, running.key)
-            if place is None:
-                more.append(f"{running.key}={value!r}")
-            else:
-                point[place] = value
-    run = over_duty(
-        study,
-        lambda sets: clearance.scene_at(
-            study, data, point, study.file.design.seed, [*study.scene.set, *sets, *overrides, *more], kind
-        ),
-    )
-    return {"": run} if isinstance(run, Scene) else dict(run.scenes)
+def _wider(study: Study, scenes: Mapping[str, Scene], kelvins: float) -> Array:
+    """The centre (k,) with clearances as much wider as that many kelvin between the parts would take."""
+    point = study.centre.copy()
+    for scene in scenes.values():
+        for running in scene.running_clearances(scene.mounting).values() if scene.mounting is not None else ():
+            if (place := _place(study, running.key)) is not None:
+                point[place] = study.centre[place] + 1e3 * kelvins * running.growth
+    return point
 
 
 def _too_hot(scene: Scene, place: str, nodes: Temperatures) -> Iterator[Note]:
@@ -343,21 +403,13 @@ def _moved(study: Study, short: Mapping[str, Taken], kept: float) -> Study:
     moved = replace(study, file=study.file.model_copy(update={"factor": factors}))
     try:
         for point in (moved.actual(np.full(len(factors), sign * reach)) for sign in (-1.0, 1.0)):
-            for _ in _running(moved, point, _Warm()):
-                pass
+            _scenes(moved, point, kind=DrawnScene)
     except InputError as error:
         why = "; ".join(f"{taken.at}{taken.causes}" for taken in short.values())
         raise InputError(
             [f"{study.path}: the region has to move ({why}), but there {fault}" for fault in error.faults]
         ) from None
     return moved
-
-
-class _Warm(dict[str, Temperatures]):
-    """The same temperatures anywhere, for drawings whose clearances do not matter."""
-
-    def __missing__(self, place: str) -> Temperatures:
-        return Temperatures(*[70.0] * len(Temperatures._fields))
 
 
 def _rounded(factor: Factor, low: float, high: float, reach: float) -> tuple[float, float]:
@@ -407,26 +459,33 @@ def clearances_seize(clearances: Mapping[str, RunningClearance], key: str) -> bo
     return any(running.seizes for running in clearances.values() if running.key == key)
 
 
-def _with_baseline(original: Study, moved: Study, heat: Heat) -> tuple[Study, list[Note]]:
+def _with_baseline(
+    original: Study, moved: Study, balance: Balances, heat: dict[str, list[Temperatures]]
+) -> tuple[Study, list[Note]]:
     """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
-    first = original.with_levels(())
+    first, point = original.with_levels(()), original.baseline
     seized = [
-        (place, running)
-        for place, clearances in _running(first, original.baseline, heat)
+        (running, name)
+        for name, clearances in _running(first, point, heat)
         for running in clearances.values()
         if running.seizes
     ]
-    baseline: dict[str, Any] = original.by_factor(original.baseline)
+    if not seized:
+        ends = _endangered(first, point, heat)
+        found = _balanced(first, balance, point, list(ends), "the original design")
+        seized = [(ends[name], name) for name, outcome in found.items() if not isinstance(outcome, Temperatures)]
+    baseline: dict[str, Any] = original.by_factor(point)
     notes = []
     if seized:
-        place, running = min(seized, key=lambda pair: pair[1].play.operating)
+        running, name = min(seized, key=lambda pair: pair[0].kelvins_left)
         words, _ = quantity(running.key.rpartition(".")[2])
+        left = f"{1e6 * running.play.operating:.0f} um{f' at {name}' if name else ''}"
+        heats = "" if running.seizes else ", which its own heat closes"
         baseline = moved.by_factor(moved.centre)
         notes.append(
             Note(
                 "seizure",
-                f"Seizure: {words} of the original design in operation {1e6 * running.play.operating:.0f} um"
-                f"{f' at {place}' if place else ''}; gains are over the middle of the region instead.",
+                f"Seizure: {words} of the original design in operation {left}{heats}; gains are over the middle of the region instead.",
             )
         )
     return replace(moved, file=moved.file.model_copy(update={"baseline": baseline})), notes

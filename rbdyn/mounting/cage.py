@@ -52,6 +52,11 @@ class RunningClearance(NamedTuple):
         return self.play.operating <= self.touching
 
     @property
+    def kelvins_left(self) -> float:
+        """Further difference of temperatures between the parts after which they touch [K]."""
+        return (self.play.operating - max(self.touching, 0.0)) / self.growth
+
+    @property
     def floor(self) -> float:
         """Clearance in operation below which it is nearly lost: parts `NEARLY_K` farther apart in temperature would touch [m]."""
         return max(self.touching, 0.0) + NEARLY_K * self.growth

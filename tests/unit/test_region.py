@@ -243,9 +243,9 @@ def test_unit_every_corner_at_every_point_of_the_duty_is_looked_at(tmp_path):
 HEATED = {"oil": 80.0, "outer": 90.0, "inner": 90.0, "rollers": 100.0}
 
 
-def heated_study(folder: Path, centre: float = 0.2) -> Study:
+def heated_study(folder: Path, centre: float = 0.2, step: float = 0.1) -> Study:
     """A study whose temperatures follow from the losses."""
-    study = hot_study(folder, centre)
+    study = hot_study(folder, centre, step)
     text = (folder / "scene.toml").read_text(encoding="utf-8")
     kept = [line for line in text.splitlines() if "temperature_C" not in line]
     kept.insert(kept.index("[lubricant]") + 1, "oil_flow_l_min = 1.0\noil_inlet_temperature_C = 60.0")
@@ -274,37 +274,61 @@ def heats(monkeypatch, seizing: float = 0.0, oil: float = 80.0) -> list[Scene]:
     return ran
 
 
-def test_a_heat_balance_is_made_once_and_resumed(tmp_path, monkeypatch):
-    """One short run at the centre gives the temperatures of all corners; a second look finds it in the store, and so does status."""
+def test_heat_balances_are_made_once_and_resumed(tmp_path, monkeypatch):
+    """A short run at the centre and one where the clearances of the moved region are least; a second look finds both in the store,
+    and so does status."""
     study, said = heated_study(tmp_path), list[str]()
     assert region_in_store(study, tmp_path) is study
     ran = heats(monkeypatch)
     region = region_that_runs(study, tmp_path, 1, notice=said.append)
-    assert len(ran) == 1 and ran[0].cage.guide_clearance_mm == 0.2 and ran[0].numerics.turns == 5.0
-    assert said[0] == "1 short heat balance of the middle of the region, for all its clearances" and said[1:] == list(
-        region.notes
-    )
+    assert ran[0].cage.guide_clearance_mm == 0.2 and ran[0].numerics.turns == 5.0
+    low = region.study.actual(-np.ones(2))
+    assert [ran[1].cage.guide_clearance_mm, ran[1].cage.pocket_clearance_mm] == pytest.approx(low)
+    assert len(ran) == 2, "the baseline, which is near its end, is the centre"
+    assert said[0] == "1 short run for the temperatures of the middle of the region"
+    assert said[3:] == list(region.notes)
     again = region_that_runs(study, tmp_path, 1)
-    assert len(ran) == 1 and again.study.file == region.study.file
+    assert len(ran) == 2 and again.study.file == region.study.file
     assert region_in_store(study, tmp_path).file == region.study.file
     record = CliRunner().invoke(app, ["status", str(study.path), "--out", str(tmp_path), "--json"])
     assert record.exit_code == 0, record.output
 
 
+def test_a_bearing_with_clearance_to_spare_is_balanced_once(tmp_path, monkeypatch):
+    """A metal cage that nothing closes: one short run, and the region stays."""
+    study = heated_study(tmp_path, centre=0.6)
+    ran = heats(monkeypatch)
+    region = region_that_runs(study, tmp_path, 1)
+    assert len(ran) == 1 and region.study is study and region.notes == ()
+
+
 def test_a_centre_that_seizes_is_balanced_with_wider_clearances(tmp_path, monkeypatch):
-    """Its heat is that of a cage which turns; where none does, one sentence says so and nothing else runs."""
+    """Its heat is that of a cage that turns; where none does, one sentence says so and nothing else runs."""
     study = heated_study(tmp_path, centre=0.11)
     ran = heats(monkeypatch, seizing=0.15)
     region = region_that_runs(study, tmp_path, 1)
-    assert [scene.cage.guide_clearance_mm > 0.15 for scene in ran] == [False, True]
+    assert [scene.cage.guide_clearance_mm > 0.15 for scene in ran] == [False, True, True]
     assert region.study.centre[0] > 0.2 and "heat takes" in region.notes[0]
+    assert region.study.baseline == pytest.approx(region.study.centre), "the original design seizes"
     (tmp_path / "never").mkdir()
     ran = heats(monkeypatch, seizing=9.0)
     with pytest.raises(
-        RunError, match=r"^the middle of the region has no steady temperatures: seizure: the cage seizes when hot"
+        RunError, match=r"^the middle of the region has no steady temperatures: seizure: the cage seizes when hot; "
     ):
         region_that_runs(study, tmp_path / "never", 1)
     assert len(ran) == 3
+
+
+def test_a_land_that_heats_itself_moves_the_region_on(tmp_path, monkeypatch):
+    """The centre leaves enough, but the least clearances seize by their own heat: the region moves until they run, and says why."""
+    ran = heats(monkeypatch, seizing=0.23)
+    region = region_that_runs(heated_study(tmp_path, centre=0.37, step=0.16), tmp_path, 1)
+    low = region.study.actual(-np.ones(2))[0]
+    assert 0.23 <= low < 0.27 and ran[-1].cage.guide_clearance_mm == pytest.approx(0.21)
+    (note,) = region.notes
+    assert (
+        note.startswith("The region of the guide clearance was narrowed from 0.210-0.530") and "and heat itself" in note
+    )
 
 
 def test_an_oil_too_hot_is_told_before_the_design_runs(tmp_path, monkeypatch):
