@@ -62,6 +62,7 @@ from doe.workflow.surfaces import PublishedComparison, compare_with_published, f
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
+from rbdyn.base.forecast import Notice
 from rbdyn.base.records import Record
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
@@ -353,9 +354,7 @@ def run_study(
     check_goals(study)
     if robust := robust or declares_unknowns(study):
         check_robust(study)
-    notice = None if agenda is None else agenda.notice
-    region = region_that_runs(study, folder, workers, scheduler, retry, progress, notice)
-    study = region.study
+    study, moves = region_that_runs(study, folder, workers, scheduler, retry, progress, clock.notice)
     reference = check_study(study, adaptive)
     clock.plan(study_stages(study, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
@@ -378,7 +377,7 @@ def run_study(
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
-    notes += [*region.notes, *augment_notes(study), *(reference.notes if reference else ())]
+    notes += [*moves, *augment_notes(study), *(reference.notes if reference else ())]
     step_failures = [failure for step in (searched, robustness) if step for failure in step.failures]
     return StudyResult(
         study=study,
@@ -469,6 +468,11 @@ class _Clock:
         self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
+
+    @property
+    def notice(self) -> Notice:
+        """Receiver of sentences to be said at once; None without an agenda."""
+        return None if self._agenda is None else self._agenda.notice
 
     def plan(self, stages: Sequence[Stage]) -> None:
         """Plan the stages to come in the agenda."""
