@@ -116,10 +116,12 @@ def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     return tables
 
 
-def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
-    """The study's scene at factor values, with a seed. Raises InputError for an impossible value."""
+def scene_at(
+    study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str], kind: type[Scene] = Scene
+) -> Scene:
+    """The study's scene at factor values, with a seed, of this ``kind``. Raises InputError for an impossible value."""
     path = study.path_of(study.scene.file)
-    scene = Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
+    scene = kind.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
     keys = [factor.key for factor in study.file.factor]
     refuse(f"{study.path}: factor.key = {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, keys))
     return scene

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.command import ForceFile, Json, OutFile, flag, guarded, hand_out, plain_number, valued
+from rbdyn.base.command import ForceFile, Json, OutFile, flag, guarded, hand_out, notice, plain_number, valued
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
+    from doe.study_file import Study
     from rbdyn.scene import Scene
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
@@ -29,9 +31,12 @@ RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
 FACTOR = """[[factor]]
 name = "{name}"
 key = "{table}.{name}"
-centre = {centre} # as the scene has it
-step = {step:.6g} # {percent:g} % of it
+centre = {centre} # {source}
+step = {step:.6g} # {width}
 resolution = 0.001 # of the drawing
+"""
+BASELINE = """[baseline] # the original design, over which gains count
+{values}
 """
 TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
 """
@@ -46,13 +51,14 @@ Limits = dict[str, dict[str, float]]
 
 
 class Factor(NamedTuple):
-    """A clearance that a study varies: name, table of the scene, value [mm], step [mm] and its share of the value."""
+    """A clearance that a study varies: name, table of the scene, value and step [mm], and where these two come from."""
 
     name: str
     table: str
     centre: float
     step: float
-    share: float
+    source: str
+    width: str
 
 
 def new(
@@ -88,23 +94,35 @@ def new(
         from doe.study_file import Study
         from doe.study_file.study import StudyFile
         from doe.workflow.front import check_goals
+        from doe.workflow.region import region_that_runs
         from doe.workflow.whole import check_study
         from rbdyn.base.command import fill_template
         from rbdyn.base.faults import read_toml, validated
-        from rbdyn.scene import Scene, rollers_only
+        from rbdyn.scene import DrawnScene, rollers_only
 
         bounds = limits_of(limit or [])
-        scene = rollers_only(Scene.load(path))
+        scene = rollers_only(DrawnScene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
-        sections = _sections(scene, read_toml(path), tolerances, chains)
-        sections |= {"responses": _responses(bounds), "duty": _duty(duty, scene)}
-        for name, section in sections.items():
-            template = template.replace(f"{{{name}}}", section)
+        sections = {"responses": _responses(bounds), "duty": _duty(duty, scene), "baseline": ""}
+        factors = _factors(read_toml(path))
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
-        text = fill_template(template, {"quoted": json.dumps(str(base))})
-        study = Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
+
+        def written(factors: list[Factor]) -> tuple[str, Study]:
+            text = template
+            for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
+                text = text.replace(f"{{{name}}}", section)
+            text = fill_template(text, {"quoted": json.dumps(str(base))})
+            return text, Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
+
+        text, study = written(factors)
         check_goals(study)
+        with tempfile.TemporaryDirectory() as folder:
+            moved = region_that_runs(study, Path(folder), notice=notice(False), kept=1.0).study
+        if moved is not study:
+            if (moved.baseline != moved.centre).any():
+                sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))
+            text, study = written(_moved(factors, study, moved))
         check_study(study)
         hand_out(text, as_json, out, force, "doe study", [path, *([duty] if duty else [])])
 
@@ -159,9 +177,8 @@ def _response(name: str, limits: Mapping[str, float]) -> str:
     return "\n".join(["[[response]]", f'name = "{name}"', *bounds, 'model = "quadratic"', goal, ""])
 
 
-def _sections(scene: "Scene", data: dict[str, Any], tolerances: bool, chains: bool) -> dict[str, str]:
+def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: bool) -> dict[str, str]:
     """Factors of the study, and what it says of their parts."""
-    factors = _factors(data)
     if not tolerances and not chains:
         return {"factors": "\n".join(map(_factor_text, factors)), "parts": HINT}
     from doe.commands.new_parts import chain_text, manufacture_of, tolerances_text
@@ -191,7 +208,7 @@ def _duty(path: Path | None, scene: "Scene") -> str:
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:
-    text = FACTOR.format(**factor._asdict(), percent=100.0 * factor.share)
+    text = FACTOR.format(**factor._asdict())
     return (
         text
         if manufacture is None
@@ -208,5 +225,19 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
         if centre is None or (landless and name == "guide_clearance_mm"):
             continue
         step = max(round(share * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
-        factors.append(Factor(name, table, float(centre), step, share))
+        factors.append(Factor(name, table, float(centre), step, "as the scene has it", f"{100.0 * share:g} % of it"))
     return factors
+
+
+def _moved(factors: list[Factor], before: "Study", after: "Study") -> list[Factor]:
+    """The factors with the region of the study ``after`` it moved."""
+    moved = []
+    for factor, old, new in zip(factors, before.file.factor, after.file.factor, strict=True):
+        source = f"the scene has {factor.centre:g}: moved to where the bearing runs"
+        changed = factor._replace(centre=new.centre, step=new.step, source=source)
+        moved.append(factor if new == old else changed)
+    return moved
+
+
+def _assigned(values: Mapping[str, float]) -> list[str]:
+    return [f"{name} = {value!r}" for name, value in values.items()]

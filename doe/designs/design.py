@@ -31,7 +31,8 @@ class Design:
     """Runs of a design in the order of execution.
 
     ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind`` (n,): kind of
-    each point, "cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given" or "centre". ``order`` (n,): place
+    each point, "cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given", "centre" or "added" in place of a
+    failed run. ``order`` (n,): place
     of each run in the standard order, which identifies the run in any order. ``region``: where the design is to predict, a
     ball through its outermost points or a box. ``reach``: half-range of every factor in coded units.
     """

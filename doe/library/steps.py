@@ -63,6 +63,7 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     from doe.report.identity import study_identity
     from doe.report.sections.design import design_record, design_tables
     from doe.study_file import Study
+    from doe.workflow.region import region_that_runs
     from doe.workflow.runs import augment_notes, design_of, evaluation
     from doe.workflow.whole import check_study
 
@@ -70,11 +71,15 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     with step_folder(folder, "design", ("design",), force) as output:
         study = Study.load(path)
         # Without a scene the runs are made elsewhere, and only the design itself is checked.
+        notes: Notes = ()
         if study.file.scene and study.path_of(study.scene.file).exists():
+            with Effort().folder(folder) as store:
+                study, notes = region_that_runs(study, store)
             check_study(study)
         points = design_of(study)
+        notes += augment_notes(study)
         output.claim(path)
-        record = design_record(study, points, evaluation(study, points)) | notes_record(augment_notes(study))
+        record = design_record(study, points, evaluation(study, points)) | notes_record(notes)
         answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
         return replace(answer, files=saved(output, "design.json", answer, partial(design_tables, record)))
 
@@ -171,7 +176,7 @@ def fit(
         study, notes = _study_or_table(study_path, table, factors, responses, model)
         output.claim(study.path, *_read_later(study, table))
         stack.enter_context(registered(study.path, folder))
-        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces) | notes_record((*reading, *notes, *unrivalled(surfaces)))
         columns = (
@@ -222,21 +227,27 @@ def _read_later(study: "Study", data: Path | None) -> list[Path]:
     return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]
 
 
-def _surfaces(study: "Study", data: Path | None, out: Path | None, effort: Effort) -> "tuple[list[Surface], Notes]":
-    """Surfaces of a study, of a table or of simulated runs, and notes on the table.
+def _surfaces(
+    study: "Study", data: Path | None, out: Path | None, effort: Effort
+) -> "tuple[Study, list[Surface], Notes]":
+    """The study with its region, surfaces of it, of a table or of simulated runs, and notes on both.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
-    from doe.workflow.runs import read_runs, run_design
+    from doe.workflow.region import region_that_runs
+    from doe.workflow.runs import read_runs, run_design, with_remaining
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
         runs = read_runs(study, data)
-        return fit_surfaces(study, runs), runs.notes
+        return study, fit_surfaces(study, runs), runs.notes
     with effort.folder(out) as folder:
+        study, notes = region_that_runs(
+            study, folder, effort.workers, effort.scheduler, effort.retry, effort.progress, effort.notice
+        )
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
-        return fit_surfaces(study, runs), ()
+        return with_remaining(study, runs), fit_surfaces(study, runs), notes
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -317,7 +328,7 @@ def front(
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
         output.claim(path, *_read_later(study, table))
-        surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
         if pareto.violations is not None:
             raise out_of_reach(study, pareto.points[0], pareto.violations)

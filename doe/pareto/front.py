@@ -23,12 +23,14 @@ from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import (
     Archive,
+    Barred,
     Doubt,
     InfeasibleError,
     Judge,
     Judged,
     Objectives,
     Search,
+    barring,
     check_search,
     dominates,
     growth,
@@ -183,6 +185,7 @@ def front(
     pick: Rule = "knee",
     doubt: Doubt | None = None,
     closest: bool = False,
+    barred: Barred | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -196,6 +199,7 @@ def front(
     pick : rule of the pick.
     doubt : maps points (n, k) to the errors of their responses downwards and upwards (n, m), within which limits must hold.
     closest : where no evaluated point keeps all limits, return the closest one as the front.
+    barred : maps points (n, k) to how far they lie beyond where the search may go (n,), at most 0 within.
 
     Raises MethodError when the bounds are no box, a setting is out of range, or an objective is not finite; InfeasibleError
     when no evaluated point keeps all limits, unless the ``closest`` is asked for.
@@ -206,7 +210,7 @@ def front(
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    judge = partial(_judged, objectives, goals, doubt)
+    judge = barring(partial(_judged, objectives, goals, doubt), barred)
     searched, violations = _searched(judge, low, high, population, generations, seed, closest)
     points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
@@ -233,7 +237,7 @@ def front(
         generations=generations,
         seed=seed,
         goals=goals,
-        violations=violations,
+        violations=None if violations is None else violations[: len(goals.limited)],
     )
 
 

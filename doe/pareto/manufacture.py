@@ -28,7 +28,7 @@ from scipy import special
 from scipy.stats import norm, qmc
 
 from doe.pareto.goals import NAMES, Goals, Rule, thinning
-from doe.pareto.search import Archive, Doubt, Judged, check_search, dominates, hypervolume, search
+from doe.pareto.search import Archive, Barred, Doubt, Judged, barring, check_search, dominates, hypervolume, search
 from rbdyn.base.arrays import Array
 
 EXACT_FACTORS = (
@@ -299,6 +299,7 @@ def tolerance_aware_front(
     keep: int = 200,
     pick: Rule = "knee",
     doubt: Doubt | None = None,
+    barred: Barred | None = None,
 ) -> ToleranceAware:
     """NSGA-II on robust costs, and the comparison with the plain front; the same seed gives the same bits.
 
@@ -309,14 +310,14 @@ def tolerance_aware_front(
     baseline : coded point (k,) to improve on. If robust costs of any point dominate its nominal costs, picks are among such
         points, else among those that dominate its robust costs.
     plain, plain_pick : coded points and costs of the plain front, and the row of its pick.
-    population, generations, seed, keep, pick, doubt : as for `doe.pareto.front`, of coded points.
+    population, generations, seed, keep, pick, doubt, barred : as for `doe.pareto.front`, of coded points.
 
     Raises ValueError when a tolerance exceeds the region; InfeasibleError when no point keeps all limits.
     """
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)
     judge = partial(box.judge, surfaces, goals)
-    history = search(partial(judge, doubt=doubt), low, high, population, generations, seed).archives
+    history = search(barring(partial(judge, doubt=doubt), barred), low, high, population, generations, seed).archives
     points, costs = history[-1]
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]

@@ -193,6 +193,22 @@ class Judged(NamedTuple):
     violations: Array
 
 
+# How far points (n, k) lie beyond where anything may be sought (n,); at most 0 within.
+Barred = Callable[[Array], Array]
+
+
+def barring(judge: "Judge", barred: Barred | None) -> "Judge":
+    """The judge for which what is ``barred`` is one more limit, the last."""
+    if barred is None:
+        return judge
+
+    def judged(points: Array) -> Judged:
+        costs, violations = judge(points)
+        return Judged(costs, np.column_stack([violations, barred(points).clip(0.0)]))
+
+    return judged
+
+
 Judge = Callable[[Array], Judged]
 History = list[tuple[Array, Judged]]  # points of each generation, with their costs and violations
 

@@ -6,7 +6,7 @@ A study can also be made from a table alone, of which some columns are factors a
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
+from doe.designs.remaining import Remaining
 from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
 from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Robust, StudyChain, Tolerances
 from doe.study_file.table import COUNT, LABELS, table_of
@@ -262,6 +263,8 @@ class Study:
     file: StudyFile
     levels: tuple[int, ...] = ()
     """Places of the values of its categories; by default the first of each, which are those of the baseline."""
+    remaining: Remaining | None = field(default=None, compare=False)
+    """What remains of the region where runs failed; None while none has."""
 
     def __post_init__(self) -> None:
         """Put a response for each limit at a point of the duty in the place of the limits of its figure."""

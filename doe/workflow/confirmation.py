@@ -134,6 +134,10 @@ class Gain(Record):
         return self.error * float(times_wider(self.freedom, count))
 
 
+class LostPickError(RunError):
+    """The pick could not be simulated."""
+
+
 def simulate_original(study: Study, simulations: Simulations) -> Confirmed:
     """The original design, simulated with fresh seeds. Raises RunError where it fails, InputError, KeyboardInterrupt."""
     run = clearance.confirmation_run(study.with_levels(()), study.baseline)
@@ -149,7 +153,7 @@ def confirm(
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
     """Simulate the choices with fresh seeds. Returns the simulated points, the ``baseline`` first, and the failures.
 
-    Raises RunError where the pick cannot be simulated, InputError, KeyboardInterrupt.
+    Raises LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
     runs = [clearance.confirmation_run(study, choice.point) for choice in choices.values()]
     results = simulations.run(runs, list(choices), simulations.progress("confirmation"))
@@ -158,7 +162,7 @@ def confirm(
         if not isinstance(result, Failure):
             confirmed[name] = confirmed_from(study, choice, result)
         elif name == "pick":
-            raise RunError(f"confirmation of the {result}")
+            raise LostPickError(f"confirmation of the {result}")
         else:
             failures.append(result)
     return confirmed, failures

@@ -62,7 +62,7 @@ def find_front(
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
-    doubt = SurfaceDoubt(study, surfaces, simulated)
+    doubt, remaining = SurfaceDoubt(study, surfaces, simulated), study.remaining
 
     def plain(errors: Doubt, closest: bool = False) -> ParetoFront:
         return front(
@@ -74,6 +74,7 @@ def find_front(
             **settings.model_dump(include=SEARCH),
             doubt=lambda points: errors(study.coded(points)),
             closest=closest,
+            barred=None if remaining is None else lambda points: remaining.excess(study.coded(points)),
         )
 
     with named_faults(study, goals, lambda point: point, ""):
@@ -164,6 +165,7 @@ def _tolerance_aware(
         plain=Archive(study.coded(pareto.points), pareto.costs),
         plain_pick=pareto.pick,
         doubt=doubt,
+        barred=None if study.remaining is None else study.remaining.excess,
         **study.file.front.model_dump(include=SEARCH),
     )
 
@@ -205,7 +207,8 @@ def tolerances_out_of_reach(study: Study, violations: Array) -> str:
 
 def excess_words(study: Study, violations: Array) -> str:
     """'impact_force_N <= 40 by 3.2' of the limits that are exceeded, by their excess (c,)."""
-    by_limit = zip(goals_of(study).limited, violations.tolist(), strict=True)
+    # Where runs failed, the last of the violations is that of no limit.
+    by_limit = zip(goals_of(study).limited, violations.tolist(), strict=False)
     return " and ".join(
         f"{study.responses[index]} {sense} {limit:g} by {violation:.4g}"
         for (index, sense, limit), violation in by_limit

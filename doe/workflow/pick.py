@@ -6,7 +6,7 @@ baseline in every response with a goal, whichever gains the widest tolerances ke
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.designs.remaining import Remaining
 from doe.pareto import ParetoFront
 from doe.pareto.front import pick_shares
 from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware
@@ -27,6 +28,7 @@ from doe.workflow.confirmation import (
     Choice,
     Confirmed,
     Limit,
+    LostPickError,
     confirm,
     confirmed_from,
     error_of_difference,
@@ -171,6 +173,10 @@ def _levels(confirmed: Confirmed, count: int, random: np.random.Generator) -> Ar
     return np.asarray(confirmed.values + confirmed.standard_error * student)
 
 
+# Picks that cannot be simulated, after which the study ends.
+LOST = 3
+
+
 @dataclass(frozen=True, eq=False)
 class Selection:
     """The front with the pick, the pick of the searched front (None without a search), simulated points, and failures.
@@ -200,14 +206,23 @@ def choose(
     simulated so far. If no point keeps all limits, the best of them is the pick. Raises RunError, InputError, KeyboardInterrupt.
     """
     trials: list[tuple[Confirmed, ParetoFront, SearchedPick | None]] = []
-    front = surface_front
+    front, lost = surface_front, 0
     while True:
         simulated = [baseline, *(point for point, _, _ in trials)] if trials else []
         candidate = None if searched is None else searched_pick(study, surfaces, searched, simulated, len(trials))
         points = choices(study, front, searched, candidate)
         if any(np.array_equal(points["pick"].point, point.point) for point, _, _ in trials):
             break
-        confirmed, _ = confirm(study, baseline, {"pick": points["pick"]}, simulations)
+        try:
+            confirmed, _ = confirm(study, baseline, {"pick": points["pick"]}, simulations)
+        except LostPickError:
+            # Its run failed like those of the design: the front stays away from there.
+            lost += 1
+            if searched is not None or lost > LOST:
+                raise
+            study = _without(study, surfaces, points["pick"].point)
+            front = find_front(study, surfaces, simulated, len(trials))
+            continue
         trials.append((confirmed["pick"], front, candidate))
         limits_kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
         if limits_kept or len(trials) == study.file.confirmation.tries:
@@ -239,6 +254,13 @@ def _promises_less(study: Study, front: ParetoFront, simulated: Sequence[Confirm
         for point in simulated
     )
     return bool((front.violations / bounds).max() < missed)
+
+
+def _without(study: Study, surfaces: Sequence[Surface], point: Array) -> Study:
+    """The study without the part of its region where a point (k,) failed."""
+    remaining = study.remaining or Remaining(surfaces[0].data.points, np.empty((0, point.size)))
+    failed = np.vstack([remaining.failed, study.coded(point)])
+    return replace(study, remaining=replace(remaining, failed=failed))
 
 
 def _badness(limits: Sequence[Limit]) -> tuple[int, float]:

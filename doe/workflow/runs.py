@@ -12,9 +12,10 @@ import numpy as np
 
 from doe import clearance, designs
 from doe.designs import Design
-from doe.designs.design import replicate_groups
-from doe.designs.model import Model, Terms, model_terms
-from doe.duty import Run
+from doe.designs.design import SAME_POINT, replicate_groups
+from doe.designs.model import Model, Terms, lattice, lost_terms, model_terms
+from doe.designs.remaining import Remaining, added_points
+from doe.duty import DutyResult, Run
 from doe.running.runner import AgendaKeeper, Progress
 from doe.running.store import Failure, Store, alike, sentence
 from doe.study_file import Study
@@ -27,6 +28,7 @@ from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import are, counted
+from rbdyn.result import SimulationResult
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
 MAKERS: dict[str, Callable[..., Design]] = {
@@ -38,6 +40,8 @@ SEEDED = {"latin_hypercube", "sobol", *OPTIMAL}
 FARTHEST = 4.0
 # Most whole numbers of a factor from which an optimal design chooses; evenly spread if there are more.
 MOST_LEVELS = 41
+# Times that failed runs are replaced: the last ones may fail too.
+REPLACED = 3
 RUNS_TABLE = "design_runs.csv"  # of a study, in its folder
 Values = tuple[float, ...]
 
@@ -70,11 +74,15 @@ def design_of(study: Study) -> Design:
         design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), basis)
     except MethodError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
-    whole = np.array([factor.whole for factor in study.file.factor])
-    reach = design.reach * study.step
-    rounded = _whole(study.actual(design.coded), study.centre, study.centre - reach, study.centre + reach)
-    design = replace(design, coded=np.where(whole, study.coded(rounded), design.coded))
+    design = replace(design, coded=_realised(study, design.coded, design.reach))
     return _without_inactive(design, list(study.inactive)) if study.inactive else design
+
+
+def _realised(study: Study, coded: Array, reach: float) -> Array:
+    """Coded points (n, k) with whole numbers rounded."""
+    whole, half = np.array([factor.whole for factor in study.file.factor]), reach * study.step
+    rounded = _whole(study.actual(coded), study.centre, study.centre - half, study.centre + half)
+    return np.where(whole, study.coded(rounded), coded)
 
 
 def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
@@ -103,9 +111,14 @@ def _design(text: str, factors: int, basis: OptimalBasis | None) -> Design:
     return design.by_blocks(settings.seed if settings.order == "random" else None)
 
 
+def _all_terms(study: Study) -> Terms:
+    """Terms of all response models together."""
+    return tuple(dict.fromkeys(term for response in study.file.response for term in terms_of(study, response.model)))
+
+
 def _optimal_basis(study: Study) -> OptimalBasis:
     """The basis of an optimal design. Raises InputError for a table with impossible runs."""
-    terms = tuple(dict.fromkeys(term for response in study.file.response for term in terms_of(study, response.model)))
+    terms = _all_terms(study)
     earlier_points, block = np.empty((0, 1)), np.empty(0, np.int64)
     if (name := study.file.design.augment) is not None:
         table = _table(study, name)
@@ -178,8 +191,6 @@ def beyond_runs(study: Study, coded: Array) -> bool:
 
 def check_runs(study: Study, design: Design) -> None:
     """Raises InputError with every response whose model needs more or other runs."""
-    from doe.designs.model import lost_terms
-
     runs = len(design.coded)
 
     def inseparable_terms(model: Model) -> list[str]:
@@ -242,7 +253,8 @@ class Runs:
     ``notes``: distinct warnings of the simulations, or how a table was read; its responses without a value are NaN. ``replicates``, (n,) or (n, m), count the independent
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
     ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs. ``at_points``: by
-    point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty.
+    point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty. ``design``: of
+    simulated runs, with those added in place of failed ones.
     """
 
     coded: Array
@@ -255,6 +267,7 @@ class Runs:
     failures: tuple[Failure, ...] = ()
     turns: float = 0.0
     at_points: Mapping[str, "Runs"] = field(default_factory=dict)
+    design: Design | None = None
 
     @property
     def places(self) -> list[int]:
@@ -311,27 +324,41 @@ def run_design(
 
 
 def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, progress: Progress) -> Runs:
-    """The same for checked runs."""
-    design, coded, actual = ordered.design, ordered.design.coded, ordered.actual
+    """The same for checked runs; runs that failed are replaced by others where the models need them."""
     results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
+    planned = len(results)
+    for _ in range(REPLACED):
+        if (more := _with_replacements(study, ordered, results)) is None:
+            break
+        ordered = more
+        results = replace(simulations, retry=False).run(ordered.scenes, ordered.labels, progress, ordered.factors)
+    design, coded, actual = ordered.design, ordered.design.coded, ordered.actual
     failures = tuple(result for result in results if isinstance(result, Failure))
     rows = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
-    # A run for each term, for each block beyond the first, and one to judge the fit.
-    needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
-    if failures and len(rows) < needed:
-        raise RunError(
-            f"only {len(rows)} of {len(results)} design runs succeeded, but the response models need {needed}: "
-            f"{sentence(failures)}"
-        )
+    if failures and (lacking := _lacking(study, design, rows)):
+        raise RunError(f"only {len(rows)} of {len(results)} design runs succeeded{lacking}: {sentence(failures)}")
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _distinct_notes([result.notes for result in sound])
     if failures:
-        lost = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
-        notes.append(Note("lost-runs", lost))
+        added = len(results) - planned
+        instead = (
+            f" {counted(added, 'other run')} in the rest of the region {are(added)} in their place." if added else ""
+        )
+        left_out = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
+        notes.insert(0, Note("lost-runs", f"{left_out}{instead} Front and pick stay where the nearest run went well."))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
     runs = Runs(
-        coded[rows], actual[rows], values, errors, tuple(notes), independent, block, failures, turns=simulations.turns
+        coded[rows],
+        actual[rows],
+        values,
+        errors,
+        tuple(notes),
+        independent,
+        block,
+        failures,
+        turns=simulations.turns,
+        design=design,
     )
     at_points = {}
     for name in study.shares:
@@ -339,6 +366,62 @@ def runs_of(study: Study, ordered: RunPlan, simulations: clearance.Simulations, 
         values, errors, independent = clearance.figures(columns, sound)
         at_points[name] = replace(runs, values=values, errors=errors, replicates=independent)
     return replace(runs, at_points=at_points)
+
+
+def _lacking(study: Study, design: Design, rows: list[int]) -> str:
+    """What the models lack if only these runs of the design went well, to end a sentence; empty where they lack nothing."""
+    # A run for each term, for each block beyond the first, and one to judge the fit.
+    needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
+    if len(rows) < needed:
+        return f", but the response models need {needed}"
+    terms = _all_terms(study)
+    lost = lost_terms(design.coded[rows], terms, design.block[rows])
+    return f", which cannot separate {', '.join(lost)} from the other terms of the response models" if lost else ""
+
+
+def _with_replacements(
+    study: Study, ordered: RunPlan, results: Sequence[SimulationResult | DutyResult | Failure]
+) -> RunPlan | None:
+    """The plan with another run for each that failed, in what remains of the region; None where the models need none, or none is left."""
+    failed = np.array([isinstance(result, Failure) for result in results])
+    design, rows = ordered.design, np.flatnonzero(~failed)
+    if not failed.any() or not rows.size or not _lacking(study, design, rows.tolist()):
+        return None
+    remaining = Remaining(design.coded[rows], design.coded[failed])
+    places = lattice(len(study.factors), design.reach)
+    places[:, list(study.inactive)] = 0.0
+    if design.region == "ball":
+        places = places[np.linalg.norm(places, axis=1) <= design.extent + SAME_POINT]
+    candidates = _realised(study, places[remaining.excess(places) < -SAME_POINT], design.reach)
+    if not len(candidates):
+        return None
+    lacking = len(design.coded) - len(rows) - design.kind.count("added")
+    coded = added_points(design.coded[rows], candidates, _all_terms(study), max(int(lacking), 1))
+    count, first = len(coded), len(design.coded)
+    order = np.arange(first, first + count)
+    longer = replace(
+        design,
+        coded=np.vstack([design.coded, coded]),
+        block=np.concatenate([design.block, np.full(count, design.block[-1])]),
+        kind=(*design.kind, *["added"] * count),
+        order=np.concatenate([design.order, order]),
+    )
+    actual = study.actual(coded)
+    return RunPlan(
+        longer,
+        np.vstack([ordered.actual, actual]),
+        [*ordered.scenes, *clearance.design_scenes(study, actual, order.tolist())],
+        [*ordered.labels, *(f"design run {first + number}" for number in range(1, count + 1))],
+        [*ordered.factors, *map(study.by_factor, actual)],
+    )
+
+
+def with_remaining(study: Study, runs: Runs) -> Study:
+    """The study with what remains of its region where runs failed."""
+    if not runs.failures:
+        return study
+    failed = [[failure.factors[name] for name in study.factors] for failure in runs.failures]
+    return replace(study, remaining=Remaining(runs.coded, study.coded(np.array(failed))))
 
 
 def _distinct_notes(notes: Sequence[Notes]) -> list[Note]:

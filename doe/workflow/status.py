@@ -20,6 +20,7 @@ from doe.running.runner import ANSWER, Agenda, Stage, agendas_of
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file import Study
 from doe.study_file.sections import Front
+from doe.workflow.region import region_in_store
 from doe.workflow.runs import STORE, design_of, ordered_runs
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
@@ -194,7 +195,8 @@ class Content:
 
 def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status`` for a study. It only reads, even while the study runs. Raises InputError."""
-    ordered = ordered_runs(study)
+    region = region_in_store(study, folder)
+    ordered = ordered_runs(region)
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     content = Content.of(folder, points)
     agenda = content.agenda
@@ -203,12 +205,12 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     answered = bool(finished_record(folder, inputs_digest(study, **options))) if agenda else _has_answer(study, folder)
     if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
         # The study as it is now has no agenda.
-        agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
+        agenda = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(region, **options))
     for stage in agenda.stages:
         if stage.name == DESIGN:
             # Whichever process ran them.
             stage.finished_runs = max(stage.finished_runs, len(content.outcomes))
-    keys = {key for key, _ in design_works(study)}
+    keys = {key for key, _ in design_works(region)}
     failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
     running = [run for run in content.running if run.key in keys]
     counts = {

@@ -49,15 +49,27 @@ from doe.workflow.front import OutOfReachError, check_goals, find_front, known_t
 from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
 from doe.workflow.parts import grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
+from doe.workflow.region import region_that_runs
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge
-from doe.workflow.runs import STORE, Runs, augment_notes, check_runs, design_of, ordered_runs, region_of, run_design
+from doe.workflow.runs import (
+    STORE,
+    Runs,
+    augment_notes,
+    check_runs,
+    design_of,
+    ordered_runs,
+    region_of,
+    run_design,
+    with_remaining,
+)
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
@@ -392,6 +404,7 @@ def run_study(
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
     robust = robust or study.asks_robust
+    study, moves = region_that_runs(study, folder, workers, scheduler, retry, progress, clock.notice)
     reference = check_study(study, adaptive, robust)
     if agenda is not None:
         agenda.plan(study_stages(study, adaptive, robust), shorter_by(study, adaptive, robust), STEPS_S)
@@ -399,10 +412,10 @@ def run_study(
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
         original = simulate_original(study, simulations)
         clock.lap("baseline_s")
-        watched = first_look(study, folder, original, progress(DESIGN), None if agenda is None else agenda.notice)
+        watched = first_look(study, folder, original, progress(DESIGN), clock.notice)
         runs = run_design(study, folder, workers, watched, scheduler, retry, agenda)
         clock.lap("design_s", FRONT)
-        turns = runs.turns
+        study, turns = with_remaining(study, runs), runs.turns
         surfaces, surface_front = _surfaces_and_front(study, runs, clock)
         searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
         if searched is not None:
@@ -416,12 +429,12 @@ def run_study(
     tolerances = _tolerances(without_broken(study, confirmed["pick"]), surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
-    reference = reference and reference.only(runs.places)
-    notes += [*unsearched, *augment_notes(study), *(reference.notes if reference else ())]
+    reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
+    notes += [*moves, *unsearched, *augment_notes(study), *(reference.notes if reference else ())]
     return StudyResult(
         study=study,
         inputs=inputs,
-        design=design_of(study),
+        design=runs.design or design_of(study),
         runs=runs,
         surfaces=surfaces,
         front=with_survival(study, surfaces, selection.front, confirmed),
@@ -435,7 +448,7 @@ def run_study(
         gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
-        published_comparisons=[] if reference is None else compare_with_published(study, runs, reference),
+        published_comparisons=[] if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=tuple(
             failure for step in (runs, searched, robustness, selection) if step for failure in step.failures
@@ -477,7 +490,7 @@ def _with_its_categories(
     if searched.runs is not runs:
         surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
         surface_front = find_front(searched.study, surfaces)
-    return searched.study, searched.runs, surfaces, surface_front
+    return with_remaining(searched.study, searched.runs), searched.runs, surfaces, surface_front
 
 
 def _edge(
@@ -504,6 +517,11 @@ def _tolerances(
     return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
 
 
+def _compared(study: Study, runs: Runs, reference: Runs) -> list[PublishedComparison]:
+    """The runs beside those of the published table, which has no run added in place of a failed one."""
+    return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
+
+
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
     return {name: gains(study, confirmed["baseline"], point) for name, point in confirmed.items() if name != "baseline"}
 
@@ -515,6 +533,11 @@ class _Clock:
         self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
+
+    @property
+    def notice(self) -> Notice:
+        """Receiver of sentences to be said at once; None without an agenda."""
+        return None if self._agenda is None else self._agenda.notice
 
     def lap(self, name: str, next_stage: str = "") -> None:
         """The stage ``name`` ends here, and the ``next_stage`` of the agenda begins."""

@@ -72,6 +72,7 @@ CODES: dict[str, Code] = {
     "windows": Code(WARNING, "two results have figures over different windows"),
     "few-replicates": Code(NOTE, "so few replicates that only large differences are significant"),
     "tolerances": Code(WARNING, "no tolerances, or too fine ones, keep what the study asks"),
+    "region": Code(WARNING, "the region of the study moved to where its clearances in operation stay above their floors"),
     "lost-runs": Code(WARNING, "runs or input sets failed and are left out"),
     "inputs": Code(WARNING, "what is known of unknown inputs is doubtful, or keys of the study override it"),
     "emulator": Code(WARNING, "an emulator explains too little, or too few input sets stand behind a range"),

@@ -29,6 +29,39 @@ class OperatingClearance(NamedTuple):
         return self.drawn + self.fit + self.temperature + self.rotation
 
 
+# Temperature difference between two parts [K] that no drawing and no heat balance excludes: balances leave 5 K and more open, and
+# an inner ring that warms first is as much ahead of its housing for minutes. A clearance that it would use up is nearly lost.
+NEARLY_K = 5.0
+
+
+class RunningClearance(NamedTuple):
+    """A clearance in operation between two parts, and how little of it may be left, diametral [m].
+
+    ``key``: of its value on the drawing. ``touching``: at or below it the parts seize; minus infinity for one that may be a
+    preload. ``growth``: by which it would shrink, a kelvin of difference between its parts [m/K].
+    """
+
+    key: str
+    play: OperatingClearance
+    touching: float
+    growth: float
+
+    @property
+    def seizes(self) -> bool:
+        """Whether the parts seize."""
+        return self.play.operating <= self.touching
+
+    @property
+    def kelvins_left(self) -> float:
+        """Further difference of temperatures between the parts after which they touch [K]."""
+        return (self.play.operating - max(self.touching, 0.0)) / self.growth
+
+    @property
+    def floor(self) -> float:
+        """Clearance in operation below which it is nearly lost: parts `NEARLY_K` farther apart in temperature would touch [m]."""
+        return max(self.touching, 0.0) + NEARLY_K * self.growth
+
+
 class CageClearances(NamedTuple):
     """Clearances of a cage [m]: diametral in its guide (None where no ring guides it), in its pockets, at their lips.
 

@@ -58,7 +58,7 @@ from rbdyn.scene.thermal import FilmTemperatures, Thermal, film_temperatures, th
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 if TYPE_CHECKING:
-    from rbdyn.mounting.cage import CageClearances, OperatingClearance
+    from rbdyn.mounting.cage import CageClearances, OperatingClearance, RunningClearance
     from rbdyn.mounting.rings import MountedClearance
     from rbdyn.scene.geometry import Geometry
 
@@ -231,30 +231,58 @@ class Scene(SceneFile):
 
     def _seizures(self) -> Iterator[str]:
         """Faults of cage clearances that fits, temperature and rotation reduce to the floor of their film."""
-        cage, laws, clearances = self.cage, self.model, self.cage_clearances
-        if clearances is None:
+        if self.mounting is None or self.cage_clearances is None:
             return
-        lands = {"film": laws.land_film_floor_um, "dry": 0.0}
-        checks = [("pocket", clearances.pocket, laws.pocket_film_floor_um if laws.pocket_film else 0.0)]
-        checks = checks if laws.pocket == "contact" else []
-        if clearances.guide is not None and laws.guide_land in lands:
-            checks.append(("guide", clearances.guide, lands[laws.guide_land]))
-        for name, play, floor_um in checks:
-            operating_um = 1e6 * play.operating
-            if operating_um <= 2.0 * floor_um:
-                floor = f", not above twice model.{'land' if name == 'guide' else name}_film_floor_um = {floor_um:g}"
+        shift = self.cage_clearances.shift
+        for name, (key, play, touching, _) in self.running_clearances(self.mounting).items():
+            if play.operating > touching:
+                continue
+            if name == "lip":
                 yield (
-                    f"cage.{name}_clearance_mm = {getattr(cage, f'{name}_clearance_mm'):g}: fits {1e6 * play.fit:+.1f} um, "
-                    f"temperature {1e6 * play.temperature:+.1f} um and rotation {1e6 * play.rotation:+.1f} um leave "
-                    f"{operating_um:.1f} um{floor if floor_um else ''}: the cage seizes; widen it or check the temperatures of mounting"
+                    f"{key} = {1e3 * play.drawn:g}: the pocket circle grows {1e6 * shift:+.1f} um relative to the roller circle, but "
+                    f"the lips allow {0.5e6 * play.operating + abs(1e6 * shift):.1f} um; widen it or check the temperatures of mounting"
                 )
-        lip = clearances.lip
-        if laws.pocket == "contact" and lip is not None and 0.5 * lip.operating <= abs(clearances.shift):
-            yield (
-                f"cage.pocket_radial_clearance_mm = {1e3 * lip.drawn:g}: the pocket circle grows {1e6 * clearances.shift:+.1f} um "
-                f"relative to the roller circle, but the lips allow {0.5e6 * lip.operating:.1f} um; widen it or check the temperatures "
-                "of mounting"
+                continue
+            floor = (
+                f", not above twice model.{'land' if name == 'guide' else name}_film_floor_um = {0.5e6 * touching:g}"
             )
+            yield (
+                f"{key} = {1e3 * play.drawn:g}: fits {1e6 * play.fit:+.1f} um, temperature {1e6 * play.temperature:+.1f} um and "
+                f"rotation {1e6 * play.rotation:+.1f} um leave {1e6 * play.operating:.1f} um{floor if touching else ''}: the cage "
+                "seizes; widen it or check the temperatures of mounting"
+            )
+
+    def running_clearances(self, mounting: Mounting) -> "dict[str, RunningClearance]":
+        """Clearances in operation with another mounting, at the speeds of the scene, with how little of each may be left.
+
+        By name: "radial", "guide", "pocket", and under guidance by the rollers "lip": what the lips allow less what the circle of
+        pockets grows. Those between parts that the model's laws leave out are none.
+        """
+        from rbdyn.mounting.cage import OperatingClearance, RunningClearance
+
+        bearing, laws, cage = self.bearing, self.model, self._cage_clearances(mounting)
+        radial, pitch = self._mounted_clearance(mounting), bearing.pitch_diameter
+        rings, body, roller = (self.material(part).thermal_expansion for part in ("rings", "cage", "roller"))
+        play = OperatingClearance(
+            radial.initial, radial.inner_fit + radial.outer_fit, radial.temperature, radial.rotation
+        )
+        running = {"radial": RunningClearance("bearing.radial_clearance_mm", play, -math.inf, rings * pitch)}
+        lands = {"film": 2e-6 * laws.land_film_floor_um, "dry": 0.0}
+        if cage.guide is not None and laws.guide_land in lands:
+            growth = max(body, rings) * 1e-3 * self.land_diameter_mm
+            running["guide"] = RunningClearance("cage.guide_clearance_mm", cage.guide, lands[laws.guide_land], growth)
+        if laws.pocket == "contact":
+            film, growth = (
+                2e-6 * laws.pocket_film_floor_um * laws.pocket_film,
+                max(body, roller) * bearing.roller_diameter,
+            )
+            running["pocket"] = RunningClearance("cage.pocket_clearance_mm", cage.pocket, film, growth)
+            if cage.lip is not None:
+                allowed = cage.lip._replace(temperature=cage.lip.temperature - 2.0 * abs(cage.shift))
+                running["lip"] = RunningClearance(
+                    "cage.pocket_radial_clearance_mm", allowed, 0.0, max(body, rings) * pitch
+                )
+        return running
 
     def _overload_faults(self) -> Iterator[str]:
         """Fault of a load 5 F/Z (Stribeck) on one roller whose contact would be wider than its diameter."""
@@ -484,6 +512,13 @@ class Scene(SceneFile):
     def material(self, part: str) -> Material:
         """Material of 'roller', 'rings' or 'cage' in SI."""
         return material_of(getattr(self.materials, part))
+
+
+class DrawnScene(Scene):
+    """A scene as drawn, which may seize in operation: for looking at its clearances, not for runs."""
+
+    def _seizures(self) -> Iterator[str]:
+        return iter(())
 
 
 def scene_of(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> Scene | BallScene:

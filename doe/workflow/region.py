@@ -1,0 +1,491 @@
+"""The region of a study where its bearings run: clearances in operation at every point of the design and of the duty.
+
+A region that reaches below the floor of a clearance (``rbdyn.mounting.cage.RunningClearance.floor``) moves upward, and a sentence
+says so. The file of the study stays as it is; its runs, fits and picks have the region that runs.
+
+With stated temperatures nothing is simulated. With a heat balance short runs of the centre give the temperatures of all points. Where
+these leave few kelvin anywhere, the corner with the least clearances is balanced too, for a land or a pocket that closes heats
+itself: it takes more than at the centre, and may close altogether.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from doe import clearance
+from doe.clearance import Simulations, points_of
+from doe.duty import over_duty
+from doe.running.runner import Progress
+from doe.running.store import Failure, Store
+from doe.study_file import Study
+from doe.study_file.sections import Factor
+from doe.workflow.runs import STORE, actual_of, design_of
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import InputError, RunError, refuse
+from rbdyn.base.notes import Note
+from rbdyn.base.pace import Notice
+from rbdyn.base.words import counted, quantity
+from rbdyn.mounting.cage import NEARLY_K, RunningClearance
+from rbdyn.result import SimulationResult
+from rbdyn.scene import DrawnScene, Scene
+from rbdyn.scene.lubricant import HOTTEST_C
+from rbdyn.scene.thermal import Temperatures, ceilings, part_temperatures
+
+# Share of its width that a stated region keeps at least: it is narrowed that far, and moves beyond.
+KEPT = 0.5
+# Most points of a design whose clearances are looked at.
+MOST_POINTS = 200
+# A run that is long enough for temperatures within 1 K, and ceilings that judge later.
+BALANCE = (
+    "numerics.turns=5", "numerics.discard_turns=5", "numerics.replicates=2", "numerics.companion=false", "numerics.extend=false",
+    f"thermal.oil_ceiling_C={HOTTEST_C:g}", "thermal.cage_ceiling_C=1000",
+)  # fmt: skip
+# Wider clearances [K of difference between parts] with which the balance is tried where the centre itself seizes.
+WIDER_K = (0.0, 60.0, 120.0)
+# Difference of temperatures [K] by which a moved region stays above the floors: those at another centre differ a little.
+SPARE_K = 2.5
+# Share of all that is taken from which a cause is named.
+NAMED = 0.2
+# Difference of temperatures [K] between two parts that is left at a point of the duty, below which its least corner is balanced.
+FEW_K = 30.0
+# By how much more a region moves [K] where that corner seizes by its own heat.
+HOTTER_K = 10.0
+# Times that the region is looked at: it moves for its centre, then for its corner.
+MOST_LOOKS = 8
+
+# Results of short runs of scenes with these labels.
+Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[SimulationResult | Failure]]
+# Temperatures of the parts that were found, by point of the duty, "" without one.
+Heat = Mapping[str, Sequence[Temperatures]]
+
+
+class Region(NamedTuple):
+    """The study with the region in which its bearings run, and what was changed for it."""
+
+    study: Study
+    notes: tuple[Note, ...] = ()
+
+
+class Taken(NamedTuple):
+    """A clearance at the point of the design and of the duty (``place``) that takes most of it, and its floor [m].
+
+    ``hotter``: further difference of temperatures [K] that its own heat makes.
+    """
+
+    running: RunningClearance
+    place: str
+    floor: float
+    hotter: float = 0.0
+
+    @property
+    def needed(self) -> float:
+        """Least value of the drawing that leaves the floor [m]."""
+        play = self.running.play
+        return self.floor + play.drawn - play.operating + self.hotter * self.running.growth
+
+    @property
+    def target(self) -> float:
+        """Least value of the drawing that a moved region has [m]: the same with other temperatures is no reason to move again."""
+        return self.needed + SPARE_K * self.running.growth
+
+    @property
+    def at(self) -> str:
+        """The place in words, to begin a sentence's part."""
+        return f"at {self.place} " if self.place else ""
+
+    @property
+    def causes(self) -> str:
+        """What takes of it, in words."""
+        play = self.running.play
+        changes = {"fits": play.fit, "heat": play.temperature, "rotation": play.rotation}
+        taken = play.drawn - play.operating
+        names = [name for name, change in changes.items() if -change > NAMED * abs(taken)]
+        takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
+        rest = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
+        rest += " and heat itself until it closes" if self.hotter else ""
+        return (
+            f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {rest}" if taken > 0.0 and names else rest
+        )
+
+
+def region_that_runs(
+    study: Study,
+    folder: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Callable[[str], Progress] | None = None,
+    notice: Notice = None,
+    kept: float = KEPT,
+) -> Region:
+    """The region of a study that runs, with a heat balance from the store in ``folder`` or simulated there.
+
+    ``notice(sentence)`` hears of it at once. ``kept``: share of its width that a region keeps at least. Raises InputError for a
+    region that nothing can move, RunError where its centre has no steady temperatures.
+    """
+
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
+        if notice is not None:
+            notice(f"{counted(len(scenes), 'short run')} for the temperatures of {labels[0].partition(' at ')[0]}")
+        with Store(folder / STORE, study.path.stem) as store:
+            follow = _silent if progress is None else progress
+            simulations = Simulations(store, workers, scheduler, retry, follow)
+            return simulations.run(list(scenes), labels, follow("heat balance"))
+
+    region = moved_region(study, balance, kept)
+    if notice is not None:
+        for note in region.notes:
+            notice(note)
+    return region
+
+
+class _UnknownError(Exception):
+    """A run is not in the store."""
+
+
+def region_in_store(study: Study, folder: Path) -> Study:
+    """The study with the region that runs, if the runs in the store of ``folder`` tell; nothing is simulated."""
+
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
+        points = points_of(scenes, labels)
+        if not (folder / STORE).exists():
+            raise _UnknownError
+        with Store(folder / STORE, read_only=True) as store:
+            outcomes = store.outcomes(points, clearance.sound)
+        if any(point.key not in outcomes for point in points):
+            raise _UnknownError
+        found = [outcomes[point.key] for point in points]
+        return [outcome if isinstance(outcome, Failure) else SimulationResult.from_dict(outcome) for outcome in found]
+
+    try:
+        return moved_region(study, balance).study
+    except (_UnknownError, RunError):
+        return study
+
+
+def _silent(title: str) -> Progress:
+    return lambda done, total: None
+
+
+def moved_region(study: Study, balance: Balances, kept: float = KEPT) -> Region:
+    """The study with its region moved to where every clearance stays above its floor at every point of the duty."""
+    if not _has_mounting(study):
+        return Region(study)
+    original, (heat, notes) = study, _heat(study, balance)
+    stays = study.file.reference is not None or study.file.design.augment is not None
+    hotter, moves, seen = dict[str, float](), dict[str, Taken](), set[tuple[float, ...]]()
+    for _ in range(MOST_LOOKS):
+        worst = _worst(study, heat, hotter)
+        short = {key: taken for key, taken in worst.items() if _low_mm(study, taken) < 1e3 * taken.needed - 1e-6}
+        movable = {} if stays else {key: taken for key, taken in short.items() if _place(study, key) is not None}
+        if movable:
+            study, moves = _moved(study, movable, kept), moves | movable
+        elif stays or (corner := tuple(_corner(study, heat).tolist())) in seen:
+            break
+        else:
+            seen.add(corner)
+            _hear_of_corner(study, balance, np.array(corner), heat, hotter)
+    notes += [_moved_note(original, study, key, taken) for key, taken in moves.items()]
+    notes += [_lost_note(study, taken, heat) for key, taken in short.items() if key not in movable]
+    if not moves:
+        return Region(study, tuple(notes))
+    study, baseline_notes = _with_baseline(original, study, balance, heat)
+    return Region(study, (*notes, *baseline_notes))
+
+
+def _corner(study: Study, heat: Heat) -> Array:
+    """The drawing (k,) with the least clearances of the region, other factors at their centre."""
+    corner = study.centre.copy()
+    for _, clearances in _running(study, corner, heat):
+        for running in clearances.values():
+            if (place := _place(study, running.key)) is not None:
+                corner[place] = _ends(study, place)[0]
+    return corner
+
+
+def _hear_of_corner(
+    study: Study, balance: Balances, corner: Array, heat: dict[str, list[Temperatures]], hotter: dict[str, float]
+) -> None:
+    """Add to ``heat`` the temperatures of the corner (k,) where few kelvin are left, or to ``hotter`` where it has none."""
+    ends = _endangered(study, corner, heat)
+    for name, outcome in _balanced(study, balance, corner, list(ends), "the least clearances").items():
+        if isinstance(outcome, Temperatures):
+            heat[name].append(outcome)
+        else:
+            lost = ends[name]
+            hotter[lost.key] = max(hotter.get(lost.key, 0.0), lost.kelvins_left - NEARLY_K + HOTTER_K)
+
+
+def _endangered(study: Study, point: Array, heat: Heat) -> dict[str, RunningClearance]:
+    """By point of the duty with a heat balance, the clearance of a drawing (k,) that the fewest kelvin close; of few enough alone."""
+    least: dict[str, RunningClearance] = {}
+    for name, clearances in _running(study, point, heat):
+        for running in clearances.values() if heat else ():
+            if running.kelvins_left < min(FEW_K, least[name].kelvins_left if name in least else FEW_K):
+                least[name] = running
+    return least
+
+
+def _balanced(
+    study: Study, balance: Balances, point: Array, names: Sequence[str], words: str
+) -> dict[str, Temperatures | str]:
+    """Temperatures of a drawing (k,) at these points of the duty by short runs, or why it has none; those undecided are left out."""
+    if not names:
+        return {}
+    found: dict[str, Temperatures | str] = {}
+    try:
+        scenes = _scenes(study, point, BALANCE)
+    except InputError as error:
+        return dict.fromkeys(names, str(error))
+    labels = [f"{words}{f' at {name}' if name else ''}" for name in names]
+    for name, result in zip(names, balance([scenes[name] for name in names], labels), strict=True):
+        if isinstance(result, SimulationResult):
+            nodes = result.temperatures_C or {}
+            found[name] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
+        elif not result.cause.startswith("undecided"):
+            found[name] = result.cause
+    return found
+
+
+def _has_mounting(study: Study) -> bool:
+    """Whether anything changes the clearances of the drawing."""
+    return "mounting" in clearance.read_scene(study) or any(text.startswith("mounting.") for text in study.scene.set)
+
+
+def _place(study: Study, key: str) -> int | None:
+    """Place of the factor with this key of the scene; None where it is no factor."""
+    return next((place for place, factor in enumerate(study.file.factor) if factor.key == key), None)
+
+
+def _ends(study: Study, place: int) -> tuple[float, float]:
+    """Ends of the region of a factor, in its units."""
+    half = design_of(study).reach * study.step[place]
+    return float(study.centre[place] - half), float(study.centre[place] + half)
+
+
+def _low_mm(study: Study, taken: Taken) -> float:
+    """Lowest value of a clearance on the drawings of the region [mm]."""
+    place = _place(study, taken.running.key)
+    return 1e3 * taken.running.play.drawn if place is None else _ends(study, place)[0]
+
+
+def _scenes(
+    study: Study, point: Array, overrides: Sequence[str] = (), kind: type[Scene] = Scene
+) -> Mapping[str, Scene]:
+    """Scenes of a drawing (k,) by point of the duty. Raises InputError for an impossible one."""
+    data, seed = clearance.read_scene(study), study.file.design.seed
+    run = over_duty(
+        study, lambda sets: clearance.scene_at(study, data, point, seed, [*study.scene.set, *sets, *overrides], kind)
+    )
+    return {"": run} if isinstance(run, Scene) else run.scenes
+
+
+def _running(study: Study, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
+    """Clearances in operation of a drawing (k,) by point of the duty, at each of the temperatures found there."""
+    for name, scene in _scenes(study, point, kind=DrawnScene).items():
+        if (mounting := scene.mounting) is None:
+            continue
+        if scene.thermal is None:
+            yield name, scene.running_clearances(mounting)
+            continue
+        for nodes in heat[name]:
+            hot = mounting.model_copy(update=part_temperatures(scene.thermal, nodes))
+            yield name, scene.running_clearances(hot)
+
+
+def _worst(study: Study, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
+    """The place that takes most of each clearance, by its key, over all points of the designs at all categories."""
+    worst: dict[str, Taken] = {}
+    for levels in study.every_level:
+        variant = study.with_levels(levels)
+        points = np.unique(actual_of(variant, design_of(variant)), axis=0)
+        for point in points[:: -(-len(points) // MOST_POINTS)]:
+            for name, clearances in _running(variant, point, heat):
+                for running in clearances.values():
+                    taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
+                    if running.key not in worst or taken.needed > worst[running.key].needed:
+                        worst[running.key] = taken
+    return worst
+
+
+def _floor(study: Study, running: RunningClearance) -> float:
+    """Floor of a clearance [m]; of a bearing that is meant to be preloaded, what the study states or none."""
+    if running.touching > -math.inf:
+        return running.floor
+    if "least_clearance_um" in study.file.adaptive.model_fields_set:
+        return 1e-6 * study.file.adaptive.least_clearance_um
+    place = _place(study, running.key)
+    drawn_mm = 1e3 * running.play.drawn if place is None else study.baseline[place]
+    return running.floor if drawn_mm > 0.0 else -math.inf
+
+
+def _heat(study: Study, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note]]:
+    """Temperatures at the centre of the region by point of the duty, and where they are too high.
+
+    Raises RunError where the bearing has no steady temperatures even with wider clearances.
+    """
+    scenes, heat, causes = (
+        _scenes(study, study.centre, kind=DrawnScene),
+        dict[str, list[Temperatures]](),
+        dict[str, str](),
+    )
+    if all(scene.thermal is None for scene in scenes.values()):
+        return {}, []
+    for kelvins in WIDER_K:
+        rest = [name for name in scenes if name not in heat]
+        words = "the middle of the region" + (" with wider clearances" if kelvins else "")
+        found = _balanced(study, balance, _wider(study, scenes, kelvins), rest, words)
+        for name in rest:
+            outcome = found.get(name, "its temperatures are undecided")
+            if isinstance(outcome, Temperatures):
+                heat[name] = [outcome]
+            else:
+                causes[name] = outcome
+        if len(heat) == len(scenes):
+            return heat, [note for name, scene in scenes.items() for note in _too_hot(scene, name, heat[name][0])]
+    raise RunError(
+        "; ".join(
+            f"the middle of the region has no steady temperatures{f' at {name}' if name else ''}: {causes[name].rstrip('.')}"
+            for name in rest
+        )
+        + "; wider clearances do not change that: give more or cooler oil, or less speed and load"
+    )
+
+
+def _wider(study: Study, scenes: Mapping[str, Scene], kelvins: float) -> Array:
+    """The centre (k,) with clearances as much wider as that many kelvin between the parts would take."""
+    point = study.centre.copy()
+    for scene in scenes.values():
+        for running in scene.running_clearances(scene.mounting).values() if scene.mounting is not None else ():
+            if (place := _place(study, running.key)) is not None:
+                point[place] = study.centre[place] + 1e3 * kelvins * running.growth
+    return point
+
+
+def _too_hot(scene: Scene, place: str, nodes: Temperatures) -> Iterator[Note]:
+    """Notes on the oil and the cage above their ceilings."""
+    if scene.thermal is None:
+        return
+    parts = {"oil": nodes.oil, "cage": nodes.rollers + scene.thermal.cage_offset_K}
+    for part, ceiling in ceilings(scene).items():
+        if parts[part] > ceiling:
+            yield Note(
+                "heat",
+                f"Too hot: the {part} reaches {parts[part]:.0f} C{f' at {place}' if place else ''} in the middle of the region, above "
+                f"its ceiling of {ceiling:g} C (thermal.{part}_ceiling_C).",
+            )
+
+
+def _moved(study: Study, short: Mapping[str, Taken], kept: float) -> Study:
+    """The study with the regions of these clearances moved. Raises InputError where one cannot move as far."""
+    factors, reach, faults = list(study.file.factor), design_of(study).reach, list[str]()
+    for key, taken in short.items():
+        place = _place(study, key)
+        assert place is not None
+        low, high = _ends(study, place)
+        factor, needed = factors[place], 1e3 * taken.target
+        top = max(high, needed + kept * (high - low))
+        if factor.allowed is not None:
+            top = min(top, factor.allowed[1])
+        centre, step = _rounded(factor, needed, top, reach)
+        if step <= 0.0:
+            faults.append(
+                f"{study.path}: factor.allowed of {factor.name} = {factor.allowed}: its region has to begin at {needed:.4g}, because "
+                f"{taken.at}{taken.causes}; raise its upper end"
+            )
+            continue
+        factors[place] = factor.model_copy(update={"centre": centre, "step": step})
+    refuse(faults)
+    moved = replace(study, file=study.file.model_copy(update={"factor": factors}))
+    try:
+        for point in (moved.actual(np.full(len(factors), sign * reach)) for sign in (-1.0, 1.0)):
+            _scenes(moved, point, kind=DrawnScene)
+    except InputError as error:
+        why = "; ".join(f"{taken.at}{taken.causes}" for taken in short.values())
+        raise InputError(
+            [f"{study.path}: the region has to move ({why}), but there {fault}" for fault in error.faults]
+        ) from None
+    return moved
+
+
+def _rounded(factor: Factor, low: float, high: float, reach: float) -> tuple[float, float]:
+    """Centre and step of a region between two ends, rounded inward at the lower one, so that other bits of a temperature change neither."""
+    step = 0.5 * (high - low) / reach
+    if step <= 0.0:
+        return low, 0.0
+    coarse = factor.finest or 10.0 ** math.floor(math.log10(step) - 1.0)
+    fine = coarse if step >= 10.0 * coarse else 0.1 * coarse
+    step = round(math.floor(step / fine + 1e-9) * fine, 12)
+    return round(math.ceil((low + reach * step) / coarse - 1e-9) * coarse, 12), step
+
+
+def _moved_note(before: Study, after: Study, key: str, taken: Taken) -> Note:
+    """How the region of a factor moved, and why."""
+    place = _place(before, key)
+    assert place is not None
+    words, unit = quantity(before.factors[place])
+    (low, high), (new_low, new_high) = _ends(before, place), _ends(after, place)
+    verb = "moved" if new_high > high * (1.0 + 1e-9) else "was narrowed"
+    return Note(
+        "region",
+        f"The region of the {words} {verb} from {low:.3f}-{high:.3f} to {new_low:.3f}-{new_high:.3f} {unit}: {taken.at}{taken.causes}.",
+    )
+
+
+def _lost_note(study: Study, taken: Taken, heat: Heat) -> Note:
+    """A clearance below its floor that nothing moves. Raises InputError where it is lost in the middle of the region too."""
+    running, key = taken.running, taken.running.key
+    words, _ = quantity(key.rpartition(".")[2])
+    stays = _place(study, key) is not None
+    if any(clearances_seize(clearances, key) for _, clearances in _running(study, study.centre, heat)):
+        fix = "widen the factor's centre" if stays else f"widen it in {study.scene.file}, or make it a factor"
+        raise InputError(
+            [f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"]
+        )
+    why = "runs of a table keep its region where it is" if stays else "no factor moves it"
+    return Note(
+        "seizure",
+        f"{'Seizure' if running.seizes else 'Nearly lost'}: {words} in operation {1e6 * running.play.operating:.0f} um {taken.at}at "
+        f"the edge of the region, where {1e6 * taken.floor:.0f} um are its floor; {why}.",
+    )
+
+
+def clearances_seize(clearances: Mapping[str, RunningClearance], key: str) -> bool:
+    """Whether the clearance with this key is lost."""
+    return any(running.seizes for running in clearances.values() if running.key == key)
+
+
+def _with_baseline(
+    original: Study, moved: Study, balance: Balances, heat: dict[str, list[Temperatures]]
+) -> tuple[Study, list[Note]]:
+    """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
+    first, point = original.with_levels(()), original.baseline
+    seized = [
+        (running, name)
+        for name, clearances in _running(first, point, heat)
+        for running in clearances.values()
+        if running.seizes
+    ]
+    if not seized:
+        ends = _endangered(first, point, heat)
+        found = _balanced(first, balance, point, list(ends), "the original design")
+        seized = [(ends[name], name) for name, outcome in found.items() if not isinstance(outcome, Temperatures)]
+    baseline: dict[str, Any] = original.by_factor(point)
+    notes = []
+    if seized:
+        running, name = min(seized, key=lambda pair: pair[0].kelvins_left)
+        words, _ = quantity(running.key.rpartition(".")[2])
+        left = f"{1e6 * running.play.operating:.0f} um{f' at {name}' if name else ''}"
+        heats = "" if running.seizes else ", which its own heat closes"
+        baseline = moved.by_factor(moved.centre)
+        notes.append(
+            Note(
+                "seizure",
+                f"Seizure: {words} of the original design in operation {left}{heats}; gains are over the middle of the region instead.",
+            )
+        )
+    return replace(moved, file=moved.file.model_copy(update={"baseline": baseline})), notes
