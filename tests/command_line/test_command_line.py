@@ -45,7 +45,7 @@ def test_command_line_help(command):
 def test_command_line_json_is_one_object_and_repeats(command, outer, outer_result):
     """Command line: standard output is one JSON object, the same figures as from Python, in any process."""
     shown = command("simulate", EXAMPLE, *QUICK, "--json", "--workers", "2")
-    assert (shown.returncode, shown.stderr) == (0, "")
+    assert shown.returncode == 0 and shown.stderr.endswith("2 at once\n") and shown.stderr.startswith("note: ")
     record = json.loads(shown.stdout)
     expected = json.loads(json.dumps(outer_result.as_dict()))
     for each in (record, expected):
@@ -71,7 +71,7 @@ def test_command_line_out_writes_files(command, tmp_path):
     folder = tmp_path / "deep" / "run"
     shown = command("simulate", EXAMPLE, *QUICK, "--json", "--out", folder)
     assert shown.returncode == 0
-    pictures = {"cage_orbit.png", "pocket_forces.png"}
+    pictures = {"roller_loads.png", "cage_orbit.png", "pocket_forces.png"}
     names = {"result.json", "figures.csv", "history.csv", *pictures, "report.html", "tables.xlsx", "made_by.json"}
     assert {path.name for path in folder.iterdir()} == names
     assert json.loads((folder / "result.json").read_text()) == json.loads(shown.stdout)
@@ -80,7 +80,7 @@ def test_command_line_out_writes_files(command, tmp_path):
     assert columns[:4] == ["time_s", "cage_x_um", "cage_y_um", "cage_speed_rpm"]
     assert {"land_N", "pocket_1_N", "inner_10_N", "outer_slip_10_m_s"} <= set(columns)
     assert len(lines) == 1 + 4 * 512
-    for picture in ("cage_orbit.png", "pocket_forces.png"):
+    for picture in pictures:
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")
 
 
@@ -122,7 +122,8 @@ def test_command_line_failing_run(command):
     arguments = ("simulate", EXAMPLE, *QUICK, "--set", "numerics.step_budget_per_turn=100")
     shown = command(*arguments)
     assert (shown.returncode, shown.stdout) == (1, "")
-    (sentence,) = shown.stderr.splitlines()
+    plan, sentence = shown.stderr.splitlines()
+    assert plan.endswith(" at once")
     for words in ("replicate ", "seed 1", "shaft turn ", "step budget of 600 used up", "raise numerics.step_budget"):
         assert words in sentence
     again = command(*arguments, "--json")
