@@ -155,13 +155,20 @@ NEARLY_LOST, MOSTLY_LOST = 0.1, 0.5
 FAST_LISTED, FAST_USUAL, FASTEST = (1.0, 2.0), 2.0, 3.0e3 * RPM
 
 
-def clearance_notes(clearances: Mapping[str, OperatingClearance | None]) -> Notes:
-    """Notes on diametral ``clearances`` [m], by name, that are negative, nearly lost or, of a cage, mostly lost in operation."""
+def clearance_notes(
+    clearances: Mapping[str, OperatingClearance | None], floors: Mapping[str, float] | None = None
+) -> Notes:
+    """Notes on diametral ``clearances`` [m], by name, that are negative, nearly lost or, of a cage, mostly lost in operation.
+
+    ``floors`` [m]: what must be left of each; a tenth of the drawn clearance where there is none.
+    """
     notes = []
     for name, play in clearances.items():
-        if play is None or play.operating >= (MOSTLY_LOST if name != "radial" else NEARLY_LOST) * max(play.drawn, 0.0):
+        if play is None:
             continue
-        lost = play.operating < NEARLY_LOST * max(play.drawn, 0.0)
+        lost = play.operating < (floors or {}).get(name, NEARLY_LOST * max(play.drawn, 0.0))
+        if not lost and (name == "radial" or play.operating >= MOSTLY_LOST * play.drawn):
+            continue
         subject = "seizure: " if lost else ""
         sentence = (
             f"{subject}{name} clearance in operation {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um drawn: fits "

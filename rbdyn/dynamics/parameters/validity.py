@@ -293,7 +293,10 @@ def limit_notes(scene: Scene) -> Notes:
     inner, outer = scene.operation.speeds
     listed = catalogue_entry(scene.bearing)
     reference = None if listed is None or listed[1].reference_speed is None else listed[1].reference_speed * RPM
-    return (*clearance_notes(scene.clearances), *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference))
+    mounting = scene.mounting
+    running = {} if mounting is None else scene.running_clearances(mounting)
+    floors = {name: clear.floor for name, clear in running.items()}
+    return (*clearance_notes(scene.clearances, floors), *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference))
 
 
 def light_load_notes(scene: Scene) -> Notes:
