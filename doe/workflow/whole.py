@@ -450,13 +450,16 @@ def run_study(
         chains=chains,
         published_comparisons=[] if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=tuple(
-            failure for step in (runs, searched, robustness, selection) if step for failure in step.failures
-        ),
+        failures=_failures(runs, searched, robustness, selection),
         notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study, surfaces))), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
+
+
+def _failures(*steps: Runs | Adaptive | Robust | Selection | None) -> tuple[Failure, ...]:
+    """Runs that failed in these steps."""
+    return tuple(failure for step in steps if step for failure in step.failures)
 
 
 def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
