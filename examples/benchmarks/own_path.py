@@ -11,14 +11,20 @@ run of a design fails, a screen is wider than 80 columns, or a study leaves no r
 """
 
 import argparse
+import contextlib
 import csv
+import fcntl
 import json
 import os
+import pty
+import re
 import resource
 import shlex
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -26,6 +32,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 COLUMNS = 80
+ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 DUTY = """\
 name;share;operation.inner_speed_rpm;operation.radial_load_N
 idle;0,15;4000;300
@@ -91,21 +98,42 @@ def walk(path: str, folder: Path) -> Iterator[Step]:
         words = shlex.split(command.format(examples=ROOT / "examples"))
         words[0] = str(Path(sys.executable).with_name(words[0]))
         before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        environment = os.environ | {"COLUMNS": str(COLUMNS)}
-        ended = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        code, screen, errors = on_a_screen(words, folder)
         wall, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
         processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        (folder / f"step_{number}.txt").write_text(f"$ {command}\n{ended.stdout}\n{ended.stderr}", encoding="utf-8")
-        faults = [] if ended.returncode == expected else [f"exit {ended.returncode}, not {expected}"]
-        faults += screen_faults(ended.stdout) + screen_faults(ended.stderr)
+        (folder / f"step_{number}.txt").write_text(f"$ {command}\n{screen}\n{errors}", encoding="utf-8")
+        faults = [] if code == expected else [f"exit {code}, not {expected}"]
+        faults += screen_faults(screen) + ["a traceback"] * ("Traceback" in errors)
         if words[1] == "study":
             faults += study_faults(folder / "study")
-        yield Step(path, command, ended.returncode, expected, wall, processor, faults)
+        yield Step(path, command, code, expected, wall, processor, faults)
+
+
+def on_a_screen(words: Sequence[str], folder: Path) -> tuple[int, str, str]:
+    """Exit code of a command whose standard output is a terminal, what that shows, and standard error, which is none."""
+    outer, inner = pty.openpty()
+    fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 50, COLUMNS, 0, 0))
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
+        process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=inner, stderr=errors)
+        os.close(inner)
+        shown = b"".join(_read(outer))
+        os.close(outer)
+        code = process.wait()
+        errors.seek(0)
+        return code, ESCAPE.sub("", shown.decode("utf-8")).replace("\r\n", "\n"), errors.read()
+
+
+def _read(outer: int) -> Iterator[bytes]:
+    """What is written to a terminal until nobody holds it any more."""
+    with contextlib.suppress(OSError):
+        while piece := os.read(outer, 65536):
+            yield piece
 
 
 def screen_faults(text: str) -> list[str]:
     """Lines wider than the screen, and tracebacks."""
-    wide = sum(len(line) > COLUMNS for line in text.splitlines())
+    # A terminal breaks the list of files written anywhere.
+    wide = sum(len(line) > COLUMNS and not line.startswith("written to ") for line in text.splitlines())
     return [f"{wide} lines wider than {COLUMNS} columns"] * (wide > 0) + ["a traceback"] * ("Traceback" in text)
 
 
