@@ -48,8 +48,9 @@ PATHS = {
             '--oil-inlet 60 --ambient 25 --lubrication jet --speed 12000 --load 1000 --oil "ISO VG 32" --out drawing.toml',
             0,
         ),
-        ("rbdyn simulate drawing.toml --out run", 0),
-        ("rbdyn simulate drawing.toml --duty duty.csv --out points", 0),
+        # The hot cage takes the guide clearance that is estimated: a danger, which the study then avoids.
+        ("rbdyn simulate drawing.toml --out run", 1),
+        ("rbdyn simulate drawing.toml --duty duty.csv --out points", 1),
         ("doe new drawing.toml --duty duty.csv --limit power_loss_W<=900 --tolerances --chains --out study.toml", 0),
         ("doe study study.toml --out study", 0),
         ("doe status study.toml --out study", 0),

@@ -15,7 +15,7 @@ from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
 from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case
-from rbdyn.dynamics.ensemble import Reporter, log
+from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
@@ -104,8 +104,12 @@ def simulate_duty(
         source, duty = str(duty), read_duty(Path(duty))
     scenes, started = duty_scenes(scene, duty, source), time.perf_counter()
     results: dict[str, SimulationResult | str] = {}
+    if notice is not None and target is None:
+        notice(plan_of(scenes[0], threads_of(workers), len(scenes)))
     for place, (point, at_point) in enumerate(zip(duty, scenes, strict=True)):
-        steps, words = part_of(progress, place, len(duty)), named(notice, point.name)
+        # The time of the first point tells that of the others.
+        words = named(notice, f"{point.name}, 1 of {len(duty)} points") if place == 0 else None
+        steps = part_of(progress, place, len(duty))
         try:
             results[point.name] = simulate(at_point, workers, steps, target=target, notice=words)
         except (InputError, RunError) as error:
@@ -176,10 +180,9 @@ def _hot(scene: Scene, result: SimulationResult | str) -> Scene | None:
 
 
 def _notes(results: Mapping[str, SimulationResult | str]) -> Notes:
-    """Points that failed, with the reason; then the notes of the others, those of all points once."""
+    """Points without a result, with the reason; then the notes of the others, those of all points once."""
     ran = {name: result for name, result in results.items() if isinstance(result, SimulationResult)}
     reasons = {name: result for name, result in results.items() if isinstance(result, str)}
-    reasons |= {name: full_status(result) for name, result in ran.items() if result.status != "ok"}
     return (
         *(Note("point", f"{name} failed: {reason.removeprefix('failed: ')}") for name, reason in reasons.items()),
         *merged({name: result.notes for name, result in ran.items()}),

@@ -334,7 +334,7 @@ def _result(
         thermal=record,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
-        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_without_computed(result.notes, scene, trial.hot)),
+        notes=(*_notes(scene, trial.hot, status, reason, ranges), *_new(result.notes, scene, trial.hot, status)),
     )
 
 
@@ -390,10 +390,10 @@ def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
     return "; ".join(excesses)
 
 
-def _without_computed(notes: Notes, scene: Scene, hot: Scene) -> list[Note]:
-    """Notes without those that take a computed temperature for one in another unit."""
+def _new(notes: Notes, scene: Scene, hot: Scene, status: str) -> list[Note]:
+    """Notes without those that the ``status`` says too, or that take a computed temperature for one in another unit."""
     computed = set(hot.unit_notes) - set(scene.unit_notes)
-    return [note for note in notes if note not in computed]
+    return [note for note in notes if note not in computed and note.code != status]
 
 
 def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> Notes:
