@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Data, Out, Quiet, Retry, Save, Scheduler, StudyPath, bars, keeping_runs
 from rbdyn.base.blocks import Detail
-from rbdyn.base.command import FAILED, Force, Json, Workers, flag, guarded, hand_over, valued
+from rbdyn.base.command import FAILED, Force, Json, Workers, flag, guarded, hand_over, notice, valued
 from rbdyn.base.terminal import show
 
 
@@ -70,9 +70,8 @@ def fit(
         from doe.library.steps import fit
 
         with bars(quiet or as_json) as progress:
-            answer = fit(
-                path, data, factor or (), response or (), model, out, workers, scheduler, retry, progress, force
-            )
+            effort = (workers, scheduler, retry, progress, notice(quiet))
+            answer = fit(path, data, factor or (), response or (), model, out, *effort, force)
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 
@@ -105,7 +104,7 @@ def front(
         from doe.library.steps import front
 
         with bars(quiet or as_json) as progress:
-            answer = front(path, data, out, point, workers, scheduler, retry, progress, force)
+            answer = front(path, data, out, point, workers, scheduler, retry, progress, notice(quiet), force)
         detail = Detail.of(quiet, verbose)
         hand_over(answer.as_dict, as_json, lambda: show(answer.screen(), detail), answer.folder, answer.files)
 

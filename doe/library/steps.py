@@ -12,6 +12,7 @@ from doe.library.effort import Effort, Follow, path_given, registered, saved, st
 from rbdyn.base.blocks import Block, Paragraph, with_notes
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.pace import Notice
 from rbdyn.base.records import plain
 from rbdyn.base.words import counted, quantity, with_error
 
@@ -149,6 +150,7 @@ def fit(
     scheduler: str | None = None,
     retry: bool = False,
     progress: Follow = None,
+    notice: Notice = None,
     force: bool = False,
 ) -> FitAnswer:
     """Response surfaces with their analysis of variance, as ``doe fit``.
@@ -159,7 +161,7 @@ def fit(
       or reduced
     - ``out``: folder for the files and the store of runs; by default nothing is written
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
-    - ``progress(stage, done, total)``: called as runs end
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs before they start
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of study, table or arguments, RunError where runs fail.
@@ -176,7 +178,7 @@ def fit(
         study, notes = _study_or_table(study_path, table, factors, responses, model)
         output.claim(study.path, *_read_later(study, table))
         stack.enter_context(registered(study.path, folder))
-        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces) | notes_record((*reading, *notes, *unrivalled(surfaces)))
         columns = (
@@ -235,7 +237,7 @@ def _surfaces(
     Raises InputError, RunError, KeyboardInterrupt.
     """
     from doe.workflow.region import region_that_runs
-    from doe.workflow.runs import read_runs, run_design, with_remaining
+    from doe.workflow.runs import design_of, read_runs, run_design, with_remaining
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
@@ -245,6 +247,8 @@ def _surfaces(
         study, notes = region_that_runs(
             study, folder, effort.workers, effort.scheduler, effort.retry, effort.progress, effort.notice
         )
+        if effort.notice is not None:
+            effort.notice(f"{counted(len(design_of(study).coded), 'design run')}, {effort.threads} at once")
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
         return with_remaining(study, runs), fit_surfaces(study, runs), notes
@@ -296,6 +300,7 @@ def front(
     scheduler: str | None = None,
     retry: bool = False,
     progress: Follow = None,
+    notice: Notice = None,
     force: bool = False,
 ) -> FrontAnswer:
     """Pareto front on the response surfaces of a study, as ``doe front``.
@@ -305,7 +310,7 @@ def front(
     - ``point``: also predict this point: values by factor (the rest at the baseline), or all of them in order, in the units
       of the factors
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
-    - ``progress(stage, done, total)``: called as runs end
+    - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs before they start
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
     Raises InputError with all faults of study, table or point, RunError where runs fail.
@@ -328,7 +333,7 @@ def front(
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
         output.claim(path, *_read_later(study, table))
-        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress))
+        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
         pareto = with_survival(study, surfaces, find_front(study, surfaces))
         if pareto.violations is not None:
             raise out_of_reach(study, pareto.points[0], pareto.violations)

@@ -13,7 +13,7 @@ from rbdyn.base.faults import key_path
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.words import quantity, shown, with_error
-from rbdyn.life.duty import SHARE_ROUNDING
+from rbdyn.life.duty import life_notes
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
@@ -125,13 +125,6 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
         *_notes(points, scenes, speeds_rpm, loads_N),
     )
     return MapDuty(points, scenes, life, notes)
-
-
-def life_notes(life: float, hours: float) -> Notes:
-    """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
-    if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
-        return ()
-    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)
 
 
 def _notes(

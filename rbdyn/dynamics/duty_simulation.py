@@ -17,7 +17,7 @@ from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.life.duty import ROLLER_EXPONENT, duty_life
+from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
@@ -138,7 +138,7 @@ def simulate_duty(
         points=points,
         worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
         life=None if life is None else life.as_record(),
-        notes=_notes(results),
+        notes=(*(() if life is None else life_notes(life.hours, sum(point.share for point in duty))), *_notes(results)),
         wall_s=time.perf_counter() - started,
         seed=scene.numerics.seed,
         versions=versions(),
