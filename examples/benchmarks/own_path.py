@@ -54,11 +54,11 @@ PATHS = {
         ("doe new drawing.toml --duty duty.csv --limit power_loss_W<=900 --tolerances --chains --out study.toml", 0),
         ("doe study study.toml --out study", 0),
         ("doe status study.toml --out study", 0),
-        ("rbdyn compare drawing.toml --set bearing.radial_clearance_mm=0.08", 0),
     ),
     "catalogue": (
         ("rbdyn new NU2208-E-XL-TVP2-P5-C3 --speed 6000 --load 3000 --shaft k5 --housing H7 --out my.toml", 0),
         ("rbdyn simulate my.toml --out run", 0),
+        ("rbdyn compare run my.toml --set bearing.radial_clearance_mm=0.06", 0),
         ("doe new my.toml --limit life_h>=20000 --out study.toml", 0),
         ("doe study study.toml --out study", 0),
     ),
