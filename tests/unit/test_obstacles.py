@@ -184,7 +184,8 @@ def test_the_corners_say_before_the_design_ends_what_is_likely(bound, unlikely, 
     )
     said: dict[str, int] = {}
     doe.study(path, tmp_path / "out", workers=1, notice=lambda sentence: said.setdefault(sentence, len(ran)))
-    plan, original, missed, *others = said
+    # The time of the rest follows the machine.
+    plan, original, missed, *others = [sentence for sentence in said if not sentence.startswith("the rest takes ")]
     assert plan.startswith("22 to 27 runs (baseline 1, design runs 20, ") and said[plan] == 0
     assert original.startswith("original design: impact force ") and said[original] == 1
     assert missed.startswith(f"the original misses impact force <= {bound:g} N by ") and said[missed] == 1
