@@ -209,10 +209,10 @@ def share_of_adaptive(study: Study, front: SimulatedFront, summary: Mapping[str,
 def compare(study: Study, settings: Settings, folder: Path, workers: int | None) -> dict[str, Any]:
     """All of it: runs, searches, comparisons, the file; returns its record. Raises as ``find_direct``."""
     folder.mkdir(parents=True, exist_ok=True)
-    with progress_bar("design runs", False, workers) as progress:
+    with progress_bar("design runs", False) as progress:
         surfaces = fit_surfaces(study, run_design(study, folder, workers, progress))
     on_surfaces = find_front(study, surfaces)
-    with Store(folder / STORE, study.path.stem) as store, progress_bar("direct front", False, workers) as progress:
+    with Store(folder / STORE, study.path.stem) as store, progress_bar("direct front", False) as progress:
         simulations = Simulations(store, workers, None, False, lambda title: progress)
         found = find_direct(study, settings, on_surfaces, simulations)
     record = record_of(study, settings, found)

@@ -109,7 +109,9 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
     there = [each for each in record["adaptive"]["points"] if each["factors"]["guidance"] == "roller"]
     assert {each["factors"]["guide_clearance_mm"] for each in there} == {0.15}
     assert "guide_clearance_mm" not in record["tolerances"]
-    assert any("chain guide: not solved, since guide_clearance_mm means nothing" in note for note in record["notes"])
+    assert any(
+        "chain guide: not solved, since guide_clearance_mm means nothing" in note["text"] for note in record["notes"]
+    )
 
 
 @pytest.mark.parametrize(

@@ -76,9 +76,7 @@ def test_replicates_of_the_last_points_run_side_by_side(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
     study, asked, run = Study.load(written(tmp_path)), [], clearance.attempt
     monkeypatch.setattr(
-        clearance,
-        "attempt",
-        lambda scene, stop, inside, heard: asked.append((scene.numerics.seed, inside)) or run(scene),
+        clearance, "attempt", lambda scene, stop, inside: asked.append((scene.numerics.seed, inside)) or run(scene)
     )
     scenes = clearance.adaptive_scenes(study, np.tile(study.baseline, (7, 1)), [2] * 7, 0)
     with Store(tmp_path / STORE) as store:
