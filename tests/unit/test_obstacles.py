@@ -65,7 +65,8 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     assert simulated == pytest.approx(least_impact(Study.load(path)), abs=1.5)
     sentences = record["obstacles"]["sentences"]
     assert sentences[0].startswith("No point of the region keeps all limits") and "relax the limits" in sentences[2]
-    assert shown.stderr.splitlines() == sentences
+    (worse,) = (note["text"] for note in record["notes"] if note["code"] == "worse")
+    assert shown.stderr.splitlines() == [f"danger: {worse}", *sentences]
     assert "No point of the region keeps all limits" in (out / "report.html").read_text("utf-8")
     answer = (out / "answer.txt").read_text("utf-8")
     assert answer.index("No point of the region") < answer.index("Chosen clearances") < answer.index("LIMIT BROKEN")
@@ -98,7 +99,11 @@ def test_a_limit_that_only_the_surfaces_miss_is_kept_by_simulation(tmp_path, mon
     path = limited_study(tmp_path, f"upper = {bound!r}", [QUICK])
     shown = commanded(path, "--json", "-q")
     record = json.loads(shown.stdout)
-    assert (shown.exit_code, record["status"], shown.stderr) == (0, "ok", "")
+    assert (shown.exit_code, record["status"]) == (0, "ok")
+    (told,) = shown.stderr.splitlines()
+    assert told.startswith("danger: the pick is worse than the baseline: whirl deviation ratio "), (
+        "and of the limit nothing"
+    )
     assert record["obstacles"]["sentences"] == [] and record["limits"]["impact_force_N"]["verdict"] == "kept"
 
 
@@ -179,7 +184,8 @@ def test_the_corners_say_before_the_design_ends_what_is_likely(bound, unlikely, 
     )
     said: dict[str, int] = {}
     doe.study(path, tmp_path / "out", workers=1, notice=lambda sentence: said.setdefault(sentence, len(ran)))
-    original, missed, *others = said
+    plan, original, missed, *others = (one for one in said if not one.startswith("the rest takes about "))
+    assert plan.startswith("22 to 27 runs ") and said[plan] == 0
     assert original.startswith("original design: impact force ") and said[original] == 1
     assert missed.startswith(f"the original misses impact force <= {bound:g} N by ") and said[missed] == 1
     likely = [sentence for sentence in others if sentence.startswith("likely no point keeps impact force <= 5 N: ")]

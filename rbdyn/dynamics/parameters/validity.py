@@ -296,7 +296,10 @@ def limit_notes(scene: Scene) -> Notes:
     mounting = scene.mounting
     running = {} if mounting is None else scene.running_clearances(mounting)
     floors = {name: clear.floor for name, clear in running.items()}
-    return (*clearance_notes(scene.clearances, floors), *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference))
+    return (
+        *clearance_notes(scene.clearances, floors),
+        *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference),
+    )
 
 
 def light_load_notes(scene: Scene) -> Notes:
@@ -375,7 +378,7 @@ def heat_notes(scene: Scene, power_loss: float) -> Notes:
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     sentence = (
-        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface and takes "
+        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface; it takes "
         f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
         f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s"
     )
