@@ -104,8 +104,8 @@ def test_unit_a_point_that_fails_leaves_the_others(scene, duty, found, monkeypat
     assert failed.status == "1 of 3 points failed" and failed.points[0].figures == found.points[0].figures
     assert failed.points[1].status == "failed: the cage left its pockets at 0.3 ms" and not failed.points[1].figures
     # Without a heat balance the life follows from the scene alone.
-    assert failed.life == found.life and failed.notes[0] == "cruise: failed: the cage left its pockets at 0.3 ms"
-    assert "Warning: cruise failed: the cage left its pockets at 0.3 ms" in text(simulated_blocks(failed))
+    assert failed.life == found.life and failed.notes[0] == "cruise failed: the cage left its pockets at 0.3 ms"
+    assert "Danger: cruise failed: the cage left its pockets at 0.3 ms" in text(simulated_blocks(failed))
     assert failed.worst["impact_force_N"].point in ("idle", "take-off")
 
 
