@@ -8,13 +8,13 @@ from doe.response_surface import Surface
 from doe.workflow.confirmation import Gain
 from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.words import quantity
+from rbdyn.base.words import improvement, quantity
 
 
 def worse_notes(gains: Sequence[Gain]) -> Notes:
     """A note on a pick that is worse than the baseline, by its simulated ``gains``."""
     worse = [
-        f"{quantity(gain.response)[0]} by {-gain.percent:.3g} ± {gain.error:.2g} %"
+        f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
         for gain in gains
         if gain.verdict == "worse"
     ]

@@ -521,7 +521,7 @@ def _tolerances(
 
 
 def _compared(study: Study, runs: Runs, reference: Runs) -> list[PublishedComparison]:
-    """The runs beside those of the published table, which has no run added in place of a failed one."""
+    """The runs compared with those of the published table, which has no run added in place of a failed one."""
     return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
 
 

@@ -11,6 +11,7 @@ heat of ISO 15312. Comments mark constants from memory. SKF's model is not a mea
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -239,8 +240,6 @@ def static_loads(
     diametral operating ``clearance`` s [m]. One roller is under the load. Both contacts of a roller share the approach. The
     outer race bears also its ``centrifugal`` force [N], which the standard leaves out.
     """
-    from scipy.optimize import brentq
-
     angle = 2.0 * math.pi * np.arange(rollers) / rollers
     most = max(float(np.max(relief)) for relief in contacts.relief)
     solid = sum((force / contacts.stiffness) ** (1.0 / LINE_EXPONENT) for force in (load, centrifugal))
@@ -250,9 +249,27 @@ def static_loads(
         inner, _ = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
         return float(inner.sum(axis=1) @ np.cos(angle)) - load
 
-    displacement = brentq(balance, -reach, reach, xtol=1e-15, rtol=1e-13) if load > 0.0 else 0.0
+    displacement = _rising_root(balance, -reach, reach, BALANCE_ERROR * load) if load > 0.0 else 0.0
     inner, outer = _race_loads(contacts, displacement * np.cos(angle) - 0.5 * clearance, centrifugal)
     return inner[None], outer[None]
+
+
+def _rising_root(function: Callable[[float], float], low: float, high: float, error: float) -> float:
+    """Where a rising function is zero within ``error``: false position with the Illinois rule; low and high are on its two sides."""
+    at_low, at_high, last = function(low), function(high), 0.0
+    for _ in range(BALANCE_STEPS):
+        place = high - at_high * (high - low) / (at_high - at_low)
+        value = function(place)
+        if abs(value) <= error or not low < place < high:
+            break
+        # The end that stays twice counts half, or it would stay to the last.
+        half = 0.5 if value * last > 0.0 else 1.0
+        if value < 0.0:
+            low, at_low, at_high = place, value, half * at_high
+        else:
+            high, at_high, at_low = place, value, half * at_low
+        last = value
+    return place
 
 
 def _race_loads(contacts: RollerContacts, approach: Array, centrifugal: float) -> tuple[Array, Array]:

@@ -338,12 +338,12 @@ class Scene(SceneFile):
 
         return geometry_of(self)
 
-    @cached_property
+    @property
     def mounted_clearance(self) -> "MountedClearance | None":
         """Radial clearance with the effects of fits, temperature and rotation; None where the scene has no mounting."""
         return None if self.mounting is None else self._mounted_clearance(self.mounting)
 
-    @cached_property
+    @property
     def cage_clearances(self) -> "CageClearances | None":
         """Cage clearances with the effects of fits, temperature and rotation; None where the scene has no mounting."""
         return None if self.mounting is None else self._cage_clearances(self.mounting)
@@ -351,7 +351,10 @@ class Scene(SceneFile):
     def _mounted_clearance(self, mounting: Mounting) -> "MountedClearance":
         from rbdyn.mounting.fits import operating_clearance
 
-        return operating_clearance(mounting, self.bearing, self.materials, *self.operation.speeds)
+        def worked_out() -> "MountedClearance":
+            return operating_clearance(mounting, self.bearing, self.materials, *self.operation.speeds)
+
+        return self.once("_mounted", worked_out) if mounting is self.mounting else worked_out()
 
     def _cage_clearances(self, mounting: Mounting) -> "CageClearances":
         from rbdyn.mounting.fits import RunningSpeeds, cage_clearances

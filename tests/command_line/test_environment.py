@@ -16,9 +16,10 @@ import pytest
 import doe
 from doe.running.runner import agenda_in
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Heading, Note, Paragraph, Table
+from rbdyn.base.blocks import Heading, Paragraph, Remarks, Table
 from rbdyn.base.faults import InputError
 from rbdyn.base.identity import identity_of
+from rbdyn.base.notes import Note
 from rbdyn.base.streams import escaped
 from rbdyn.base.workbook import write_workbook
 from rbdyn.result import write_json
@@ -75,7 +76,12 @@ def test_a_terminal_gets_no_control_character_of_a_name(arguments):
 
 
 def test_blocks_escape_names_and_keep_their_own_style():
-    blocks = [Heading(EVIL), Paragraph(EVIL), Note(EVIL), Table(EVIL, (EVIL, "x"), [(EVIL, EVIL)])]
+    blocks = [
+        Heading(EVIL),
+        Paragraph(EVIL),
+        Remarks((Note("remark", EVIL),)),
+        Table(EVIL, (EVIL, "x"), [(EVIL, EVIL)]),
+    ]
     for width, bold in ((None, False), (60, True)):
         text = terminal.text(blocks, width=width, bold=bold)
         assert not re.search(r"[\x07\x9b\r]", text) and set(re.findall("\x1b.{3}", text)) <= {"\x1b[1m", "\x1b[0m"}

@@ -137,6 +137,8 @@ def test_command_line_rollers_as_of_the_catalogue(command, designation):
     if designation != "NU2210":  # whose series has a cage of its own thickness
         assert own == listed
     else:
+        # No catalogue gives its rollers; a drawing does.
+        listed["uncertain"]["estimated"].remove("bearing.roller_diameter_mm")
         assert {**own, "cage": {}} == {**listed, "cage": {}}
 
 

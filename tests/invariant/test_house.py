@@ -38,6 +38,7 @@ EDGES = {
     "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
+    "rbdyn/dynamics/duty_simulation.py": "is the saved record of the points",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
     "doe/workflow": "asks for chains",

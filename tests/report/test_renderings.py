@@ -128,7 +128,7 @@ def test_a_screen_has_five_notes_of_a_line_each_and_says_where_the_others_are():
     assert lines[6].startswith("4 more notes in the report") and lines[7:] == ["after"]
     whole = terminal.text(tree)
     assert whole.count("end\n") == 5 and "4 more notes in the report" in whole and "general" not in whole
-    assert terminal.text(tree, Detail.ALL, 80).count("end") == 8 and "note: general" in "".join(map(page.render, tree))
+    assert terminal.text(tree, Detail.ALL, 80).count("end") == 8 and "Note: general" in "".join(map(page.render, tree))
     assert "in full" in terminal.text([Remarks(long_notes(3))], width=80)
     assert "report" not in terminal.text([Remarks(long_notes(3))])
 

@@ -149,7 +149,7 @@ def test_unit_ball_bearings_are_exact(tmp_path):
     [
         ("none.toml", "none.toml: no such file; check the path"),
         ("none.json", "none.json: cannot be read (no such file); check the path"),
-        ("old.json", "format is rbdyn.simulation/3, not rbdyn.simulation/4; run the scene again"),
+        ("old.json", "format is rbdyn.simulation/3, not rbdyn.simulation/5; run the scene again"),
         ("half.json", "half.json: not a saved simulation result; check the path"),
         (BALLS, "A is a bearing with rollers and B one with balls"),
     ],
@@ -158,7 +158,7 @@ def test_unit_what_cannot_be_compared(short, tmp_path, source, fault):
     """Unit: each bad source is one sentence."""
     short.save(tmp_path / "old.json")
     text = (tmp_path / "old.json").read_text()
-    (tmp_path / "old.json").write_text(text.replace("rbdyn.simulation/4", "rbdyn.simulation/3"))
+    (tmp_path / "old.json").write_text(text.replace("rbdyn.simulation/5", "rbdyn.simulation/3"))
     (tmp_path / "half.json").write_text(text[: len(text) // 2])
     with pytest.raises(InputError) as refused:
         rbdyn.compare(short, tmp_path / source)

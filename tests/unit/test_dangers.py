@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 import rbdyn
 from doe.response_surface import fit
 from doe.workflow.confirmation import Gain
-from doe.workflow.dangers import choice_notes, extrapolation_notes
+from doe.workflow.dangers import extrapolation_notes, worse_notes
+from doe.workflow.obstacles import MissedLimit, Obstacles
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import CODES, Level, Note, condensed, ranked, status_notes, status_of, verdict
 from rbdyn.cli.app import app
@@ -127,14 +128,24 @@ def test_unit_statuses_are_notes():
     assert codes == ["overload", "seizure", "heat", "heat", "undecided", "failed"]
 
 
+def obstacles(verdict: str | None, reachable: bool = True, chains: dict[str, str] | None = None) -> Obstacles:
+    """Obstacles of a pick with one limit of this verdict, or without any."""
+    missed = MissedLimit("power_loss_W", None, "<=", 250.0, 255.0, 1.0, verdict, 5.0, 257.0, 0.9) if verdict else None
+    return Obstacles(reachable, (missed,) if missed else (), [], (), chains or {}, "")
+
+
 def test_unit_dangers_of_a_choice():
     """Unit: a response worse beyond its error, a broken or undecided limit, a chain that misses; a kept one is no note."""
     gains = [Gain("power_loss_W", -3.0, 1.0), Gain("impact_force_N", -0.5, 1.0), Gain("cage_slip", 4.0, 1.0)]
-    notes = choice_notes(gains, "broken", "LIMIT BROKEN", {"guide": "misses"})
-    assert [note.code for note in notes] == ["broken-limit", "worse", "missed-chain"]
-    assert notes[1] == "the pick is worse than the baseline: power loss by 3 ± 1 %"
-    assert [note.code for note in choice_notes(gains[1:], "undecided", "x", {})] == ["open-limit"]
-    assert choice_notes(gains[1:], "kept", "", {}) == ()
+    (worse,) = worse_notes(gains)
+    assert (worse.code, worse) == ("worse", "the pick is worse than the baseline: power loss 3.0 ± 1.0 % more")
+    assert worse_notes(gains[1:]) == ()
+    found = obstacles("broken", chains={"guide": "misses"}).notes
+    assert {note.code for note in found} == {"broken-limit", "missed-chain"}
+    assert found[0].startswith("Limit power loss <= 250 W is missed by 5.0 ± 1.0 W") and "guide: misses" in found[-1]
+    assert {note.code for note in obstacles("undecided").notes} == {"open-limit"}
+    assert obstacles("undecided", reachable=False).notes[0].level == Level.DANGER
+    assert obstacles(None).notes == ()
 
 
 def test_unit_extrapolation_is_found_beyond_the_runs_and_at_corners_without_runs():

@@ -15,7 +15,8 @@ from instant_runs import instantly, unillustrated
 from short_studies import short_study
 
 import doe
-from rbdyn.base.blocks import Note, Section, Table, Widget
+from rbdyn.base.blocks import Remarks, Section, Table, Widget
+from rbdyn.base.notes import Note
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROLLERS = EXAMPLES / "cylindrical_roller.toml"
@@ -162,7 +163,8 @@ def test_unit_a_page_of_a_notebook_escapes_every_text():
     class Marked(doe.Answer):
         def blocks(self):
             marked = '<b onclick="x()">&'
-            return [Note(marked), Widget("surface"), Table(marked, (marked, "y"), [(marked, marked)], note=marked)]
+            notes = Remarks((Note("remark", marked),))
+            return [notes, Widget("surface"), Table(marked, (marked, "y"), [(marked, marked)], note=marked)]
 
         def sections(self):
             return [Section("a", "first", self.blocks()), Section("b", "<i>second</i>", self.blocks())]

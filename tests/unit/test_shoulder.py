@@ -86,7 +86,8 @@ def test_semi_axes_have_three_digits_and_no_exponent() -> None:
     shown = text(blocks(equilibrium(thrust(30_000.0))))
     contact = equilibrium(thrust(30_000.0)).row_reports[""].contacts["inner"]
     assert 1.0 < contact["semi_major_mm"] < 10.0 and "e+" not in shown
-    assert f"semi-axes {1e3 * contact['semi_major_mm']:.0f} x {1e3 * contact['semi_minor_mm']:.0f} µm" in shown
+    major, minor = (float(f"{1e3 * contact[f'semi_{axis}_mm']:.3g}") for axis in ("major", "minor"))
+    assert f"semi-axes {major:.0f} x {minor:.0f} µm" in shown
 
 
 def test_a_sweep_names_the_points_that_climb() -> None:

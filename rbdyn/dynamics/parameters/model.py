@@ -355,6 +355,8 @@ def race_contact_law(scene: Scene, which: str) -> Any:
 
 def roller_relief(scene: Scene, slices: int) -> Array:
     """Profile drop of the roller at its slice centres [m]."""
+    if scene.bearing.roller_profile == "cylinder":
+        return np.zeros(slices)
     from rbdyn.contact import profile
 
     drawing, length = scene.bearing, scene.bearing.effective_length
@@ -365,9 +367,7 @@ def roller_relief(scene: Scene, slices: int) -> Array:
         return profile.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
     if drawing.profile_table is not None:
         return profile.table_relief(position, drawing.profile_table)
-    if drawing.roller_profile == "logarithmic":
-        return profile.logarithmic_relief(position, drawing.roller_diameter, length)
-    return np.zeros(slices)
+    return profile.logarithmic_relief(position, drawing.roller_diameter, length)
 
 
 def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:

@@ -378,7 +378,7 @@ def heat_notes(scene: Scene, power_loss: float) -> Notes:
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     sentence = (
-        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface and takes "
+        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface; it takes "
         f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
         f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s"
     )
