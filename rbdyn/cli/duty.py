@@ -13,7 +13,7 @@ from rbdyn.base.faults import key_path
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.words import quantity, shown, with_error
-from rbdyn.life.duty import SHARE_ROUNDING
+from rbdyn.life.duty import life_notes
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
@@ -127,13 +127,6 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
     return MapDuty(points, scenes, life, notes)
 
 
-def life_notes(life: float, hours: float) -> Notes:
-    """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
-    if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
-        return ()
-    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)
-
-
 def _notes(
     points: Sequence[DutyPoint], scenes: Sequence[Scene], speeds: Sequence[float], loads: Sequence[float]
 ) -> Notes:
@@ -161,12 +154,13 @@ def _place(scene: Scene) -> tuple[float, float]:
 def simulated_blocks(found: "DutySimulation") -> list[Block]:
     """The verdict, the worst points in words, figures and clearances in operation at each point, lives, notes."""
     names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
+    lifeless = [point.name for point in found.points if point.L10_h is None and point.status != "ok"]
     blocks = [
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
-        Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
+        Paragraph("" if found.life else f"Life over the duty: unknown, for there is none at {', '.join(lifeless)}."),
     ]
     return with_notes(found.notes, blocks)
 

@@ -17,7 +17,7 @@ from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.life.duty import ROLLER_EXPONENT, duty_life
+from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
@@ -115,6 +115,7 @@ def simulate_duty(
     cases = [None if one is None else load_case(one, share) for one, share in zip(hot, shares, strict=True)]
     known = [case for case in cases if case is not None]
     life = duty_life(known, ROLLER_EXPONENT) if len(known) == len(cases) else None
+    short = () if life is None else life_notes(life.hours, sum(point.share for point in duty))
     points = tuple(
         SimulatedPoint(
             point.name,
@@ -134,7 +135,7 @@ def simulate_duty(
         points=points,
         worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
         life=None if life is None else life.as_record(),
-        notes=_notes(results),
+        notes=(*short, *_notes(results)),
         wall_s=time.perf_counter() - started,
         seed=scene.numerics.seed,
         versions=versions(),

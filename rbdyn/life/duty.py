@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rbdyn.base.faults import MethodError
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite
 from rbdyn.life import Life
 
@@ -94,3 +95,10 @@ def duty_life(cases: Sequence[LoadCase], exponent: float) -> DutyLife:
         point_hours=tuple(case.hours for case in cases),
         damage=tuple(one / rate if rate > 0.0 else 0.0 for one in rates),
     )
+
+
+def life_notes(life: float, hours: float) -> Notes:
+    """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
+    if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
+        return ()
+    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)

@@ -12,9 +12,10 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text as terminal_text
 from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.app import map_blocks
-from rbdyn.cli.duty import life_notes, map_duty
+from rbdyn.cli.duty import map_duty
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import FIGURES, Point, SlipMap
+from rbdyn.life.duty import life_notes
 from rbdyn.result import Quantity
 from rbdyn.scene.duty import read_duty
 

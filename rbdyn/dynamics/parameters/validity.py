@@ -296,7 +296,10 @@ def limit_notes(scene: Scene) -> Notes:
     mounting = scene.mounting
     running = {} if mounting is None else scene.running_clearances(mounting)
     floors = {name: clear.floor for name, clear in running.items()}
-    return (*clearance_notes(scene.clearances, floors), *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference))
+    return (
+        *clearance_notes(scene.clearances, floors),
+        *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference),
+    )
 
 
 def light_load_notes(scene: Scene) -> Notes:
