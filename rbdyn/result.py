@@ -254,17 +254,23 @@ def write_json(path: Path | str, data: dict[str, Any]) -> None:
         new.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def place_of_file(path: Path | str) -> Path:
+    """The path of a file to write. Raises InputError where no file can be."""
+    path = path_of(path)
+    if path.is_dir() or not path.name:
+        raise InputError([f"{path}: is a folder; name a file in it"])
+    if not path.parent.is_dir():
+        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
+    return path
+
+
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
     """A file to write, which then replaces ``path``: a reader gets the old one or the new one.
 
     A failure or an interruption leaves no part of the new one. Raises InputError for a path where no file can be.
     """
-    path = path_of(path)
-    if path.is_dir() or not path.name:
-        raise InputError([f"{path}: is a folder; name a file in it"])
-    if not path.parent.is_dir():
-        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
+    path = place_of_file(path)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         with naming(lambda: path):

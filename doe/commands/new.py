@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.command import ForceFile, Json, OutFile, flag, guarded, hand_out, notice, plain_number, valued
+from rbdyn.base.command import (
+    ForceFile,
+    Json,
+    OutFile,
+    check_out,
+    flag,
+    guarded,
+    hand_out,
+    notice,
+    plain_number,
+    valued,
+)
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
@@ -100,6 +111,8 @@ def new(
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
 
+        reads = [path, *([duty] if duty else [])]
+        check_out(out, force, reads)
         bounds = limits_of(limit or [])
         scene = rollers_only(DrawnScene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
@@ -124,7 +137,7 @@ def new(
                 sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))
             text, study = written(_moved(factors, study, moved))
         check_study(study)
-        hand_out(text, as_json, out, force, "doe study", [path, *([duty] if duty else [])])
+        hand_out(text, as_json, out, force, "doe study", reads)
 
 
 def limits_of(texts: Sequence[str]) -> Limits:

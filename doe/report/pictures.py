@@ -148,6 +148,7 @@ def _pairs(pairs: Sequence[tuple[int, int]], path: Path) -> Iterator[tuple[Axes,
     yield from zip(axes.flat, pairs, strict=False)
     for axis in axes.flat[: len(pairs)]:
         axis.grid(alpha=0.3)
+        axis.xaxis.set_major_locator(MaxNLocator(5))  # seven long numbers such as 0.0035 would run into each other
     figure.tight_layout()
     # Below the figure, where no point lies; every mark once.
     marks = {words: mark for axis in axes.flat for mark, words in zip(*axis.get_legend_handles_labels(), strict=True)}

@@ -205,8 +205,8 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     return sorted(agendas, key=lambda pair: pair[0].begin)
 
 
-# Shortest time [s] that clocks tell apart.
-SHORTEST_S = 1e-6
+# Time [s] at full speed that a first run counts with, so that loading of code does not make a short one look crowded.
+CALM_S = 5.0
 # Largest crowd: runs that take longer wait for something else than a processor.
 MOST_CROWD = 10.0
 
@@ -316,7 +316,7 @@ class AgendaKeeper:
                     seconds = outcome.seconds - outcome.result.get("cost", {}).get("compile_s", 0.0)
                     running = len(self._store.running()) + 1 if cluster and self._store is not None else threads
                     spent = shared * max(seconds, 0.0)
-                    crowd = spent / max(outcome.result.get("cost", {}).get("cpu_s", spent), SHORTEST_S)
+                    crowd = (spent + CALM_S) / (outcome.result.get("cost", {}).get("cpu_s", spent) + CALM_S)
                     self._estimate(spent / works[point.key] / running, min(max(crowd, 1.0), MOST_CROWD))
 
             engine(points, replace(ledger, give=end))

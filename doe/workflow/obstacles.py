@@ -128,7 +128,8 @@ class Obstacles(Record):
             least = "No point of the region keeps all limits: the chosen clearances are those that miss them least."
             yield Note(worst, least)
         for limit in self.limits:
-            yield Note("broken-limit" if limit.verdict == "broken" else "open-limit", limit.sentence)
+            sure = limit.verdict == "broken" or not self.reachable
+            yield Note("broken-limit" if sure else "open-limit", limit.sentence)
         if self.limits:
             yield Note(worst, self._remedy())
         yield from (Note("missed-chain", f"Chain {name}: {why}.") for name, why in self.chains.items())

@@ -89,16 +89,25 @@ def hand_out(
     if path is not None:
         from rbdyn.result import whole_file
 
-        if path.is_file() and not force:
-            raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])
-        if any(path.exists() and path.samefile(read) for read in reads):
-            raise InputError([f"--out {path}: is a file that this command reads; name another file"])
+        check_out(path, force, reads)
         with whole_file(path) as new:
             new.write_text(f"{text}\n", encoding="utf-8")
     if as_json:
         print_json(tomllib.loads(text))
     else:
         print(text if path is None else f"written to {path}; next: {following} {shlex.quote(str(path))}")
+
+
+def check_out(path: Path | None, force: bool, reads: Sequence[Path]) -> None:
+    """Raise the InputError of ``hand_out`` before anything is computed."""
+    if path is not None:
+        from rbdyn.result import place_of_file
+
+        if path.is_file() and not force:
+            raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])
+        if any(path.exists() and path.samefile(read) for read in reads):
+            raise InputError([f"--out {path}: is a file that this command reads; name another file"])
+        place_of_file(path)
 
 
 def hand_over(

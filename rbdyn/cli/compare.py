@@ -1,6 +1,7 @@
 """The command ``rbdyn compare``. Physics is imported inside it, so that help comes at once."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import output_folder
-from rbdyn.base.identity import identity_line, identity_of
+from rbdyn.base.identity import Identity, identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
 from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show
@@ -62,7 +63,7 @@ def compare(
         with command.progress_bar("comparing", quiet or as_json) as progress:
             found = run(a, b, assignments or [], both, workers, progress, command.notice(quiet))
         inputs = [file_of(path) for path in (a, b) if path is not None]
-        identity = identity_of("rbdyn compare", found.a.scene, inputs)
+        identity = _identity(found, inputs)
         answer = partial(blocks, found)
         written = write_with_report(folder, identity, answer, partial(_write, found))
         detail = Detail.of(quiet, verbose)
@@ -71,6 +72,16 @@ def compare(
         )
     if found.failed:
         raise typer.Exit(command.FAILED)
+
+
+def _identity(found: "Comparison", files: Sequence[Path]) -> Identity:
+    """Identity of both bearings; what differs of bearing and operating point is stated of each."""
+    a, b = (identity_of("rbdyn compare", side.scene, files) for side in (found.a, found.b))
+    pairs = {name: (getattr(a, name), getattr(b, name)) for name in ("bearing", "drawing", "point")}
+    words: dict[str, Any] = {
+        name: one if one == other else f"{one} against {other}" for name, (one, other) in pairs.items()
+    }
+    return replace(a, **words)
 
 
 def blocks(found: "Comparison") -> list[Block]:

@@ -154,12 +154,13 @@ def _place(scene: Scene) -> tuple[float, float]:
 def simulated_blocks(found: "DutySimulation") -> list[Block]:
     """The verdict, the worst points in words, figures and clearances in operation at each point, lives, notes."""
     names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
+    lifeless = [point.name for point in found.points if point.L10_h is None and point.status != "ok"]
     blocks = [
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
-        Paragraph("" if found.life else "Life over the duty: unknown, for a point has no steady temperatures."),
+        Paragraph("" if found.life else f"Life over the duty: unknown, for there is none at {', '.join(lifeless)}."),
     ]
     return with_notes(found.notes, blocks)
 

@@ -43,7 +43,7 @@ def overload_sentence(pressure: float, limit: float) -> str:
 def pressure_notes(pressure: float, limit: float, race: str) -> Notes:
     """A note on a largest ``pressure`` [Pa] that dents a race or is above its shakedown limit; ``limit``: ``BALLS`` or ``ROLLERS``."""
     if pressure > SHAKEDOWN[limit]:
-        return (Note("overload", f"{race} race: overloaded by {overload_sentence(pressure, limit)}"),)
+        return (Note("overload", f"{race} race: overloaded: {overload_sentence(pressure, limit)}"),)
     return (Note("dent", dent_sentence(pressure, limit, race)),) if pressure > limit else ()
 
 

@@ -119,6 +119,7 @@ def simulate_duty(
     cases = [None if one is None else load_case(one, share) for one, share in zip(hot, shares, strict=True)]
     known = [case for case in cases if case is not None]
     life = duty_life(known, ROLLER_EXPONENT) if len(known) == len(cases) else None
+    short = () if life is None else life_notes(life.hours, sum(point.share for point in duty))
     points = tuple(
         SimulatedPoint(
             point.name,
@@ -138,7 +139,7 @@ def simulate_duty(
         points=points,
         worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
         life=None if life is None else life.as_record(),
-        notes=(*(() if life is None else life_notes(life.hours, sum(point.share for point in duty))), *_notes(results)),
+        notes=(*short, *_notes(results)),
         wall_s=time.perf_counter() - started,
         seed=scene.numerics.seed,
         versions=versions(),

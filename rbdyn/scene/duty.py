@@ -134,7 +134,7 @@ def _columns(sheet: Sheet) -> tuple[list[str], str]:
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]
     keys, times = [name for name in names if "." in name], [name for name in TIMES if name in names]
-    missing = [NAME] * (NAME not in names) + ["share"] * (not times)
+    missing = [NAME] * (NAME not in names) + ["share or hours"] * (not times)
     faults = [
         f"{sheet.path}: column {name} is missing; add it, or rename one of {listed(sheet.header)}" for name in missing
     ]

@@ -194,7 +194,7 @@ def speed_notes(speed: float, pitch_diameter: float, reference: float | None, us
     if speed <= fast:
         return ()
     base = reference or usual / pitch_diameter
-    sentence = f"{speed / RPM:.0f} rpm is {speed / base:.2g} times the {name} of {base / RPM:.3g} rpm"
+    sentence = f"{speed / RPM:.0f} rpm is {speed / base:.2g} times the {name} of {base / RPM:.0f} rpm"
     if speed <= limit:
         return (
             Note(

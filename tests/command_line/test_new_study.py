@@ -77,6 +77,20 @@ def test_command_line_limits_that_are_refused(scene):
     assert json.loads(doe("new", scene, "--limit", "x=1", "--json").stdout)["status"] == "refused"
 
 
+def test_command_line_places_without_a_file_are_refused_first(scene, tmp_path):
+    """Command line: a missing folder, a folder and a file that exists are named as such; exit 2."""
+    gone, there = tmp_path / "gone" / "x.toml", tmp_path / "there.toml"
+    there.write_text("kept", encoding="utf-8")
+    for place, words in {
+        gone: f"{gone}: there is no folder {gone.parent}; make it first",
+        tmp_path: f"{tmp_path}: is a folder; name a file in it",
+        there: f"--out {there}: exists; add --force to write over it, or name another file",
+    }.items():
+        refused = doe("new", scene, "--out", place)
+        assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", f"{words}\n")
+    assert there.read_text("utf-8") == "kept"
+
+
 @pytest.mark.parametrize(
     ("scene", "names"),
     [("outer", ["radial", "guide", "pocket"]), ("inner", ["radial", "guide", "pocket"]), ("roller", ["radial", "pocket"])],

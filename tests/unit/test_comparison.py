@@ -190,5 +190,7 @@ def test_command_line_compare(command, tmp_path):
         {"key": "operation.inner_speed_rpm", "a": 30000.0, "b": 12000.0, "a_default": False, "b_default": False}
     ]
     assert record["figures"]["life_h"]["verdict"] == "significant"
+    # The first line states the operating points of both.
+    assert "against 12000 rpm" in " ".join(ran.stdout.partition("A: ")[0].split())
     refused = command("compare", str(BALLS), str(ROLLERS))
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,24 @@ def test_unit_a_duty_survives_saving(found, tmp_path):
     table = found.table()
     assert table["name"].to_list() == ["idle", "cruise", "take-off"]
     assert {"impact_force_N_statistical_error", "radial_operating_clearance_um", "L10_h"} <= set(table)
+
+
+def test_unit_a_life_below_the_hours_of_the_duty_is_a_danger(scene, duty, found, monkeypatch):
+    """Unit: hours beyond the life bring a danger, shares or fewer hours none; an unknown life names the points without one."""
+
+    def unrun(*_, **__):
+        raise RunError("not run")
+
+    monkeypatch.setattr(duty_simulation, "simulate", unrun)
+    points = read_duty(duty)
+    total = sum(point.share for point in points)
+    for hours, short in ((1.0, False), (0.99 * found.life["L10_h"], False), (1.01 * found.life["L10_h"], True)):
+        scaled = [point.model_copy(update={"share": point.share * hours / total}) for point in points]
+        unsimulated = simulate_duty(scene, scaled, notice=None)
+        assert ("short-life" in [note.code for note in unsimulated.notes]) == short
+    first, second, third = unsimulated.points
+    lost = replace(unsimulated, life=None, points=(first, replace(second, L10_h=None), third))
+    assert "Life over the duty: unknown, for there is none at cruise." in text(simulated_blocks(lost))
 
 
 def test_closed_form_of_the_worst_point():

@@ -19,10 +19,12 @@ from doe.cli import app
 from doe.study_file import Study
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import OutOfReachError
+from doe.workflow.obstacles import MissedLimit, Obstacles
 from doe.workflow.runs import region_of
 from doe.workflow.status import study_stages
 from doe.workflow.surfaces import reference_runs
 from doe.workflow.whole import run_study
+from rbdyn.base.notes import Level, Note, of_level, ranked
 from rbdyn.dynamics import simulate as module
 
 QUICK = ("generations = 5", "generations = 15")
@@ -258,3 +260,15 @@ def test_two_points_of_a_duty_are_shown_one_a_line(tmp_path, monkeypatch):
     json.loads(shown.stdout)
     lines = [line for line in shown.stderr.splitlines() if line.startswith("note: original design at ")]
     assert len(lines) == 2 and all("power loss " in line and " W" in line for line in lines)
+
+
+def test_unit_what_to_relax_is_a_danger_ahead_of_a_worse_pick():
+    """Unit: where no point keeps the limits, what would be kept stands behind that and ahead of what the pick loses."""
+    missed = MissedLimit("impact_force_N", None, "<=", 5.0, 37.0, 37.0, "undecided", 32.0, 56.0, 0.95)
+    notes = Obstacles(False, (missed,), [], (), {}, "").notes
+    dangers = of_level(ranked([Note("worse", "the pick is worse"), *notes]), Level.DANGER)
+    assert [str(note) for note in dangers] == [
+        *map(str, notes),
+        "the pick is worse",
+    ] and "56 N would be kept" in dangers[1]
+    assert [note.level for note in Obstacles(True, (missed,), [], (), {}, "").notes] == [Level.WARNING] * 2
