@@ -34,7 +34,7 @@ def test_command_line_from_a_designation_to_a_run(command, tmp_path, arguments, 
     result = json.loads(ran.stdout)
     assert result["cage_speed_rpm"]["value"] == pytest.approx(cage_rpm, rel=0.03)
     assert 50.0 < result["power_loss_W"]["value"] < 1000.0
-    assert any(note.startswith("lubricant: ISO VG") for note in result["notes"])
+    assert any(note["text"].startswith("lubricant: ISO VG") for note in result["notes"])
     assert result["scene"]["traction"]["model"] == "limiting_shear"
     check = result["friction_check"]
     assert (
