@@ -156,8 +156,12 @@ def compare(
     if isinstance(sources[0], Scene | BallScene) and sources[0] == sources[1]:
         sources = sources[:1]
     results: list[Any] = []
+    if notice is not None and any(isinstance(source, Scene) for source in sources):
+        from rbdyn.dynamics.ensemble import plan_of, threads_of
     for place, source in enumerate(sources):
         steps, words = part_of(progress, place, len(sources)), named(notice, "AB"[place])
+        if words is not None and isinstance(source, Scene):
+            words(plan_of(source, threads_of(workers)))
         try:
             results.append(_result(source, workers, steps, words))
         except RunError as error:

@@ -116,7 +116,8 @@ def new(
         bounds = limits_of(limit or [])
         scene = rollers_only(DrawnScene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
-        sections = {"responses": _responses(bounds), "duty": _duty(duty, scene), "baseline": ""}
+        points, hours = _duty(duty, scene)
+        sections = {"responses": _responses(bounds), "duty": points, "baseline": ""}
         factors = _factors(read_toml(path))
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
@@ -125,7 +126,7 @@ def new(
             text = template
             for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
                 text = text.replace(f"{{{name}}}", section)
-            text = fill_template(text, {"quoted": json.dumps(str(base))})
+            text = fill_template(text, {"quoted": json.dumps(str(base)), "hours": "true" if hours else None})
             return text, Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
 
         text, study = written(factors)
@@ -208,16 +209,16 @@ def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: b
     }
 
 
-def _duty(path: Path | None, scene: "Scene") -> str:
-    """The duty of the study; empty without a file of its points. Raises InputError."""
+def _duty(path: Path | None, scene: "Scene") -> tuple[str, bool]:
+    """The duty of the study, and whether its shares are hours; empty without a file of its points. Raises InputError."""
     if path is None:
-        return ""
+        return "", False
     from doe.commands.new_duty import duty_text
-    from rbdyn.scene.duty import duty_scenes, read_duty
+    from rbdyn.scene.duty import duty_scenes, in_hours, read_duty
 
     points = read_duty(path)
     duty_scenes(scene, points, str(path))
-    return duty_text(points)
+    return duty_text(points, in_hours(points)), in_hours(points)
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:

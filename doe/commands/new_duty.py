@@ -3,11 +3,11 @@
 import json
 from collections.abc import Sequence
 
-from rbdyn.scene.duty import DutyPoint, shares_of_time
+from rbdyn.scene.duty import DutyPoint
 
 POINT = """[[duty]]
 name = {name}
-share = {share!r} # of the time
+share = {share!r} # {unit}
 set = {set}
 """
 
@@ -18,9 +18,9 @@ def _quoted(value: str | list[str]) -> str:
     return "".join(f"\\u{ord(character):04x}" if character in "{}#" else character for character in text)
 
 
-def duty_text(points: Sequence[DutyPoint]) -> str:
-    """The [[duty]] tables of a study, with shares that sum to 1."""
+def duty_text(points: Sequence[DutyPoint], hours: bool) -> str:
+    """The [[duty]] tables of a study; ``hours``: whether shares are hours."""
+    unit = "h" if hours else "of the time"
     return "\n".join(
-        POINT.format(name=_quoted(point.name), share=share, set=_quoted(point.set))
-        for point, share in zip(points, shares_of_time(points), strict=True)
+        POINT.format(name=_quoted(point.name), share=point.share, unit=unit, set=_quoted(point.set)) for point in points
     )

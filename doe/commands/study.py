@@ -87,8 +87,9 @@ def _leave_by(record: dict[str, Any], as_json: bool) -> None:
     sentences = record["obstacles"]["sentences"]
     if as_json:
         alarm(note for note in record["notes"] if note["text"] not in sentences)
-    for sentence in sentences:
-        print(sentence, file=sys.stderr)
+    if as_json or not sys.stdout.isatty():
+        for sentence in sentences:
+            print(sentence, file=sys.stderr)
     if sentences:
         raise typer.Exit(FAILED)
 

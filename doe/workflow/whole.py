@@ -71,6 +71,7 @@ from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record
+from rbdyn.life.duty import life_notes
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
@@ -363,7 +364,9 @@ class StudyResult:
         """The dangers of the pick first, then those of its runs and of the baseline's, then all other notes."""
         pick = (*self.obstacles.notes, *worse_notes(self.gains["pick"]))
         runs = (note.about(f"at the {name}") for name in ("pick", "baseline") for note in self.confirmed[name].dangers)
-        return (*pick, *runs, *self.notes)
+        duty, points = self.duty, self.study.file.duty
+        life = () if duty is None else life_notes(duty.life["pick"].hours, sum(point.share for point in points))
+        return (*pick, *life, *runs, *self.notes)
 
     @property
     def whirl_sentence(self) -> str:

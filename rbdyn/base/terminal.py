@@ -9,7 +9,7 @@ from textwrap import shorten, wrap
 from typing import NamedTuple
 
 from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Tiles, Verdict, says
-from rbdyn.base.notes import CODES, DANGER, condensed, of_level
+from rbdyn.base.notes import CODES, DANGER, NOTE, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
 
@@ -52,12 +52,12 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
 
 
 def _few_notes(block: Remarks, page: "Page") -> str:
-    """The first notes, merged and cut, without general ones, and where the others are."""
+    """The first notes, merged, without general ones, and where the others are; remarks that are no warnings are cut."""
     every = condensed(block.listed)
     room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)), 0)
     first = [note for note in every if not CODES[note.code].general][:room]
     lines = [f"{note.level}: {note}" for note in first]
-    short = [page.short(line) for line in lines]
+    short = [page.short(line) if note.level == NOTE else line for note, line in zip(first, lines, strict=True)]
     left = len(every) - len(first)
     where = f"{counted(left, 'more note')} in the report (--out)" if left else "notes in full: in the report (--out)"
     return "".join(map(page.lines, [*short, *([where] if left or short != lines else [])]))

@@ -97,11 +97,15 @@ def read_duty(path: Path) -> list[DutyPoint]:
     return validated(DutyTables, {key: tables[key] for key in DutyTables.model_fields if key in tables}, str(path)).duty
 
 
+def in_hours(points: Sequence[DutyPoint]) -> bool:
+    """Whether the shares are hours, for they do not sum to 1."""
+    return abs(math.fsum(point.share for point in points) - 1.0) > SHARE_ROUNDING
+
+
 def shares_of_time(points: Sequence[DutyPoint]) -> list[float]:
     """Shares of the time, which sum to 1 where those of the points are hours."""
-    total = math.fsum(point.share for point in points)
-    rounding = abs(total - 1.0) <= SHARE_ROUNDING
-    return [point.share if rounding else point.share / total for point in points]
+    total = math.fsum(point.share for point in points) if in_hours(points) else 1.0
+    return [point.share / total for point in points]
 
 
 def _points_of_table(sheet: Sheet) -> list[DutyPoint]:

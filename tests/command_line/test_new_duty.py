@@ -12,7 +12,7 @@ from doe.commands.new_duty import duty_text
 from doe.study_file import Study
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
-from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty
+from rbdyn.scene.duty import DutyPoint, duty_scenes, in_hours, read_duty, shares_of_time
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
 KEYS = "operation.inner_speed_rpm,operation.radial_load_N,lubricant.temperature_C"
@@ -71,12 +71,17 @@ def test_unit_a_european_table_means_the_same(scene, tmp_path):
 
 
 def test_unit_hours_stand_for_shares(scene, tmp_path):
-    """Unit: a column of hours gives the study of the shares, and both in one table are refused; so does TOML in place of CSV."""
-    shares = duty_text(read_points(table(tmp_path, TABLE), scene))
+    """Unit: a column of hours gives a duty in hours with the same shares, as TOML does; both in one table are refused."""
+    points = read_points(table(tmp_path, TABLE), scene)
+    shares = duty_text(points, False)
     hours = TABLE.replace("share", "hours").replace("0.2,", "400,").replace("0.75,", "1500,").replace("0.05,", "100,")
-    assert duty_text(read_points(table(tmp_path, hours), scene)) == shares
+    timed = read_points(table(tmp_path, hours), scene)
+    assert shares_of_time(timed) == shares_of_time(points) and in_hours(timed) and not in_hours(points)
+    ran = doe("new", str(EXAMPLE), "--duty", str(tmp_path / "duty.csv"))
+    study = tomllib.loads(ran.stdout)
+    assert study["normalise_shares"] is True and [point["share"] for point in study["duty"]] == [400.0, 1500.0, 100.0]
     (tmp_path / "duty.toml").write_text(shares)
-    assert duty_text(read_points(tmp_path / "duty.toml", scene)) == shares
+    assert duty_text(read_points(tmp_path / "duty.toml", scene), False) == shares
     with pytest.raises(InputError, match="columns share and hours: both state the time; keep one of them"):
         read_points(table(tmp_path, "name,share,hours\na,1,5\n"), scene)
     with pytest.raises(InputError, match="hours in row 1 = -5: is below 0; check the sign"):
@@ -86,7 +91,7 @@ def test_unit_hours_stand_for_shares(scene, tmp_path):
 def test_unit_names_survive_the_template(scene, tmp_path):
     """Unit: braces, number signs and umlauts of a name come out of the study as they went in."""
     points = read_points(table(tmp_path, "name,share\n{start} # 1,0.5\nLäufer,0.5\n"), scene)
-    assert [point["name"] for point in tomllib.loads(duty_text(points))["duty"]] == ["{start} # 1", "Läufer"]
+    assert [point["name"] for point in tomllib.loads(duty_text(points, False))["duty"]] == ["{start} # 1", "Läufer"]
     ran = doe("new", str(EXAMPLE), "--duty", str(tmp_path / "duty.csv"))
     assert [point["name"] for point in tomllib.loads(ran.stdout)["duty"]] == ["{start} # 1", "Läufer"]
 

@@ -119,18 +119,22 @@ def long_notes(count: int, code: str = "unit") -> tuple[Note, ...]:
     return tuple(Note(code, f"{number}: {number * 'more '}{'word ' * 30}end") for number in range(count))
 
 
-def test_a_screen_has_five_notes_of_a_line_each_and_says_where_the_others_are():
-    """Unit: below full detail the first five, cut; a file has them whole; at full detail all; general ones in files alone."""
-    tree = [Paragraph("before"), Remarks((Note("left-out", "general"), *long_notes(8))), Paragraph("after")]
+def test_a_screen_has_five_notes_and_says_where_the_others_are():
+    """Unit: below full detail the first five, remarks cut at the width, warnings whole, for they end with what to do; a file has
+    them whole; at full detail all; general ones in files alone.
+    """
+    tree = [Paragraph("before"), Remarks((Note("left-out", "general"), *long_notes(8, "remark"))), Paragraph("after")]
     lines = terminal.text(tree, width=80).splitlines()
-    assert [line[:10] for line in lines[1:6]] == [f"warning: {number}" for number in range(5)]
+    assert [line[:7] for line in lines[1:6]] == [f"note: {number}" for number in range(5)]
     assert all(len(line) <= 80 and line.endswith("…") for line in lines[1:6])
     assert lines[6].startswith("4 more notes in the report") and lines[7:] == ["after"]
     whole = terminal.text(tree)
     assert whole.count("end\n") == 5 and "4 more notes in the report" in whole and "general" not in whole
     assert terminal.text(tree, Detail.ALL, 80).count("end") == 8 and "Note: general" in "".join(map(page.render, tree))
-    assert "in full" in terminal.text([Remarks(long_notes(3))], width=80)
-    assert "report" not in terminal.text([Remarks(long_notes(3))])
+    assert "in full" in terminal.text([Remarks(long_notes(3, "remark"))], width=80)
+    warned = terminal.text([Remarks(long_notes(3))], width=80)
+    assert warned.count("end\n") == 3 and max(map(len, warned.splitlines())) <= 80
+    assert "report" not in warned and "report" not in terminal.text([Remarks(long_notes(3, "remark"))])
 
 
 def test_dangers_come_first_even_quietly_and_take_the_place_of_notes():

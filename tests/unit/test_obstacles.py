@@ -69,7 +69,7 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     assert sentences[0].startswith("No point of the region keeps all limits") and "relax the limits" in sentences[2]
     # The lower impact costs whirl, which this study wants large.
     worse, *obstacles = shown.stderr.splitlines()
-    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio by 31.")
+    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio 31.")
     assert obstacles == sentences
     assert "No point of the region keeps all limits" in (out / "report.html").read_text("utf-8")
     answer = (out / "answer.txt").read_text("utf-8")
@@ -105,7 +105,7 @@ def test_a_limit_that_only_the_surfaces_miss_is_kept_by_simulation(tmp_path, mon
     record = json.loads(shown.stdout)
     assert (shown.exit_code, record["status"]) == (0, "ok")
     (worse,) = shown.stderr.splitlines()
-    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio by ")
+    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio ")
     assert record["obstacles"]["sentences"] == [] and record["limits"]["impact_force_N"]["verdict"] == "kept"
 
 
