@@ -162,7 +162,13 @@ def _pending_interrupts() -> list[object]:
         interrupts.append(lost.object)
         threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
 
-    sys.unraisablehook = hook
+    def printed(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        # Compiled code of libraries prints such a Ctrl-C before it hands it to the hook above.
+        if kind is not KeyboardInterrupt:
+            print_usual(kind, error, trace)
+
+    print_usual = sys.excepthook
+    sys.unraisablehook, sys.excepthook = hook, printed
     return interrupts
 
 

@@ -26,6 +26,7 @@ def in_process(program: str, *arguments: Any) -> subprocess.CompletedProcess[str
         stack.enter_context(patch.object(sys, "argv", words))
         stack.enter_context(patch.dict(os.environ, {"NO_COLOR": "1"}))
         stack.enter_context(patch.object(sys, "unraisablehook", sys.unraisablehook))
+        stack.enter_context(patch.object(sys, "excepthook", sys.excepthook))
         stack.enter_context(warnings.catch_warnings())
         warnings.resetwarnings()
         for category in UNSEEN:
