@@ -198,7 +198,8 @@ def read_designation(text: str) -> Designation:
 def _read(word: str, kind: str, form: str) -> tuple[list[str], list[Suffix]]:
     """The parts of a suffix, classes apart from what they follow, and its features. Raises MethodError."""
     match = re.fullmatch(form, word)
-    if match is None:
+    # CM is a clearance of electric motors, not a contact angle C and a cage M.
+    if match is None or word == "CM":
         raise MethodError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
     parts, features, joined = list[str](), list[Suffix](), False
     for name, value in sorted(match.groupdict().items(), key=lambda item: match.start(item[0])):

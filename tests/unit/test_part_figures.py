@@ -114,7 +114,7 @@ def test_a_map_has_all_of_them_at_every_point():
 def test_a_whole_study_improves_and_limits_parts(tmp_path):
     """A study with a response and a limit of each kind ends, and its answer has them."""
     text = short_study(tmp_path).read_text(encoding="utf-8")
-    further = "".join(f'\n[[response]]\nname = "{name}"\ngoal = "none"\nupper = 1e4\n' for name in ONE_OF_EACH)
+    further = "".join(f'\n[[response]]\nname = "{name}"\ngoal = "none"\nupper = 1e5\n' for name in ONE_OF_EACH)
     path = tmp_path / "parts.toml"
     # The published table has no such columns.
     path.write_text(text.partition("[reference]")[0] + further, encoding="utf-8")
