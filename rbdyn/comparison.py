@@ -156,12 +156,8 @@ def compare(
     if isinstance(sources[0], Scene | BallScene) and sources[0] == sources[1]:
         sources = sources[:1]
     results: list[Any] = []
-    if notice is not None and any(isinstance(source, Scene) for source in sources):
-        from rbdyn.dynamics.ensemble import plan_of, threads_of
     for place, source in enumerate(sources):
         steps, words = part_of(progress, place, len(sources)), named(notice, "AB"[place])
-        if words is not None and isinstance(source, Scene):
-            words(plan_of(source, threads_of(workers)))
         try:
             results.append(_result(source, workers, steps, words))
         except RunError as error:
@@ -280,8 +276,11 @@ def _kind(source: Any) -> str:
 
 def _result(source: Any, workers: int | None, progress: "Reporter", notice: Notice) -> Any:
     if isinstance(source, Scene):
+        from rbdyn.dynamics.ensemble import plan_of, threads_of
         from rbdyn.dynamics.simulate import simulate
 
+        if notice is not None:
+            notice(plan_of(source, threads_of(workers)))
         return simulate(source, workers, progress, notice=notice)
     if isinstance(source, BallScene):
         from rbdyn.quasistatic.bearing import equilibrium

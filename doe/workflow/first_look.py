@@ -59,11 +59,13 @@ def first_look(study: Study, folder: Path, original: Confirmed, progress: Progre
         return progress
     for sentence in original_sentences(study, original):
         notice(sentence)
+    missed = [limit for limit in every_limit(study, original) if limit.verdict == "broken"]
+    if not missed:
+        return progress
     ordered = ordered_runs(study)
     rows = [row for row, kind in enumerate(ordered.design.kind) if kind == "cube"]
-    missed = [limit for limit in every_limit(study, original) if limit.verdict == "broken"]
     runs, labels = [ordered.scenes[row] for row in rows], [ordered.labels[row] for row in rows]
-    waiting = bool(rows and missed)
+    waiting = bool(rows)
 
     def watch(done: int, total: int) -> None:
         nonlocal waiting
