@@ -17,6 +17,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
 
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
@@ -226,6 +227,10 @@ class Program(typer.Typer):
 
     def __init__(self) -> None:
         super().__init__(cls=Group, no_args_is_help=True, pretty_exceptions_enable=False)
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """Run the program; typer's own call would replace the hook that keeps a lost Ctrl-C from being printed."""
+        return get_command(self)(*arguments, **options)
 
     def command(self, name: str | None = None, *, cls: type[TyperCommand] | None = Command, **options: Any) -> Any:
         """Take up a function as a command."""

@@ -195,6 +195,22 @@ def test_an_interrupt_that_a_callback_swallows_comes_again():
     assert (found.returncode, found.stderr) == (130, "")
 
 
+@pytest.mark.parametrize("package", ["rbdyn", "doe"])
+def test_an_interrupt_that_compiled_code_prints_and_loses_stays_silent(package):
+    """Command line: Cython prints a Ctrl-C that it cannot raise; neither our programs nor typer show it."""
+    program = (
+        f"import importlib\ncli = importlib.import_module('{package}.cli')\n"
+        "import sys, typer.core\n"
+        "usual = typer.core.TyperGroup.main\n"
+        "def main(self, *a, **k):\n"
+        "    sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None)\n"
+        "    return usual(self, *a, **k)\n"
+        "typer.core.TyperGroup.main = main\nsys.argv = ['x', '--help']\ncli.run()"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=300)
+    assert (found.returncode, found.stderr) == (0, "")
+
+
 def test_an_interrupt_that_pydantic_words_is_one():
     """Unit: Ctrl-C while a model is built, of which pydantic leaves the name in the text of its own error."""
     wrapped = "Error building `default` serializer:\\n  SchemaError: Error building `literal` serializer:\\n  KeyboardInterrupt: "
