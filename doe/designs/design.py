@@ -12,7 +12,7 @@ of the cube -1 and +1, one column a factor. ``to_actual`` and ``to_coded`` conve
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import product
 from typing import Literal, Self
 
 import numpy as np
@@ -123,7 +123,6 @@ def central_composite(
     centre_replicates: int = 6,
     cube: str = "full",
     blocks: bool = False,
-    cube_blocks: int = 1,
 ) -> Design:
     """Central composite design in standard order.
 
@@ -133,7 +132,6 @@ def central_composite(
     centre_replicates : number of centre points, whose scatter estimates the pure error.
     cube : "full", or "resolution_v" for the tabulated fraction.
     blocks : whether cube and axial points are separate blocks, which share the centre points by `centre_shares`.
-    cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
 
     Raises MethodError when a number is out of range, ``alpha`` or ``cube`` is unknown, the fraction is not tabulated, or the
     blocks are impossible.
@@ -146,8 +144,7 @@ def central_composite(
     if centre_replicates < 0:
         raise MethodError(f"centre_replicates = {centre_replicates}: must be at least 0")
     corners = cube_points(factors, cube)
-    number = cube_blocks if blocks else 1
-    shares = centre_shares(factors, len(corners), alpha, centre_replicates, number)
+    shares = centre_shares(factors, len(corners), alpha, centre_replicates)
     distance = axial_distance(factors, alpha, cube_runs=len(corners), centres=shares)
     axial = np.asarray(np.kron(np.eye(factors), [[-distance], [distance]]), float)
     if alpha == "inscribed":
@@ -155,9 +152,7 @@ def central_composite(
     parts = [("cube", corners), ("axial", axial), ("centre", np.zeros((centre_replicates, factors)))]
     of_run = [0] * (len(corners) + len(axial) + centre_replicates)
     if blocks:
-        of_cube = corner_blocks(corners, number).tolist()
-        of_centres = [place % number for place in range(shares[0])] + [number] * shares[1]
-        of_run = [*of_cube, *[number] * len(axial), *of_centres]
+        of_run = [*[0] * len(corners), *[1] * len(axial), *[0] * shares[0], *[1] * shares[1]]
     ball = distance > 1.0 or alpha == "inscribed"
     return design_of_parts(parts, of_run, max(1.0, distance), "ball" if ball else "box")
 
@@ -200,13 +195,11 @@ def axial_distance(
     return float(alpha)
 
 
-def centre_shares(
-    factors: int, cube_runs: int, alpha: float | str, centre_replicates: int, cube_blocks: int = 1
-) -> tuple[int, int]:
+def centre_shares(factors: int, cube_runs: int, alpha: float | str, centre_replicates: int) -> tuple[int, int]:
     """Numbers of centre points with the cube and with the axial points, of ``centre_replicates`` in all.
 
     The blocks disturb the surface least when their orthogonal axial distance is nearest to ``alpha``. For
-    alpha = "orthogonal_blocks" the rotatable distance is the target. All blocks of the cube get the same number.
+    alpha = "orthogonal_blocks" the rotatable distance is the target.
 
     Raises MethodError for an unknown ``alpha``.
     """
@@ -218,7 +211,7 @@ def centre_shares(
         orthogonal = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
         return abs(math.log(orthogonal / target))
 
-    best = min(range(0, centre_replicates + 1, cube_blocks), key=away)
+    best = min(range(centre_replicates + 1), key=away)
     return best, centre_replicates - best
 
 
@@ -240,38 +233,6 @@ def cube_points(factors: int, cube: str = "full") -> Array:
     corners = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=basic)])
     added = [corners[:, ["ABCDEFGH".index(letter) for letter in word]].prod(axis=1) for word in generators]
     return np.column_stack([corners, *added])
-
-
-def corner_blocks(corners: Array, blocks: int) -> Rows:
-    """Block (n,) of each corner, with no block effect confounded with a term up to second order.
-
-    The signs of interactions of three or more factors, as long as possible, set the blocks; the products of these
-    interactions must be long too. Raises MethodError where no such division exists.
-    """
-    if blocks == 1:
-        return np.zeros(len(corners), dtype=np.intp)
-    count = corners.shape[1]
-    longest_first = (word for size in range(count, 2, -1) for word in combinations(range(count), size))
-    words = [corners[:, word].prod(axis=1) for word in longest_first]
-    short = _short_products(corners)
-    clear = [word for word in words if not np.abs(short.T @ word).any()]
-    if blocks == 2 and clear:
-        return (clear[0] > 0).astype(np.intp)
-    if blocks == 4:
-        for one, two in combinations(clear, 2):
-            between = one * two
-            if not np.abs(short.T @ between).any():
-                return (2 * (one > 0) + (two > 0)).astype(np.intp)
-    raise MethodError(
-        f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors have no division that confounds no block "
-        "with a second-order term; use fewer blocks or a larger cube"
-    )
-
-
-def _short_products(corners: Array) -> Array:
-    """Columns of the constant, the factors and their two-factor products."""
-    pairs = [corners[:, pair].prod(axis=1) for pair in combinations(range(corners.shape[1]), 2)]
-    return np.column_stack([np.ones(len(corners)), corners, *pairs])
 
 
 # Factors that vary together, in the order of the published tables, and how the design divides into blocks:

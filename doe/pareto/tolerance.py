@@ -10,11 +10,10 @@ tolerance, where the same shape applies.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.manufacture import (
@@ -36,7 +35,6 @@ from rbdyn.base.faults import MethodError
 Costs = Callable[[Array], Array]
 # Number (d,) of the parts (n, k) that keep all limits, on each draw of the surfaces or emulators.
 PartCount = Callable[[Array], Array]
-Aim = Literal["ratios", "product", "sum"]
 
 MARCH = 32  # steps up to the rim of the region in the search for the first loss
 HALVINGS = 24
@@ -91,25 +89,21 @@ def widest_tolerances(
     distribution: Distribution = "normal",
     samples: int = 4096,
     seed: int = 1,
-    aim: Aim = "ratios",
     promise: str = "keep all limits",
     count_on_draws: PartCount | None = None,
     open_errors: str = "",
 ) -> WidestTolerances:
     """The widest tolerances within which a part keeps all limits with a stated probability.
 
-    objectives : maps points (samples, k) to costs (samples, c). Row i always belongs to part i, so that each part may have
-        its own drawn surface; then ``limits`` has a row a part too.
+    objectives : maps points (samples, k) to costs (samples, c).
     pick : the nominal point (k,).
-    limits : largest permitted costs (c,) or (samples, c).
+    limits : largest permitted costs (c,).
     ratios : half widths (k,) relative to each other; all are widened together.
     lower, upper : bounds (k,) of the region, which no half width exceeds, for no surface is valid beyond.
     names : of the limits (c,), for the result.
     probability : share of the parts that must keep all limits.
     distribution : of the parts within the tolerance, see `doe.pareto.manufacture.offsets`.
     samples, seed : of the random parts, the same for every width (common random numbers).
-    aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum over the ratios. Each
-        half width is then within a twentieth to twenty times its ratio.
     promise : the condition on the parts in words, for the sentence.
     count_on_draws : number of parts that keep all limits on each draw of the surfaces or emulators, for the interval. By
         default the interval has only the error of the random parts.
@@ -137,8 +131,6 @@ def widest_tolerances(
         return parts.nothing(
             worst, f"even the exact pick keeps {worst} with a probability below the required {parts.percent}"
         )
-    if aim != "ratios":
-        share = _best_ratios(parts, share, aim)
     return _result(parts, parts.largest_scale(share), share)
 
 
@@ -184,14 +176,14 @@ class _Parts:
         """Half widths at a scale, none beyond the region."""
         return np.minimum(ratios * scale, self.room)
 
-    def largest_scale(self, ratios: Array, march: int = MARCH) -> float:
+    def largest_scale(self, ratios: Array) -> float:
         """Largest scale up to which the share of parts is at least the target."""
 
         def lost(scale: float) -> bool:
             return self.share(self.half(ratios, scale)) < self.target
 
-        steps = np.linspace(0.0, float((self.room / ratios).max()), march + 1).tolist()
-        first = next((place for place in range(1, march + 1) if lost(steps[place])), None)
+        steps = np.linspace(0.0, float((self.room / ratios).max()), MARCH + 1).tolist()
+        first = next((place for place in range(1, MARCH + 1) if lost(steps[place])), None)
         if first is None:
             return steps[-1]
         good, bad = steps[first - 1], steps[first]
@@ -206,27 +198,6 @@ class _Parts:
         sentence = f"No tolerance is possible: {cause}; demand less of the gain or a lower probability."
         error = error_of_share(share, len(self.offsets))
         return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
-
-
-def _best_ratios(parts: _Parts, share: Array, aim: Aim) -> Array:
-    """Ratios with the largest product or sum of their widest tolerances."""
-    reach = np.log(20.0)
-    free = np.flatnonzero(parts.room > 0.0)
-
-    def ratios(logarithms: Array) -> Array:
-        changed = share.copy()
-        changed[free] *= np.exp(logarithms - logarithms.mean())
-        return changed
-
-    def worth(logarithms: Array) -> float:
-        trial = ratios(logarithms)
-        half = parts.half(trial, parts.largest_scale(trial, march=4))[free]
-        return -float(np.log(half.clip(1e-300)).sum() if aim == "product" else (1.0 / share[free]) @ half)
-
-    start, bounds = np.zeros(free.size), [(-reach, reach)] * free.size
-    simplex = np.vstack([start, 0.7 * np.eye(free.size)])
-    options = {"maxfev": 60 * max(free.size, 1), "xatol": 1e-3, "fatol": 1e-4, "initial_simplex": simplex}
-    return ratios(minimize(worth, start, method="Nelder-Mead", bounds=bounds, options=options).x)
 
 
 def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:

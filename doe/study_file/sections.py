@@ -101,7 +101,7 @@ Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_colum
 
 # Keys of only some kinds of design.
 KEYS_OF = {
-    "central_composite": {"alpha", "cube", "blocks", "cube_blocks"},
+    "central_composite": {"alpha", "cube", "blocks"},
     "box_behnken": {"blocks"},
     "full_factorial": {"levels"},
     "latin_hypercube": {"runs"},
@@ -128,8 +128,6 @@ class Design(Consistent):
     none."""
     blocks: bool = False
     """Whether the runs form orthogonal blocks."""
-    cube_blocks: Literal[1, 2, 4] = 1
-    """Blocks into which the cube is cut; needs blocks = true."""
     levels: Annotated[int, Field(ge=2, le=100)] = 3
     """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
@@ -157,8 +155,6 @@ class Design(Consistent):
         )
         if self.kind in ("d_optimal", "i_optimal") and "runs" not in self.model_fields_set:
             yield f"runs: missing; kind = {self.kind!r} needs the number of runs to make"
-        if self.cube_blocks > 1 and not self.blocks:
-            yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true with it"
 
 
 # Keys by which a response wishes for something beyond its limits.
@@ -225,8 +221,6 @@ class Front(Strict):
     """Quantile of a tolerance-aware front."""
     distribution: Literal["normal", "uniform"] = "normal"
     """Distribution of the parts within the tolerances."""
-    tolerance_samples: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
-    """Random parts for a quantile."""
 
 
 class Adaptive(Strict):
@@ -280,13 +274,8 @@ class Tolerances(Strict):
     """Smallest difference of a response that matters, in percent of the baseline."""
     finest_grade: Annotated[int, Field(ge=1, le=18)] = 4
     """Finest grade of ISO 286 that the shop holds. Parts of a finer one are a warning, with the response that demands them."""
-    aim: Literal["ratios", "product", "sum"] = "ratios"
-    """"ratios" keeps the ratios of the factors' own tolerances, or of their steps if one has none; "product" and "sum" of
-    the half widths are maximised."""
     distribution: Literal["normal", "uniform"] = "normal"
     """Distribution of the parts within the tolerances."""
-    surface_uncertainty: bool = False
-    """Whether the errors of the surfaces count too."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096
     """Random parts."""
     seed: Annotated[int, Field(ge=0)] = 1

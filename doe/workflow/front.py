@@ -247,8 +247,7 @@ def tolerance_box(study: Study) -> ToleranceBox | None:
     front = study.file.front
     if front.tolerance_aware == "none":
         return None
-    parts = front.quantile, front.distribution, front.tolerance_samples
-    return ToleranceBox(tolerances_of(study), front.tolerance_aware, *parts)
+    return ToleranceBox(tolerances_of(study), front.tolerance_aware, front.quantile, front.distribution)
 
 
 def tolerances_of(study: Study) -> Array:

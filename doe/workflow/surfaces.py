@@ -266,14 +266,6 @@ def predict_draws(surfaces: Sequence[Surface], draws_by_surface: Sequence[Array]
     return np.stack(columns, axis=-1)
 
 
-def predict_paired(surfaces: Sequence[Surface], draws_by_surface: Sequence[Array], coded: Array) -> Array:
-    """Responses (n, m) at coded points (n, k), each row on its own drawn coefficients (n, p)."""
-    columns = []
-    for surface, coefficients in zip(surfaces, draws_by_surface, strict=True):
-        columns.append(link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1)))
-    return np.column_stack(columns)
-
-
 def jacobian(surface: Surface, coded: Array) -> Array:
     """Derivatives (p,) of the prediction at a coded point (k,) with respect to the coefficients."""
     row = model_matrix(coded, surface.terms)

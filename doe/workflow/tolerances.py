@@ -25,7 +25,7 @@ from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import Draws, draws_of, keeping, known_tolerances, open_errors, rigid_factors
 from doe.workflow.parts import Grade, grades_of
 from doe.workflow.runs import region_of
-from doe.workflow.surfaces import draw_all, goals_of, predict_all, predict_paired
+from doe.workflow.surfaces import goals_of, predict_all
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.words import improvement, quantity, rounded_down, shown
 from rbdyn.scene import Scene
@@ -339,37 +339,22 @@ class _PickParts:
             return np.where(self.gain == 0.0, 0.0, self.gain / self.unit)
 
     @cached_property
-    def _coefficients(self) -> list[Array] | None:
-        settings = self.settings
-        return draw_all(self.surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
-
-    def _responses(self, coded: Array) -> Array:
-        """Responses (samples, m); with the errors of the surfaces, each row on its own draw."""
-        if self._coefficients is None:
-            return predict_all(self.surfaces, coded)
-        return predict_paired(self.surfaces, self._coefficients, coded)
-
-    def _at(self, place: Array) -> Array:
-        """Responses (samples, m) at one place (k,), for each part may have its own draw of the surfaces."""
-        return self._responses(np.repeat(self.study.coded(place)[None], self.settings.samples, axis=0))
-
-    @cached_property
     def _centre_values(self) -> Array:
-        return self._at(self.point)
+        return predict_all(self.surfaces, self.study.coded(self.point)[None])
 
     @cached_property
     def _reference(self) -> Array:
-        """Costs (samples, q) of the baseline."""
+        """Costs (1, q) of the baseline."""
         if self.simulated_baseline is not None:
-            return self.goals.costs(np.broadcast_to(self.simulated_baseline, self._centre_values.shape))
-        return self.goals.costs(self._at(self.study.baseline))
+            return self.goals.costs(self.simulated_baseline[None])
+        return self.goals.costs(predict_all(self.surfaces, self.study.coded(self.study.baseline)[None]))
 
     def _costs(self, parts: Array) -> Array:
         """Costs and violations (samples, q + c) of parts (samples, f), values of the factors that have a tolerance."""
         points = np.tile(self.point, (len(parts), 1))
         points[:, self.free_factors] = parts
         coded = self.study.coded(points)
-        values = self._responses(coded)
+        values = predict_all(self.surfaces, coded)
         if (here := self.neighbours) is not None:
             values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
         return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
@@ -389,7 +374,7 @@ class _PickParts:
         share = np.array([one.least is not None and one.response not in settings.at_least for one in demands])
         least[share] = settings.keep * self.gain[share]
         slack = 1e-9 * np.abs(self.gain).max()
-        no_violations = np.zeros((settings.samples, len(self.goals.limited)))
+        no_violations = np.zeros((1, len(self.goals.limited)))
         half_widths = known_tolerances(study)
         ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
         low, high = _box(study, self.point, None if self.neighbours is None else np.nan_to_num(ratios))
@@ -405,7 +390,7 @@ class _PickParts:
             promise=self._promise(demands),
             count_on_draws=count,
             open_errors=open_errors(self.surfaces, searched=self.neighbours is not None),
-            **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
+            **settings.model_dump(include={"probability", "distribution", "samples", "seed"}),
         )
         return replace(tolerances, sentence=_impossible(demands) or tolerances.sentence).among(free, self.point.size)
 

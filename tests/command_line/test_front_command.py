@@ -202,8 +202,6 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
         at = [surface.predict((each - study.centre) / study.step) for each in (study.baseline, point, parts)]
         kept &= at[2] <= at[0] - 0.5 * (at[0] - at[1])
     assert kept.mean() == pytest.approx(0.95, abs=0.01)
-    unsure = widest_tolerances_of(study, surfaces, point, Tolerances(gains=study.responses, surface_uncertainty=True))
-    assert unsure.half_widths.tolist() == [0.0, 0.0, 0.0] and "even the exact pick" in unsure.sentence
 
 
 @pytest.mark.parametrize(

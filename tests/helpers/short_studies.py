@@ -8,10 +8,7 @@ from pathlib import Path
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Searches that find something, and draws that tell something, in no time.
-BRIEF = (
-    ("generations = 200", "generations = 5\ndraws = 100\ntolerance_samples = 64"),
-    ("keep = 0.5", "keep = 0.5\nsamples = 512"),
-)
+BRIEF = (("generations = 200", "generations = 5\ndraws = 100"), ("keep = 0.5", "keep = 0.5\nsamples = 512"))
 SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
 
 

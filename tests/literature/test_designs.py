@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doe.designs import axial_distance, box_behnken, central_composite, to_actual, to_coded
-from doe.designs.design import RESOLUTION_V, centre_shares, corner_blocks, cube_points
+from doe.designs.design import centre_shares, cube_points
 from doe.designs.model import block_contrasts, model_matrix, model_terms
 from doe.response_surface import fit
 
@@ -87,26 +87,10 @@ def test_literature_two_factors_in_two_blocks():
     assert design.coded.max() == pytest.approx(1.414, abs=5e-4)
 
 
-def test_literature_three_factors_in_three_blocks():
-    """Literature: NIST/SEMATECH e-Handbook, Table 3.30: half cubes of 4, 6 axial points at 1.633, 2 centres each."""
-    design = central_composite(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True, cube_blocks=2)
-    assert np.bincount(design.block).tolist() == [6, 6, 8]
-    assert design.coded.max() == pytest.approx(1.63299, abs=5e-6)
-    for block in (0, 1):
-        corners = design.coded[(design.block == block) & (np.array(design.kind) == "cube")]
-        assert len(set(corners.prod(axis=1))) == 1
-
-
-@pytest.mark.parametrize(
-    ("factors", "cube", "cube_blocks", "centres"),
-    [(2, "full", 1, 4), (3, "full", 2, 6), (4, "full", 2, 6), (5, "full", 4, 12), (5, "resolution_v", 1, 7),
-     (6, "resolution_v", 2, 6), (7, "full", 4, 9)],
-)  # fmt: skip
-def test_blocks_disturb_no_term(factors, cube, cube_blocks, centres):
-    design = central_composite(
-        factors, alpha="orthogonal_blocks", cube=cube, centre_replicates=centres, blocks=True, cube_blocks=cube_blocks
-    )
-    assert design.blocks == cube_blocks + 1
+@pytest.mark.parametrize(("factors", "cube", "centres"), [(2, "full", 4), (5, "resolution_v", 7)])
+def test_blocks_disturb_no_term(factors, cube, centres):
+    design = central_composite(factors, alpha="orthogonal_blocks", cube=cube, centre_replicates=centres, blocks=True)
+    assert design.blocks == 2
     assert cosines_of_blocks(design) < 1e-12
 
 
@@ -218,13 +202,6 @@ def test_coding_goes_there_and_back(coded):
 def test_bad_designs_are_refused(arguments, words):
     with pytest.raises(ValueError, match=words):
         central_composite(**arguments)
-
-
-def test_cubes_that_cannot_be_divided_are_refused():
-    assert set(RESOLUTION_V) == {5, 6, 7, 8}
-    for corners, blocks in ((cube_points(2), 2), (cube_points(3), 4), (cube_points(5, "resolution_v"), 2)):
-        with pytest.raises(ValueError, match="confounds no block"):
-            corner_blocks(corners, blocks)
 
 
 @pytest.mark.parametrize(

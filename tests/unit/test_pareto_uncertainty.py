@@ -24,7 +24,6 @@ from doe.workflow.surfaces import (
     jacobian,
     predict_all,
     predict_draws,
-    predict_paired,
     predicted_gains,
     statement,
 )
@@ -112,16 +111,6 @@ def test_drawn_coefficients_have_the_quantiles_of_t():
     # 97.5 % quantile of t with 6 degrees of freedom: 2.447.
     assert np.quantile(drawn[:, 0], [0.025, 0.5, 0.975]) == pytest.approx([5 - 4.894, 5.0, 5 + 4.894], abs=0.15)
     assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(0.95, abs=0.01)
-
-
-def test_draws_in_pairs_are_the_diagonal_of_all_draws(table):
-    surfaces = of_the_textbook(table[1])
-    drawn = draw_all(surfaces, 5, 1)
-    points = np.random.default_rng(1).uniform(-1, 1, (5, 3))
-    everything = predict_draws(surfaces, drawn, points)
-    assert predict_paired(surfaces, drawn, points) == pytest.approx(
-        np.array([everything[i, i] for i in range(5)]), rel=1e-12
-    )
 
 
 def test_share_of_non_dominated_is_a_plain_count():
