@@ -13,7 +13,7 @@ import numpy as np
 from studies import main
 
 from rbdyn.accuracy.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, flat, records, reported
 from rbdyn.accuracy.tolerances import (
     MARGIN,
     NEGLIGIBLE,
@@ -27,6 +27,7 @@ from rbdyn.accuracy.tolerances import (
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Sheet, columns_of
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
@@ -108,13 +109,8 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = MARGIN) -> str
 
 def table(rows: Sequence[Row], sought: float = MARGIN) -> Table:
     """Table for the terminal, failures in their places."""
-
-    def where_found(text: Callable[[Bias], str]) -> Callable[[Row], str]:
-        return lambda row: "" if row.found is None else text(row.found)
-
-    biases = {heading: where_found(text) for heading, text in bias_columns(sought).items()}
     title = f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors"
-    return tabled(title, rows, {**columns_of(Row), **biases})
+    return Sheet(title, (*columns_of(Row), *bias_columns(sought, lambda row: row.found)), rows).block
 
 
 def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:

@@ -9,17 +9,18 @@ discards. Independent samples narrow it as one over the root of all counted turn
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from studies import main
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, flat, records, reported
 from rbdyn.accuracy.tolerances import MARGIN, NORMAL, OUTPUTS, about, percent
 from rbdyn.base.arrays import Array
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.base.words import with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -44,11 +45,7 @@ class Row(Record):
     half_width: dict[str, float]
 
 
-def _half_width(name: str) -> Callable[[Row], str]:
-    return lambda row: percent(row.half_width[name])
-
-
-COLUMNS: Columns = {**columns_of(Row), **{f"{name} ±": _half_width(name) for name in OUTPUTS}}
+COLUMNS = (*columns_of(Row), *Column[Row]("{}", percent, "{} ±", at=("half_width", "{}"), files=False).of(OUTPUTS))
 
 
 class Slope(Record):
@@ -77,7 +74,7 @@ def study(
     written = records(rows)
     return reported(
         "replicates",
-        (tabled("95 % half-widths, relative", rows, COLUMNS),),
+        (Sheet("95 % half-widths, relative", COLUMNS, rows).block,),
         sentences,
         [flat(row, "half_width") for row in written],
         lambda path: _draw(rows, path),

@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from studies import main, printed
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.accuracy.variants import with_options
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record
+from rbdyn.base.table import Column, Sheet
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
@@ -47,12 +48,12 @@ class Point(Record):
     rhs_per_turn: float
 
 
-COLUMNS: Columns = {
-    "ns a right-hand side": ("rhs_ns", ".0f"),
-    "right-hand sides a turn": ("rhs_per_turn", ".0f"),
-    "ms a turn": ("turn_ms", ".2f"),
-    "s a simulated s": ("of_real_time", ".2f"),
-}
+COLUMNS = (
+    Column[Point]("rhs_ns", ".0f", "ns a right-hand side"),
+    Column[Point]("rhs_per_turn", ".0f", "right-hand sides a turn"),
+    Column[Point]("turn_ms", ".2f", "ms a turn"),
+    Column[Point]("of_real_time", ".2f", "s a simulated s"),
+)
 
 
 class Line(Record):
@@ -212,7 +213,9 @@ def study(scene: Scene, progress: Reporter = None) -> Report:
 
 def report(measured: Scaling) -> Report:
     """Tables, fits and picture of what was measured."""
-    tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in measured.points.items()]
+    tables = [
+        Sheet("", (Column("size", words=kind), *COLUMNS), points).block for kind, points in measured.points.items()
+    ]
     sentences = []
     for kind, line in measured.lines.items():
         straight = f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f})"

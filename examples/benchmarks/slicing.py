@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from studies import main
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, flat, records, reported
 from rbdyn.accuracy.tolerances import (
     MARGIN,
     NEGLIGIBLE,
@@ -28,6 +28,7 @@ from rbdyn.accuracy.tolerances import (
 from rbdyn.accuracy.variants import with_options
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import shown
+from rbdyn.base.table import Sheet, columns_of
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
@@ -63,7 +64,7 @@ def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNT
     runs = f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices"
     return reported(
         "slices",
-        (tabled(title, rows, {**columns_of(Row), **bias_columns(sought, finest)}),),
+        (Sheet(title, (*columns_of(Row), *bias_columns(sought, lambda row: row, finest)), rows).block,),
         (chosen, runs),
         [flat(row) for row in written],
         lambda path: _draw(rows, path, sought),

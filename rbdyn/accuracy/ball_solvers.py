@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.quasistatic import finite_search, full_system
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.ball import Control
@@ -112,7 +113,7 @@ def study(
     return reported(
         "solvers",
         (
-            tabled("residual against time", _until_solved(attempts), columns_of(Attempt)),
+            Sheet("residual against time", columns_of(Attempt), _until_solved(attempts)).block,
             success_table(f"{perturbations} seeded scenes nearby", rows),
         ),
         (*causes(rows), sentence),
@@ -198,7 +199,7 @@ def fared(name: str, solutions: Sequence[Solution], took_us: Sequence[float]) ->
 
 def success_table(title: str, rows: Sequence[Success], first: str = "solver") -> Table:
     """Table of how solvers fare."""
-    return tabled(title, rows, {first: ("solver", ""), **columns_of(Success)})
+    return Sheet(title, (Column("solver", words=first, files=False), *columns_of(Success)), rows).block
 
 
 def causes(rows: Sequence[Success]) -> list[str]:

@@ -9,8 +9,9 @@ always contains the truth is too wide.
 import math
 from typing import Any
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Sheet, columns_of
 from rbdyn.base.words import error_alone, value_alone, with_error
 from rbdyn.dynamics.ensemble import in_turn
 from rbdyn.dynamics.run import with_numerics
@@ -35,19 +36,12 @@ class Row(Record):
     """
 
     figure: str = shown("figure")
-    truth: float = shown("truth")
-    truth_error: float = shown("±")
+    truth: float = shown("truth", value_alone, error="truth_error")
+    truth_error: float = shown("±", lambda error: error_alone(error).removeprefix("± "))
     covered: float = shown("covered", ".3f")
     statistical_alone: float = shown("statistical alone", ".3f")
     half_width: float = shown("half-width", ".2g %")
     offset: float = shown("offset", "+.2g %")
-
-
-COLUMNS: Columns = {
-    **columns_of(Row),
-    "truth": lambda row: value_alone(row.truth, row.truth_error),
-    "±": lambda row: error_alone(row.truth_error).removeprefix("± "),
-}
 
 
 def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -> Report:
@@ -69,10 +63,12 @@ def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -
         f"{100.0 * longer:.0f} % of the runs were lengthened."
     )
     sentences = [conclusion(rows, repeats), length]
-    table = tabled(f"95 % intervals that contain the truth, {repeats} repeats", rows, COLUMNS)
+    sheet = Sheet(f"95 % intervals that contain the truth, {repeats} repeats", columns_of(Row), rows)
     written = records(rows)
     figures: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
-    return reported("coverage", (table,), sentences, written, rows=written, **figures, conclusion=" ".join(sentences))
+    return reported(
+        "coverage", (sheet.block,), sentences, written, rows=written, **figures, conclusion=" ".join(sentences)
+    )
 
 
 def one_bearing(scene: Scene) -> Scene:

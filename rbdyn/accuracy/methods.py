@@ -18,11 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of, velocity_verlet
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.advance import ACCEPTED, DERIVATIVES, NOW
@@ -505,7 +506,7 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
 def table(attempts: Sequence[Attempt], turns: float) -> Table:
     """Table for the terminal, failures in their places."""
     title = f"errors after {turns:g} shaft turns, worst of {STARTS} starts; one thread"
-    return tabled(title, attempts, {**columns_of(Attempt), "status": ("status", "")})
+    return Sheet(title, (*columns_of(Attempt), Column("status", files=False)), attempts).block
 
 
 def ratio_table(ratios: dict[str, Speedup]) -> Table:

@@ -4,7 +4,7 @@ import logging
 import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,8 +21,6 @@ T = TypeVar("T")
 LOGGER = logging.getLogger("rbdyn.accuracy")
 # Keys of the scene that make a study shorter.
 KEYS = ("numerics.turns", "numerics.replicates")
-# By heading: field of a row and format of its figure, see ``cell``, or a function from a row to its text.
-Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
 
 
 @dataclass(frozen=True)
@@ -71,30 +69,6 @@ class Progress:
         for item in items:
             yield item
             self.step()
-
-
-def cell(value: Any, form: str) -> str:
-    """A figure as text, None as nothing; a format that ends in " %" takes a share."""
-    if value is None:
-        return ""
-    return f"{100.0 * value:{form[:-2]}} %" if form.endswith(" %") else format(value, form)
-
-
-def columns_of(kind: type[Any]) -> dict[str, tuple[str, str]]:
-    """Columns of the fields of a record that are ``shown``."""
-    columns = ((one.metadata["column"], one.name) for one in fields(kind) if "column" in one.metadata)
-    return {heading: (name, form) for (heading, form), name in columns}
-
-
-def tabled(title: str, rows: Iterable[Any], columns: Columns) -> Table:
-    """Table of rows, a line each."""
-    lines = [
-        tuple(
-            column(row) if callable(column) else cell(getattr(row, column[0]), column[1]) for column in columns.values()
-        )
-        for row in rows
-    ]
-    return Table(title, tuple(columns), lines)
 
 
 def records(rows: Iterable[Any]) -> list[dict[str, Any]]:

@@ -20,10 +20,11 @@ import numpy as np
 
 from rbdyn.accuracy import methods
 from rbdyn.accuracy.methods import COMPILED
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, flat, record, records
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.base.words import signed_with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -151,6 +152,7 @@ class Bias(Record):
 
 
 B = TypeVar("B", bound=Bias)
+R = TypeVar("R")
 
 
 def first_within(rows: Iterable[B], name: Callable[[B], str], margin: float) -> tuple[B | None, list[Difference]]:
@@ -247,21 +249,24 @@ def table(biases: StatisticsBias, margin: float = MARGIN) -> Table:
     """Table for the terminal; failed tolerances at the end."""
     reference = biases.rows[-1]
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
-    ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(margin, reference)})
+    ran = Sheet(title, (*columns_of(Row), *bias_columns(margin, lambda row: row, reference)), biases.rows).block
     failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in biases.failures]
     return replace(ran, rows=[*ran.rows, *failed])
 
 
-def bias_columns(margin: float, reference: Bias | None = None) -> dict[str, Callable[[Bias], str]]:
-    """Columns of the bias of each output with its error, and of the verdict; ``reference`` has none."""
+def bias_columns(margin: float, bias: Callable[[R], Bias | None], reference: R | None = None) -> tuple[Column[R], ...]:
+    """Columns of the ``bias`` of each output with its error, and of the verdict; ``reference`` has none."""
+
+    def column(heading: str, text: Callable[[Bias], str]) -> Column[R]:
+        return Column("", words=heading, cell=lambda row: "" if (found := bias(row)) is None else text(found))
 
     def output(name: str) -> Callable[[Bias], str]:
-        return lambda row: f"{signed_with_error(100.0 * row.bias[name], 100.0 * row.bias_error[name])} %"
+        return lambda found: f"{signed_with_error(100.0 * found.bias[name], 100.0 * found.bias_error[name])} %"
 
-    return {
-        **{name: output(name) for name in OUTPUTS},
-        f"within {percent(margin)}": lambda row: "reference" if row is reference else row.verdict(margin),
-    }
+    def verdict(found: Bias) -> str:
+        return "reference" if found is reference else found.verdict(margin)
+
+    return (*(column(name, output(name)) for name in OUTPUTS), column(f"within {percent(margin)}", verdict))
 
 
 def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Replicate]) -> Row:

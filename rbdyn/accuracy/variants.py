@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.faults import InputError, RunError, read_toml, set_key
 from rbdyn.base.records import Record, finite, shown
+from rbdyn.base.table import Sheet, columns_of
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
@@ -91,8 +92,8 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
 def study_options(scene: Scene, progress: Reporter = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
     """``rbdyn accuracy SCENE options``. Raises RunError, KeyboardInterrupt."""
     costs = option_costs(scene, options, progress)
-    table, rows = tabled("nanoseconds a right-hand side", costs, columns_of(OptionCost)), records(costs)
-    return reported("options", (table,), (), rows, options=rows)
+    sheet, rows = Sheet("nanoseconds a right-hand side", columns_of(OptionCost), costs), records(costs)
+    return reported("options", (sheet.block,), (), rows, options=rows)
 
 
 LARGEST_GAP = 0.01
@@ -215,8 +216,16 @@ def report(rows: Sequence[Ending]) -> Report:
     written = records(rows)
     failures = f"{unexplained} of {len(rows)} cases failed without a diagnosis"
     status: dict[str, Any] = {"status": failures} if unexplained else {}
-    table = tabled(f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %", rows, columns_of(Ending))
+    title = f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %"
     sentences = [f"{row.case}: {row.reason}" for row in rows if row.reason]
     sheet = [row | {"assignments": " ".join(row["assignments"])} for row in written]
-    outcome = reported("stability", (table,), sentences, sheet, **status, largest_gap=LARGEST_GAP, cases=written)
+    outcome = reported(
+        "stability",
+        (Sheet(title, columns_of(Ending), rows).block,),
+        sentences,
+        sheet,
+        **status,
+        largest_gap=LARGEST_GAP,
+        cases=written,
+    )
     return replace(outcome, failed=unexplained > 0)

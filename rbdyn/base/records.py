@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
 
 
+# Options of a column at its field.
+COLUMN_OPTIONS = {"unit", "meaning", "error", "cell", "missing", "scale", "text", "screen", "files"}
+
+
 def keyed(*path: str, **options: Any) -> Any:
     """A field under another key than its name, or under keys one within the other; ``options`` as of ``dataclasses.field``."""
     return field(metadata={"path": path}, **options)
@@ -42,9 +46,10 @@ def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Li
     return field(init=init, repr=False, metadata={"by": by} | ({"path": path} if path or spread else {}))
 
 
-def shown(heading: str, form: str = "", **options: Any) -> Any:
-    """A field with its heading in tables and the format of its figure there."""
-    return field(metadata={"column": (heading, form)}, **options)
+def shown(heading: str, form: Any = 4, **options: Any) -> Any:
+    """A field with its column in tables; ``options`` as of ``rbdyn.base.table.Column`` and ``dataclasses.field``."""
+    column = {key: options.pop(key) for key in COLUMN_OPTIONS & options.keys()}
+    return field(metadata={"column": {"words": heading, "form": form, **column}}, **options)
 
 
 def outside_json(**options: Any) -> Any:
