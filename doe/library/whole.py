@@ -43,9 +43,8 @@ class StudyAnswer(Answer):
 
     def sections(self) -> list[Section]:
         from doe.report.page import sections
-        from doe.report.sections.record import drop_undefined
 
-        return sections(drop_undefined(self.as_dict()))
+        return sections(self.as_dict())
 
     def rows(self) -> Mapping[str, Rows]:
         from doe.report.sections.duty import duty_rows

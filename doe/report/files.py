@@ -24,7 +24,7 @@ from doe.report.sections.design import runs_record
 from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
-from doe.report.sections.record import drop_undefined, notes_of, readable
+from doe.report.sections.record import notes_of, readable
 from doe.report.sections.robust import robust_tables
 from doe.report.sections.search import (
     adaptive_record,
@@ -35,6 +35,7 @@ from doe.report.sections.search import (
     search_sentences,
 )
 from doe.report.sections.unknown import robust_record
+from doe.report.summary import restored
 from doe.running.store import grouped
 from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
@@ -93,7 +94,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         plots.robust_front(outcome.robust.responses, outcome.robust.front, folder / pictures[-1])
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
-        plots.adaptive_search(record, folder / pictures[-1])
+        plots.adaptive_search(restored(record), folder / pictures[-1])
     if outcome.duty is not None and gain_stills(record):
         pictures.append("duty_gains.png")
         plots.duty_gains(record, folder / pictures[-1])
@@ -117,7 +118,7 @@ def answer_text(record: dict[str, Any]) -> str:
 
 def blocks(record: dict[str, Any]) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
-    clean = drop_undefined(record)
+    clean = restored(record)
     details = [
         *in_few_runs(clean),
         changes(clean),

@@ -32,9 +32,9 @@ from doe.report.sections.record import (
     response_label,
     responses,
 )
+from doe.report.summary import restored
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
-from rbdyn.base.identity import Identity
 from rbdyn.base.page import identity_section, page
 from rbdyn.base.words import label, quantity, rounded_down, shown
 
@@ -61,7 +61,7 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     summary : record of ``doe study --json``; parts that are missing or null are left out.
     motion : record of ``doe.clearance.motion_record``; without it nothing moves.
     """
-    record = drop_undefined(dict(summary))
+    record = restored(summary)
     moving = drop_undefined(dict(motion or {}))
     chapters = sections(record, moving)
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
@@ -73,21 +73,21 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
 
 def title(summary: Record) -> str:
     """The title of the study, or the name of its file in words."""
-    settings = summary.get("asked") or {}
+    settings = part(summary, "asked") or {}
     stem = PurePath(settings.get("study_file") or "clearance study").stem.replace("_", " ")
     return settings.get("title") or stem[:1].upper() + stem[1:]
 
 
 def window_title(summary: Record) -> str:
     """The title of the study with its bearing and the command."""
-    identity = part(summary, "identity")
-    return f"{title(summary)}: {Identity.from_dict(identity).title}" if identity else title(summary)
+    return f"{title(summary)}: {summary.identity.title}"
 
 
 def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
     """Sections with something to say, of a record without undefined values (``drop_undefined``)."""
-    chapters = [chapter(summary, motion or {}) for chapter in CHAPTERS]
-    whole = [replace(section, blocks=readable(section.blocks, summary)) for section in chapters if section]
+    record = restored(summary)
+    chapters = [chapter(record, motion or {}) for chapter in CHAPTERS]
+    whole = [replace(section, blocks=readable(section.blocks, record)) for section in chapters if section]
     return [section for section in whole if section.blocks]
 
 
@@ -257,8 +257,7 @@ def _effect(effect: Record, whose: str) -> str:
 
 def identity(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Bearing, operating point, date and hashes of the input files."""
-    stated = part(summary, "identity")
-    return identity_section(Identity.from_dict(stated)) if stated else None
+    return identity_section(summary.identity)
 
 
 def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:

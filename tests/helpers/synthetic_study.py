@@ -86,7 +86,14 @@ def summary() -> dict[str, Any]:
     chosen = {"radial_clearance_mm": 0.0225, "guide_clearance_mm": 0.185, "pocket_clearance_mm": 0.235}
     return {
         "format": "doe.study/2",
+        "identity": {"command": "doe study", "bearing": "made-up bearing", "drawing": "", "point": "24000 rpm",
+                     "date": "2026-01-31", "version": "0.1.0", "files": {}},
         "status": "ok",
+        "limits": {},
+        "limits_sentence": "",
+        "obstacles": {},
+        "tried": 1,
+        "edge": {},
         "asked": {
             "title": "Clearances of a made-up bearing",
             "study_file": "study.toml",
@@ -127,7 +134,15 @@ def summary() -> dict[str, Any]:
             "tolerance_aware": {"kind": "worst_case", "quantile": None,
                                 "front": [{**each, "robust": each["responses"]} for each in front[:6]]},
         },
+        "pick_on_surfaces": None,
         "pick": chosen,
+        "operating_clearances_mm": {},
+        "clearance_class": "",
+        "whirl_sentence": "",
+        "rivals_sentences": [],
+        "made": {},
+        "missed_chains": {},
+        "inputs": "0123456789abcdef",
         "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
         "confirmation": {
             "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0, "nil": 0.0}},

@@ -12,7 +12,8 @@ from synthetic_study import FACTORS, RESPONSES, summary
 from doe.report.files import answer_text, blocks
 from doe.report.page import page_data, sections
 from doe.report.sections.duty import at_points, duty_rows, gain_stills
-from doe.report.sections.record import drop_undefined, readable
+from doe.report.sections.record import readable
+from doe.report.summary import restored
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
 
@@ -74,21 +75,19 @@ def over_duty() -> dict:
 
 def sentences(record: dict) -> dict[str, str]:
     """Roles of the sentences on the duty by their text, names in words."""
-    clean = drop_undefined(record)
+    clean = restored(record)
     return {block.text: block.role for block in readable(at_points(clean), clean) if isinstance(block, Paragraph)}
 
 
 def test_without_a_duty_nothing_is_said_of_one():
     """Unit: the answer and the report of a study at one point have no word on a duty."""
     assert at_points(summary()) and sentences(summary()) == {}
-    assert "duty" not in answer_text(summary()) and "duty" not in {
-        part.key for part in sections(drop_undefined(summary()))
-    }
+    assert "duty" not in answer_text(summary()) and "duty" not in {part.key for part in sections(restored(summary()))}
 
 
 def test_each_point_has_its_verdicts():
     """Unit: a row a point, a column a response with a goal, the worst verdict on its limits."""
-    table = at_points(drop_undefined(over_duty()))[0]
+    table = at_points(restored(over_duty()))[0]
     assert isinstance(table, Table) and list(table.header) == ["point", "share", "impact force", "power loss", "limits"]
     assert [row[0] for row in table.rows] == ["idle", "cruise", "take-off"]
     assert [row[1] for row in table.rows] == ["25 %", "70 %", "5 %"]
@@ -121,7 +120,7 @@ def test_the_dearest_compromise_is_named_where_it_exceeds_its_errors():
     for entry in record["duty"]["points"]:
         entry |= {"own": None, "own_note": f"{entry['name']} alone has no pick"}
     assert not any(text.startswith("The compromise") for text in sentences(record))
-    (chapter,) = (part for part in sections(drop_undefined(record)) if part.key == "duty")
+    (chapter,) = (part for part in sections(restored(record)) if part.key == "duty")
     assert any("idle alone has no pick" in getattr(block, "text", "") for block in chapter.blocks)
 
 
@@ -179,10 +178,10 @@ def test_gains_are_drawn_at_each_point_and_over_the_duty():
 def test_clearances_in_operation_stand_at_each_point():
     """Unit: where temperatures change them each point has its own, at baseline and pick; else no such table."""
     record = over_duty()
-    assert "Clearances in operation" not in str(sections(drop_undefined(record)))
+    assert "Clearances in operation" not in str(sections(restored(record)))
     for entry, play in zip(record["duty"]["points"], (0.01, 0.02, 0.03), strict=True):
         entry["operating_clearances_mm"] = {FACTORS[0]: {"baseline": play, "pick": play + 0.001}}
-    (chapter,) = (part for part in sections(drop_undefined(record)) if part.key == "duty")
+    (chapter,) = (part for part in sections(restored(record)) if part.key == "duty")
     (table,) = (
         block for block in chapter.blocks if getattr(block, "caption", "").startswith("Clearances in operation")
     )
@@ -197,7 +196,7 @@ def test_a_ratio_has_no_unit_anywhere():
     whole = terminal.text(blocks(record), Detail.ALL, 200)
     assert "impact force, worst ratio" in whole and "idle: impact force [N] ≤ 30" in whole
     assert "impact force [N]" not in whole.replace("idle: impact force [N]", "")
-    named = {entry["name"]: entry for entry in page_data(drop_undefined(record), {})["responses"]}
+    named = {entry["name"]: entry for entry in page_data(restored(record), {})["responses"]}
     assert named[IMPACT]["unit"] == "" and named[POWER]["unit"] == "W"
     assert "impact force [N]" in terminal.text(blocks(summary()), Detail.ALL, 200)
 
@@ -227,7 +226,7 @@ def test_the_manual_describes_every_column():
 @pytest.mark.parametrize("width", [80, 60, 40])
 def test_no_word_of_a_header_is_broken(width):
     """Report: at any width each word of a header of the duty's tables stands whole in a line, and no line is longer."""
-    clean = drop_undefined(over_duty())
+    clean = restored(over_duty())
     (chapter,) = (part for part in sections(clean) if part.key == "duty")
     tables = [block for block in [*readable(at_points(clean), clean), *chapter.blocks] if isinstance(block, Table)]
     assert len(tables) == 4

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from doe.report.files import answer_text, blocks
 from doe.report.page import html_report
 from doe.report.sections.answer import first_screen
-from doe.report.sections.record import drop_undefined
+from doe.report.summary import restored
 from doe.workflow.confirmation import LOSS, NOISE, REAL, Choice, Confirmed
 from doe.workflow.front import find_front
 from doe.workflow.pick import choices
@@ -52,14 +52,12 @@ def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
     command = "The probability over the unknown inputs is computed by: doe study study.toml --robust."
     record["limits_sentence"] = f"{words} at the pick. {'' if odds else command}".strip()
     record["limits"] = {RESPONSES[2]: {**limit, "odds": odds}}
-    identity = {"command": "doe study", "bearing": "made-up bearing", "drawing": "", "point": "24000 rpm", "date": "2026-01-31",
-                "version": "0.1.0", "files": {}}  # fmt: skip
-    return record | {"status": "ok" if verdict == "kept" else verdict, "identity": identity}
+    return record | {"status": "ok" if verdict == "kept" else verdict}
 
 
 def roles(record: dict) -> dict[str, str]:
     """Roles of the sentences of the first screen by their text."""
-    return {block.text: block.role for block in first_screen(drop_undefined(record)) if isinstance(block, Paragraph)}
+    return {block.text: block.role for block in first_screen(restored(record)) if isinstance(block, Paragraph)}
 
 
 @pytest.mark.parametrize("width", [60, 80, 100])

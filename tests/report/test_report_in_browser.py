@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from headless import as_wide_as, widths
 from report_page import PICTURE, keys, opened, report_in_browser, text_of
-from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
+from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
 
 from doe.report.page import html_report
 from rbdyn.base.words import with_error
@@ -47,17 +47,6 @@ def test_two_factors_of_awkward_names_draw_as_they_are(browser):
     page = opened(browser, name="awkward.html")
     assert "</script><b>x</b>" in page.find_element("id", "surface_x").text
     assert page.find_elements("css selector", "main b") == []
-    assert driver.get_log("browser") == []
-
-
-def test_a_record_without_what_was_asked_still_plays(browser):
-    driver, folder = browser
-    record = summary()
-    del record["asked"]
-    (folder / "bare.html").write_text(html_report(record, motion()), encoding="utf-8")
-    page = opened(browser, name="bare.html")
-    assert page.find_elements("id", "surface") == []
-    assert "0.0225" in text_of(page, "front_point")
     assert driver.get_log("browser") == []
 
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.special import ndtri
+from synthetic_study import summary
 
 from doe.dimension_chain import grade_tolerances, solve
 from doe.dimension_chain.allocation import cheapest, total_cost
@@ -250,4 +251,4 @@ def test_tolerances_in_proportion_to_the_unit_say_that_they_are_no_grades():
 
 def reported(record):
     """The report of a record in words."""
-    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(record))
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(summary() | record))

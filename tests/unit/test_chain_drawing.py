@@ -6,6 +6,7 @@ import pytest
 from chains import chain, with_functions
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from synthetic_study import summary
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.links import size_text
@@ -198,4 +199,4 @@ def test_unit_fixed_links_that_fill_the_limits_leave_nothing():
 
 def reported(record):
     """The report of a record in words."""
-    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(record))
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(summary() | record))

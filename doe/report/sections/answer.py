@@ -53,7 +53,7 @@ from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
-from rbdyn.base.identity import Identity, identity_line
+from rbdyn.base.identity import identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
 
@@ -80,9 +80,8 @@ def first_screen(summary: Record) -> list[Block]:
 
     Over a duty the verdicts at each of its points follow the gains.
     """
-    identity = part(summary, "identity")
     return [
-        *([identity_line(Identity.from_dict(identity))] if identity else ()),
+        identity_line(summary.identity),
         *_clearances(summary),
         *_judged(summary),
         *_gained(summary),
@@ -96,7 +95,7 @@ def _judged(summary: Record) -> list[Block]:
     """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
     limits = list((part(summary, "limits") or {}).values())
     odds = [limit["odds"][0] for limit in limits if limit.get("odds")]
-    kept = summary.get("status", "ok") in ("ok", "missed") and all(limit.get("verdict") == "kept" for limit in limits)
+    kept = summary.status in ("ok", "missed") and all(limit.get("verdict") == "kept" for limit in limits)
     sentence = part(summary, "limits_sentence") or ""
     if not kept or min(odds, default=1.0) < NEARLY_ALL:
         return [_limits_judged(summary), Paragraph(sentence, "warning")]
@@ -276,8 +275,8 @@ def tolerance_of(summary: Record, factor: Factor) -> float | None:
 
 def gains_statement(summary: Record) -> str:
     """Whether the gain is real, in words."""
-    if summary.get("statement"):
-        return str(summary["statement"])
+    if summary.statement:
+        return str(summary.statement)
     verdicts = [gain.get("verdict") for gain in (part(summary, "gains") or {}).values()]
     if not verdicts:
         return ""

@@ -15,7 +15,8 @@ from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remar
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import improvement, label, quantity, shown, with_error
 
-Record = Mapping[str, Any]
+# A record of a study, or a part of it.
+Record = Any
 # Limits by their sense in a record.
 SENSES = {"<=": "≤", ">=": "≥"}
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
@@ -31,9 +32,7 @@ def part(record: Record, *keys: str) -> Any:
     """The value under nested keys; None where any is missing or null."""
     value: Any = record
     for key in keys:
-        if not isinstance(value, Mapping):
-            return None
-        value = value.get(key)
+        value = value.get(key) if isinstance(value, Mapping) else getattr(value, key, None)
     return value
 
 
@@ -162,7 +161,7 @@ def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
 
 def notes_of(summary: Record) -> Notes:
     """Notes of a record."""
-    return tuple(map(Note.of, part(summary, "notes") or ()))
+    return tuple(part(summary, "notes") or ())
 
 
 def is_ratio(summary: Record, name: str) -> bool:
