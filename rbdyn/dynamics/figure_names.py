@@ -1,21 +1,8 @@
 """Names of the figures of parts of a bearing. They stand apart so that a command can check a name without compiled code."""
 
-# Powers lost, in the order of the power vector of ``forces.equations``.
-LOSSES = (
-    "outer_race_traction",
-    "inner_race_traction",
-    "rolling_resistance",
-    "race_damping",
-    "pocket_friction",
-    "pocket_damping",
-    "pocket_film",
-    "land_film",
-    "land_friction",
-    "land_damping",
-    "roller_drag",
-    "support_damping",
-)
-POWERS = {f"{loss}_power_W": loss for loss in LOSSES}
+from rbdyn.losses import POWER_TERMS
+
+POWERS = {f"{loss}_power_W": loss for loss in POWER_TERMS}
 # Operating diametral clearances, and the clearance of the scene that each is.
 CLEARANCES = {f"{name}_operating_clearance_um": name for name in ("radial", "guide", "pocket")}
 # Contacts at the largest load of a race: race and key of its report.

@@ -11,12 +11,13 @@ import numpy as np
 
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
-from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, LOSSES, POWERS
+from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, POWERS
 from rbdyn.dynamics.forces.equations import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import Figure, Runs, mean, quantity
+from rbdyn.losses import POWER_TERMS
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
@@ -43,7 +44,7 @@ def part_figures(
     moving = steady and drifting(runs)
     figures = dict[str, Quantity]()
     for name, loss in POWERS.items():
-        power = _mean_power(LOSSES.index(loss))
+        power = _mean_power(POWER_TERMS.index(loss))
         # Most scenes have no work at all of some losses.
         slow = slow_change(power, power, runs, since, moving=moving) if steady and _works(power, runs) else 0.0
         figures[name] = quantity(power, runs, companions, share, slow)

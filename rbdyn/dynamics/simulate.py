@@ -12,7 +12,6 @@ from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
-from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, OUTER_LOAD, RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
@@ -38,6 +37,7 @@ from rbdyn.dynamics.statistics.metrics import (
     whirl_notes,
     work_done,
 )
+from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
@@ -138,7 +138,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
     races = race_report(scene, inner_load, outer_load)
     weights = [run.duration for run in runs]
-    terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
+    terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
     pulses: dict[str, Any] = pulse_figures(scene, runs, companions, ensemble.plan.share)

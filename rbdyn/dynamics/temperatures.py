@@ -100,7 +100,7 @@ def _weighted(weights: Array, constant: float) -> Figure:
 
 
 def powers_of(runs: Sequence[Replicate]) -> Array:
-    """Mean powers [W] in the order of ``equations.LOSSES`` and what follows there."""
+    """Mean powers [W] in the order of ``POWER_TERMS`` and what follows there."""
     work = np.sum([run.work[run.first :].sum(axis=0) for run in runs], axis=0)
     return np.asarray(work / sum(run.duration for run in runs))
 

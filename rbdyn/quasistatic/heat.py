@@ -38,7 +38,7 @@ from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, part_temperatures
 from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
 from rbdyn.thermal.fixed_point import State
-from rbdyn.thermal.heat import TERMS, Effusivities, power_vector, shares
+from rbdyn.thermal.heat import TERMS, Effusivities, shares
 from rbdyn.thermal.losses import HeatModel, Losses, log_viscosity, no_rest
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, temperatures
 
@@ -156,8 +156,8 @@ def powers_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
     """Losses in the order of ``heat.TERMS`` [W], (terms,): half of each moment's power at either race."""
     inner, outer = scene.operation.speeds
     rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
-    races = ("outer", "inner")
-    return power_vector({f"{race}_race_traction": sliding for race in races}, dict.fromkeys(races, rolling))
+    by_kind = {"race_traction": sliding, "rolling_resistance": rolling}
+    return np.array([by_kind.get(term.partition("_")[2], 0.0) for term in TERMS])
 
 
 def term_shares(scene: SingleRowScene, film_to_oil: float) -> Array:

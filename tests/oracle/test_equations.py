@@ -13,7 +13,7 @@ import pytest
 from conftest import EVERYTHING, ROOT
 from numpy_twin import POWERS, twin
 
-from rbdyn.dynamics.forces.equations import LOADS, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT, pocket_loads
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWER_TERMS, SHAFT, pocket_loads
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import needs_clock
@@ -237,7 +237,7 @@ def fed(scene):
 
 def test_unit_twin_names_the_powers():
     """Unit: the twin's own list of powers is that of the equations."""
-    assert (*LOSSES, "shaft", "load", "inner_rolling") == tuple(POWERS)
+    assert (*POWER_TERMS, "shaft", "load", "inner_rolling") == tuple(POWERS)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -374,4 +374,4 @@ def test_unit_each_switch_silences_its_own_power(interpreted):
     """Unit: a law that is off loses exactly nothing, and every other power is there in some state."""
     for assignments, silent in SWITCHES.items():
         power = np.abs([outcome.power for outcome in interpreted[switched(assignments)]]).max(axis=0)[:SHAFT]
-        assert {name for name, value in zip(LOSSES, power, strict=True) if value == 0.0} == silent, assignments
+        assert {name for name, value in zip(POWER_TERMS, power, strict=True) if value == 0.0} == silent, assignments

@@ -15,10 +15,10 @@ from rbdyn.dynamics.forces.equations import (
     INNER_LOAD,
     LAND_LOAD,
     LOADS,
-    LOSSES,
     OUTER_LOAD,
     POCKET_CONTACT_LOAD,
     POCKET_LOAD,
+    POWER_TERMS,
     POWERS,
     SHAFT,
 )
@@ -131,7 +131,7 @@ def test_unit_json_keys_and_values(outer_result):
     assert record["power_balance"].keys() >= {"relative_gap"}
     assert record["loads"].keys() >= {"max_inner_N", "max_outer_N"}
     assert record["cost"].keys() >= COST_KEYS
-    assert set(record["power_terms_W"]) == set(LOSSES)
+    assert set(record["power_terms_W"]) == set(POWER_TERMS)
     assert record["cost"]["turns"] == 2 * (4 + 2)
     # The terms are the same means, summed in another order.
     assert sum(record["power_terms_W"].values()) == pytest.approx(record["power_loss_W"]["value"], rel=1e-12)

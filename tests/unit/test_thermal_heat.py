@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from rbdyn.base.faults import MethodError
 from rbdyn.contact.film_thickness import RollingContact
-from rbdyn.dynamics.forces.equations import LOSSES
 from rbdyn.life.rollers import iso_15312_heat, seat_heat
+from rbdyn.losses import POWER_TERMS
 from rbdyn.properties.catalogue import envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, oil_at
 from rbdyn.scene.bearing import CustomMaterial, material_of
 from rbdyn.thermal.conductances import CageSize, cavity_volume, half_space_contact, race_contact, seats, surfaces
-from rbdyn.thermal.heat import TERMS, Effusivities, heat_partition, power_vector, shares
+from rbdyn.thermal.heat import TERMS, Effusivities, heat_partition, shares
 from rbdyn.thermal.network import NODES
 from rbdyn.thermal.oil_fraction import CM3_PER_MINUTE, fraction_notes, oil_fraction, residence
 
@@ -29,7 +29,7 @@ positive = st.floats(100.0, 3e4)
 def test_unit_terms_are_those_of_a_simulation():
     """Unit: each loss of a simulation has its row, with rolling resistance by race, and windage besides."""
     by_race = {"outer_rolling_resistance", "inner_rolling_resistance"}
-    assert set(TERMS) == set(LOSSES) - {"rolling_resistance"} | by_race | {"spin_windage"}
+    assert set(TERMS) == set(POWER_TERMS) - {"rolling_resistance"} | by_race | {"spin_windage"}
     assert len(set(TERMS)) == len(TERMS)
 
 
@@ -73,20 +73,15 @@ def test_unit_share_of_the_oil_in_a_film():
         assert np.array_equal(dry[TERMS.index(term)], wet[TERMS.index(term)])
 
 
-def test_unit_power_vector_and_errors():
-    """Unit: heat sums to the power; the covariance of heat is that of powers between the shares; an unknown term is refused."""
-    powers = {term: float(number) for number, term in enumerate(LOSSES, 1)}
-    vector = power_vector(powers, {"outer": 1.0, "inner": 2.0}, windage=7.0)
+def test_unit_errors_of_heat():
+    """Unit: heat sums to the power; the covariance of heat is that of powers between the shares."""
+    powers = np.arange(1.0, len(TERMS) + 1.0)
     array = shares(Effusivities(1.0, 2.0, 3.0), "inner", 0.3)
-    heat = array.T @ vector
-    assert heat.sum() == pytest.approx(sum(powers.values()) + 7.0 - powers["support_damping"], rel=1e-14)
-    covariance = np.diag(np.arange(len(TERMS), dtype=float))
-    of_heat = array.T @ covariance @ array
-    one = np.ones(len(NODES))
     without = np.array([term != "support_damping" for term in TERMS])
-    assert one @ of_heat @ one == pytest.approx(np.diag(covariance)[without].sum())
-    with pytest.raises(MethodError, match="power term magic: heats no node"):
-        power_vector({"magic": 1.0}, {})
+    assert (array.T @ powers).sum() == pytest.approx(powers[without].sum(), rel=1e-14)
+    covariance = np.diag(np.arange(len(TERMS), dtype=float))
+    one = np.ones(len(NODES))
+    assert one @ (array.T @ covariance @ array) @ one == pytest.approx(np.diag(covariance)[without].sum())
 
 
 def test_unit_heat_partition():

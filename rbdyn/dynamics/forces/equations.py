@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
-from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import (
     RingMotion,
@@ -35,13 +34,14 @@ from rbdyn.dynamics.forces.bodies import (
 from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
+from rbdyn.losses import POWER_TERMS
 
 # After the powers lost come the input by the shafts and by loads without a potential, and last the inner race's part of the
 # rolling resistance.
 (
     OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
     LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POWERS,
-) = range(len(LOSSES) + 4)  # fmt: skip
+) = range(len(POWER_TERMS) + 4)  # fmt: skip
 # Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
 POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 

@@ -10,11 +10,11 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Notes
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, POWERS, ROLLING, RollerBearing
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
 from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage
+from rbdyn.losses import LOSSES, POWER_TERMS
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 from rbdyn.scene.thermal import Thermal, inlet_temperature
@@ -28,15 +28,16 @@ from rbdyn.thermal.conductances import (
     surface_coefficient,
     surfaces,
 )
-from rbdyn.thermal.heat import TERMS, Effusivities, shares
+from rbdyn.thermal.heat import GUIDES, TERMS, Effusivities, shares
 from rbdyn.thermal.losses import HeatModel, Losses, no_rest
-from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS, Boundaries, Conductances, matrix, source
+from rbdyn.thermal.network import NODES, OIL, ROLLERS, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
 
 
 def _terms_of_powers() -> Array:
     """Terms of the heat from the powers of a simulation, (terms, powers): rolling resistance is that of both races there."""
-    rows = np.array([[float(term == loss) for loss in (*LOSSES, *[""] * (POWERS - len(LOSSES)))] for term in TERMS])
+    powers = (*POWER_TERMS, *[""] * (POWERS - len(POWER_TERMS)))
+    rows = np.array([[float(loss.name == power) for power in powers] for loss in LOSSES])
     for race, inner in (("outer", -1.0), ("inner", 1.0)):
         rows[TERMS.index(f"{race}_rolling_resistance"), INNER_ROLLING] = inner
     rows[TERMS.index("outer_rolling_resistance"), ROLLING] = 1.0
@@ -44,8 +45,6 @@ def _terms_of_powers() -> Array:
 
 
 TERMS_OF_POWERS = _terms_of_powers()
-# Exponents of the viscosity in losses, with which a search begins; the states visited change them.
-VISCOUS = {"outer_rolling_resistance": 0.7, "inner_rolling_resistance": 0.7, "pocket_film": 0.5, "land_film": 1.0}
 
 
 class Network(NamedTuple):
@@ -62,7 +61,7 @@ class Network(NamedTuple):
 
     @property
     def shares(self) -> Array:
-        """Shares (powers, 4) of the nodes in the powers of a simulation, in the order of ``LOSSES`` and what follows there."""
+        """Shares (powers, 4) of the nodes in the powers of a simulation, in the order of ``POWER_TERMS`` and what follows there."""
         return np.asarray(TERMS_OF_POWERS.T @ self.term_shares)
 
     def terms(self, powers: Array) -> Array:
@@ -98,18 +97,12 @@ def term_shares(hot: Scene, film_to_oil: float) -> Array:
 
 def heat_model(hot: Scene, network: Network, temperatures: Array, powers: Array, viscosity: Array) -> HeatModel:
     """Model of the balance about a state: ``temperatures`` (4,) [C], ``powers`` of the simulation, ``viscosity``: ``log_viscosity``."""
-    guide = {"outer": OUTER, "inner": INNER, "roller": ROLLERS}[hot.cage.guidance]
-    surfaces_of = {
-        "outer_rolling_resistance": OUTER,
-        "inner_rolling_resistance": INNER,
-        "pocket_film": ROLLERS,
-        "land_film": guide,
-    }
-    films = np.zeros((len(TERMS), len(NODES)))
-    for row, term in enumerate(TERMS):
-        for node in (surfaces_of.get(term, OIL), ROLLERS if term in surfaces_of else OIL):
+    films = np.zeros((len(LOSSES), len(NODES)))
+    for row, loss in enumerate(LOSSES):
+        surface = GUIDES[hot.cage.guidance] if loss.film == "guide" else loss.film
+        for node in (OIL, OIL) if surface is None else (NODES.index(surface), ROLLERS):
             films[row, node] += 0.5
-    exponents = np.array([VISCOUS.get(term, 0.0) for term in TERMS])
+    exponents = np.array([loss.exponent for loss in LOSSES])
     losses = Losses(temperatures, network.terms(powers), exponents, films, viscosity)
     return HeatModel(losses, network.term_shares, network.conductances, network.boundaries, no_rest())
 

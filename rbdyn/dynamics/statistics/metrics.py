@@ -45,11 +45,11 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.notes import Note, Notes
-from rbdyn.dynamics.figure_names import LOSSES
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate, student_factor
 from rbdyn.dynamics.statistics.pulses import as_short_as_the_filter
+from rbdyn.losses import POWER_TERMS
 from rbdyn.result import JITTER, Quantity
 from rbdyn.scene import Scene
 
@@ -66,7 +66,7 @@ class Replicate:
     - ``whirl``: samples, sum and sum of squares of the speed of the cage's centre
     - ``pulses``: number of pulses on the pocket walls, sums of their heights and impulses; none unless the scene asks for them
     - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
-    - ``work``: integrals of the powers in the order of ``LOSSES`` and what follows there
+    - ``work``: integrals of the powers in the order of ``POWER_TERMS`` and what follows there
     - ``largest``: loads in the order of ``equations``
     - ``energy``: kinetic, elastic and potential energy together, at the ends of batches
     - ``energy_scale``: load of a contact times its approach
@@ -155,7 +155,7 @@ class Replicate:
 
     def power(self, term: str) -> float:
         """Mean power [W] of one loss."""
-        return float(self.work[self.first :, LOSSES.index(term)].sum() / self.duration)
+        return float(self.work[self.first :, POWER_TERMS.index(term)].sum() / self.duration)
 
     @property
     def inner_rolling_resistance(self) -> float:
