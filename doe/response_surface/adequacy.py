@@ -5,13 +5,12 @@
 - ``diagnose``: leverage, studentized residuals, Cook's distance, normality, outliers
 - ``compare``: scatter of the runs compared with their known variances; ``model_error``: lack of fit as an error of predictions
 
-Weighted fits have weighted sums. Repeated runs count within a block. Differences of blocks are a separate source and no part
+Repeated runs count within a block. Differences of blocks are a separate source and no part
 of the model, so R2 refers to the scatter within blocks.
 
 Known variances come from replicates of the simulation. The residuals over them give a test of lack of fit that needs no
 repeated design points. Repeated points show whether the replicates contain all of the scatter. A variance of few replicates
-is itself uncertain, and the tests allow for it. With weights from few replicates they are conservative: with 8 replicates,
-5 % tests reject a true surface in 1 to 2 % of fits, with equal weights in 5 %.
+is itself uncertain, and the tests allow for it.
 
 The response is the model plus a random field of mean zero and constant variance. Its correlation length is one coded unit, so
 that distinct runs of a design are nearly independent. The variance of the field is a variance component, estimated by the
@@ -82,8 +81,8 @@ def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, 
     error = solution.mean_square, solution.dof
     block_columns = range(len(terms), len(solution.coefficients))
     groups = replicate_groups(points, block)
-    within = sum_within(response, solution.weights, block)
-    about_mean = sum_within(response, solution.weights, np.zeros_like(block))
+    within = sum_within(response, block)
+    about_mean = sum_within(response, np.zeros_like(block))
     return [
         row("model", max(within - residual, 0.0), model_df, *error),
         *(entry for entry in term_rows(terms, solution) if entry["source"] != "1"),
@@ -118,7 +117,7 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tupl
     pure_df = len(response) - len(np.unique(groups))
     if pure_df == 0:
         return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)
-    pure = sum_within(response, solution.weights, groups)
+    pure = sum_within(response, groups)
     lack = max(solution.residual_sum - pure, 0.0)
     tested = row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df)
     if pure == 0.0 < lack:
@@ -127,29 +126,28 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tupl
     return tested, row("pure_error", pure, pure_df)
 
 
-def sum_within(values: Array, weights: Array, group: Whole) -> float:
-    """Weighted sum of squares about the mean of each group, exactly zero for equal values."""
+def sum_within(values: Array, group: Whole) -> float:
+    """Sum of squares about the mean of each group, exactly zero for equal values."""
     total = 0.0
     for label in np.unique(group):
         # Relative to the first value, equal values have no rounding.
-        offset, weight = values[group == label] - values[group == label][0], weights[group == label]
-        total += float((weight * (offset - weight @ offset / weight.sum()) ** 2).sum())
+        offset = values[group == label] - values[group == label][0]
+        total += float(((offset - offset.mean()) ** 2).sum())
     return total
 
 
 def goodness(solution: LeastSquares, response: Array, prediction: Array, block: Whole) -> dict[str, Any]:
     """R2 and similar figures on the scatter within blocks, PRESS and precision, as defined by Myers et al."""
-    within = sum_within(response, solution.weights, block)
+    within = sum_within(response, block)
     free = len(response) - len(np.unique(block))
-    missed, variance = press(solution), observation_variance(solution)
+    missed, variance = press(solution), solution.mean_square
     size = len(solution.coefficients)
-    mean = float(solution.weights @ response / solution.weights.sum())
     return {
         "r2": complement(solution.residual_sum, within),
         "adjusted_r2": complement(solution.mean_square, within / free),
         "predicted_r2": None if missed is None else complement(missed, within),
         "press": missed,
-        "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
+        "cv_percent": ratio(100 * math.sqrt(variance), abs(float(response.mean()))),
         "adequate_precision": ratio(float(np.ptp(prediction)), math.sqrt(size * variance / len(response))),
     }
 
@@ -159,12 +157,7 @@ def press(solution: LeastSquares) -> float | None:
     free = 1.0 - solution.leverage
     if (free <= EXACT).any():
         return None
-    return float((solution.weights * (solution.residuals / free) ** 2).sum())
-
-
-def observation_variance(solution: LeastSquares) -> float:
-    """Variance of a new run about the surface; for unequal weights that of the mean run."""
-    return solution.mean_square * float((1.0 / solution.weights).mean())
+    return float(((solution.residuals / free) ** 2).sum())
 
 
 def ratio(a: float, b: float) -> float | None:
@@ -232,9 +225,8 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     """Diagnostics of a least-squares fit to ``response`` (n,)."""
     free = 1.0 - solution.leverage
     tested = (free > EXACT) & (solution.mean_square > 0)
-    weighted = solution.residuals * np.sqrt(solution.weights)
     safe = np.where(tested, free, 1.0)
-    standardized = np.where(tested, weighted / np.sqrt(safe * (solution.mean_square or 1.0)), np.nan)
+    standardized = np.where(tested, solution.residuals / np.sqrt(safe * (solution.mean_square or 1.0)), np.nan)
     # A run with the whole residual leaves no scatter for its own test.
     rest = solution.dof - standardized**2
     judged = tested & (rest > EXACT * solution.dof) & (solution.dof > 1)
@@ -320,8 +312,7 @@ def _list(runs: list[int]) -> str:
 class KnownVariance(Record):
     """Comparison of a fit with known variances.
 
-    ``chi_square``: of the residual over the known variance, with ``df`` and ``p``. ``expected``: its mean for a true model,
-    infinite for weights of too few replicates. ``pure_error``: ANOVA row of the replicate variance at the repeated points. Its
+    ``chi_square``: of the residual over the known variance, with ``df``, its mean for a true model, and ``p``. ``pure_error``: ANOVA row of the replicate variance at the repeated points. Its
     ``f`` is pure error over this variance and its ``p`` two-sided, both None without repeats. ``covariance``: of the surface's
     coefficients by the known variances alone, with ``standard_errors``. ``dof``: of the variance of one run, None where it is
     known exactly.
@@ -329,8 +320,7 @@ class KnownVariance(Record):
 
     chi_square: float
     df: int
-    p: float | None
-    expected: float = outside_json()
+    p: float
     mean_square_ratio: float = derived(lambda self: self.chi_square / self.df)
     pure_error_ratio: float | None = derived(lambda self: self.pure_error["f"])
     pure_error_p: float | None = derived(lambda self: self.pure_error["p"])
@@ -351,23 +341,19 @@ def compare(
     """Compare the residual and the pure error of a fit with the ``variances`` (n,) of the runs.
 
     ``matrix`` (n, p): of the fit, with the surface in its first ``count`` columns. ``groups`` (n,): repeated points.
-    ``replicates`` (n,): number behind each variance, 0 for variances taken as exact. With weights 1 / variance the residual
-    sum is the chi-square; with equal weights it is divided by the mean variance.
+    ``replicates`` (n,): number behind each variance, 0 for variances taken as exact. The residual sum over the mean variance
+    is the chi-square.
     """
-    unit = fit.weights * variances
-    weighted = bool(np.ptp(fit.weights) > 0)
     few = replicates[replicates > 1]
     dof = 1.0 / float(np.mean(1.0 / (few - 1))) if few.size else None
     df = fit.dof
-    chi_square = fit.residual_sum / float(unit.mean())
-    project = fit.inverse[:count] @ (matrix * fit.weights[:, None]).T
+    chi_square = fit.residual_sum / float(variances.mean())
+    project = fit.inverse[:count] @ matrix.T
     return KnownVariance(
         chi_square=chi_square,
         df=df,
-        p=_upper_tail(unit, dof, weighted, chi_square, df),
-        # A squared residual over its own estimated variance is an F(1, dof).
-        expected=df * (1.0 if dof is None or not weighted else dof / (dof - 2) if dof > 2 else math.inf),
-        pure_error=_pure_error_row(fit, response, unit, groups, dof, weighted),
+        p=_upper_tail(variances, dof, chi_square, df),
+        pure_error=_pure_error_row(response, variances, groups, dof),
         covariance=(project * variances) @ project.T,
         dof=dof,
     )
@@ -378,7 +364,7 @@ def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
     share = math.sqrt(variance.mean_square_ratio)
     sentences = [
         f"chi-square of the residual over the known variance is {variance.chi_square:.4g} on {variance.df} degrees of freedom"
-        f"{'; a test needs more replicates a run' if variance.p is None else ''}. Standard errors come from the residual and are "
+        f". Standard errors come from the residual and are "
         f"{share:.3g} times those of the known variance alone."
     ]
     f, p = variance.pure_error_ratio, variance.pure_error_p
@@ -395,39 +381,25 @@ def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
     return [*sentences, f"{scatter}: {cause}; rely on tests against pure error."]
 
 
-def _upper_tail(unit: Array, dof: float | None, weighted: bool, chi_square: float, df: int) -> float | None:
-    """Probability of a larger sum of squares, None where the replicates are too few.
-
-    The unit of the sum is a variance known to ``dof`` degrees of freedom a run.
-    """
+def _upper_tail(variances: Array, dof: float | None, chi_square: float, df: int) -> float:
+    """Probability of a larger sum of squares in the unit of a variance known to ``dof`` degrees of freedom a run."""
     if dof is None:
         return float(special.chdtrc(df, chi_square))
-    if not weighted:
-        # The mean of all variances, each known to ``dof`` degrees of freedom.
-        total = dof * float(unit.sum() ** 2 / (unit**2).sum())
-        return float(special.fdtrc(df, total, chi_square / df))
-    if dof <= 4:
-        return None
-    # Each squared residual over its own estimated variance is an F(1, dof). A multiple of a chi-square has the same
-    # mean and variance.
-    mean = dof / (dof - 2)
-    spread = 2 * dof**2 * (dof - 1) / ((dof - 2) ** 2 * (dof - 4))
-    scale = spread / (2 * mean)
-    return float(special.chdtrc(df * mean / scale, chi_square / scale))
+    # The mean of all variances, each known to ``dof`` degrees of freedom.
+    total = dof * float(variances.sum() ** 2 / (variances**2).sum())
+    return float(special.fdtrc(df, total, chi_square / df))
 
 
-def _pure_error_row(
-    solution: LeastSquares, response: Array, unit: Array, groups: Whole, dof: float | None, weighted: bool
-) -> AnovaRow:
+def _pure_error_row(response: Array, variances: Array, groups: Whole, dof: float | None) -> AnovaRow:
     labels, sizes = np.unique(groups, return_counts=True)
     df = len(groups) - len(labels)
     if df == 0:
-        return AnovaRow(source="replicate_variance", ss=None, df=None, ms=float(unit.mean()), f=None, p=None)
-    means = [(1 - 1 / size) * unit[groups == label].sum() for label, size in zip(labels, sizes, strict=True)]
+        return AnovaRow(source="replicate_variance", ss=None, df=None, ms=float(variances.mean()), f=None, p=None)
+    means = [(1 - 1 / size) * variances[groups == label].sum() for label, size in zip(labels, sizes, strict=True)]
     mean_square = float(sum(means)) / df
-    f = ratio(sum_within(response, solution.weights, groups) / df, mean_square)
-    repeated = unit[sizes[np.searchsorted(labels, groups)] > 1]
-    tail = None if f is None else _upper_tail(repeated, dof, weighted, f * df, df)
+    f = ratio(sum_within(response, groups) / df, mean_square)
+    repeated = variances[sizes[np.searchsorted(labels, groups)] > 1]
+    tail = None if f is None else _upper_tail(repeated, dof, f * df, df)
     total_dof = None if dof is None else round(dof * len(repeated))
     p = None if tail is None else 2 * min(tail, 1 - tail)
     ss = None if total_dof is None else mean_square * total_dof
@@ -454,8 +426,8 @@ def model_error(
     lack, pure = find(table, "lack_of_fit"), find(table, "pure_error")
     beyond, dof = solution.residual_sum, solution.dof
     source: Source = "residual"
-    if known_variance is not None and not known_variance.refuted and math.isfinite(known_variance.expected):
-        beyond *= 1.0 - known_variance.expected / known_variance.chi_square if known_variance.chi_square else 0.0
+    if known_variance is not None and not known_variance.refuted:
+        beyond *= 1.0 - known_variance.df / known_variance.chi_square if known_variance.chi_square else 0.0
         source = "known variance"
     elif pure["df"]:
         beyond, dof, source = (lack["ss"] or 0.0) - (lack["df"] or 0) * (pure["ms"] or 0.0), lack["df"] or 0, "repeats"
@@ -480,7 +452,6 @@ def draw_fields(error: ModelError | None, coded: Array, draws: int, random: np.r
 
 def _share(solution: LeastSquares, matrix: Array, groups: Whole) -> float:
     """Expected residual sum of a field of variance 1: the trace of its part outside the model."""
-    member = (groups[:, None] == np.unique(groups)[None, :]) * np.sqrt(solution.weights)[:, None]
-    scaled = matrix * np.sqrt(solution.weights)[:, None]
-    inside = scaled.T @ member
+    member = (groups[:, None] == np.unique(groups)[None, :]).astype(float)
+    inside = matrix.T @ member
     return float((member**2).sum() - np.einsum("pg,pq,qg", inside, solution.inverse, inside))

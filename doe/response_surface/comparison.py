@@ -29,13 +29,7 @@ Rival = Callable[[Rows, Array], Array]
 
 
 def compare(
-    coded: ArrayLike,
-    values: ArrayLike,
-    refit: Callable[[Rows], Surface],
-    *,
-    name: str,
-    matrix: ArrayLike | None = None,
-    standard_errors: ArrayLike | None = None,
+    coded: ArrayLike, values: ArrayLike, refit: Callable[[Rows], Surface], *, name: str, matrix: ArrayLike | None = None
 ) -> dict[str, Any]:
     """Leave out each point in turn with all its replicates, refit both rivals, and compare their errors there.
 
@@ -49,13 +43,12 @@ def compare(
     refit : the polynomial fitted to the runs of some rows; it raises MethodError where they do not suffice.
     matrix : model matrix of the polynomial (n, p), to find the points that it needs (leverage of all replicates together
         above 0.95); by default only those without which ``refit`` fails.
-    standard_errors : known standard error of each value (n,), for the process; by default it estimates one.
 
     Returns a record:
 
     - ``polynomial`` and ``gaussian_process``: ``loo_rmse`` and ``loo_r2`` (None where all points have one mean)
     - of the process also ``length_scales`` in coded units by letter, ``deviation`` of the random function and
-      ``log_likelihood``; ``noise`` of a run, None where the standard errors are known
+      ``log_likelihood``; ``noise`` of a run
     - ``difference`` of the squared errors, polynomial less process: ``mean``, ``standard_error`` and 95 % ``interval`` by
       Student's t over the points, which are taken as independent
     - ``points``: number compared; ``folds``: number of fits; ``sentence``
@@ -67,7 +60,7 @@ def compare(
     cross-validation has no unbiased estimate (Bengio and Grandvalet, J. Mach. Learn. Res. 5 (2004)).
     """
     points, response = np.asarray(coded, float), np.asarray(values, float)
-    variances = np.zeros(len(response)) if standard_errors is None else np.asarray(standard_errors, float) ** 2
+    variances = np.zeros(len(response))
     whole = fit_emulator(points, response, variances, trend="constant")
     group = replicate_groups(points)
     basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
@@ -91,7 +84,7 @@ def compare(
     scores = [_score(score, truths) for score in squares.T]
     return {
         "polynomial": scores[0],
-        "gaussian_process": {**scores[1], **_hyperparameters(whole, scatter=standard_errors is None)},
+        "gaussian_process": {**scores[1], **_hyperparameters(whole)},
         "difference": difference,
         "points": len(truths),
         "folds": len(folds),
@@ -107,13 +100,13 @@ def _folds(firsts: Whole, singly: bool) -> list[Whole]:
     return np.array_split(np.random.default_rng(1).permutation(firsts), FOLDS)
 
 
-def _hyperparameters(process: Emulator, scatter: bool) -> dict[str, Any]:
+def _hyperparameters(process: Emulator) -> dict[str, Any]:
     parameters = process.hyperparameters
     return {
         "kernel": "Matern 5/2",
         "length_scales": dict(zip(ascii_uppercase, parameters.lengths.tolist(), strict=False)),
         "deviation": math.sqrt(parameters.variance),
-        "noise": math.sqrt(parameters.nugget) if scatter else None,
+        "noise": math.sqrt(parameters.nugget),
         "log_likelihood": process.likelihood,
     }
 

@@ -33,17 +33,16 @@ ROUNDING = 8 * np.finfo(np.float64).eps  # share of the response below which a v
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
-    """Minimum of sum(weights * residuals^2).
+    """Minimum of the sum of squared residuals.
 
-    ``coefficients`` (p,); ``inverse`` (p, p) of X'WX; ``residuals`` (n,) in the unit of the response;
-    ``leverage`` (n,), the diagonal of the hat matrix; ``mean_square`` of the weighted residuals over ``dof``;
+    ``coefficients`` (p,); ``inverse`` (p, p) of X'X; ``residuals`` (n,) in the unit of the response;
+    ``leverage`` (n,), the diagonal of the hat matrix; ``mean_square`` of the residuals over ``dof``;
     ``inflation`` (p,), the variance inflation factor of each column, NaN for one that does not vary.
     """
 
     coefficients: Array
     inverse: Array
     residuals: Array
-    weights: Array
     leverage: Array
     inflation: Array
     mean_square: float
@@ -51,7 +50,7 @@ class LeastSquares:
 
     @property
     def residual_sum(self) -> float:
-        """Weighted sum of squared residuals."""
+        """Sum of squared residuals."""
         return self.mean_square * self.dof
 
     def partial_sum(self, columns: Sequence[int]) -> float:
@@ -61,33 +60,29 @@ class LeastSquares:
         return float(part @ np.linalg.solve(self.inverse[np.ix_(places, places)], part))
 
 
-def solve(matrix: ArrayLike, response: ArrayLike, weights: ArrayLike | None = None) -> LeastSquares:
-    """Fit ``matrix`` (n, p) of full column rank to ``response`` (n,), n > p, with positive weights (n,), by default 1.
+def solve(matrix: ArrayLike, response: ArrayLike) -> LeastSquares:
+    """Fit ``matrix`` (n, p) of full column rank to ``response`` (n,), n > p.
 
     Residuals below the rounding of the response are zero, and so are coefficients whose columns contribute less.
     """
     columns, values = np.asarray(matrix, float), np.asarray(response, float)
-    weight = np.ones(len(values)) if weights is None else np.asarray(weights, float)
-    root = np.sqrt(weight)
-    scale = _powers_of_two(columns * root[:, None])
-    unit, target = columns * root[:, None] / scale, values * root
+    scale = _powers_of_two(columns)
+    unit = columns / scale
     orthogonal, triangle = np.linalg.qr(unit)
     back = linalg.solve_triangular(triangle, np.eye(len(triangle)))
-    scaled, rest = _refinement(unit, target, orthogonal, back)
-    rounding = ROUNDING * np.linalg.norm(target)
+    scaled, rest = _refinement(unit, values, orthogonal, back)
+    rounding = ROUNDING * np.linalg.norm(values)
     if np.linalg.norm(rest) <= rounding:
         rest = np.zeros_like(rest)
     scaled = np.where(np.abs(scaled) * np.linalg.norm(unit, axis=0) <= rounding, 0.0, scaled)
     inverse = (back @ back.T) / np.outer(scale, scale)
     dof = columns.shape[0] - columns.shape[1]
-    share = weight / weight.sum()
-    spread = (weight[:, None] * (columns - share @ columns) ** 2).sum(axis=0)
-    varies = spread > ROUNDING**2 * (weight[:, None] * columns**2).sum(axis=0)
+    spread = ((columns - columns.mean(axis=0)) ** 2).sum(axis=0)
+    varies = spread > ROUNDING**2 * (columns**2).sum(axis=0)
     return LeastSquares(
         coefficients=scaled / scale,
         inverse=inverse,
-        residuals=rest / root,
-        weights=weight,
+        residuals=rest,
         leverage=(orthogonal**2).sum(axis=1),
         inflation=np.where(varies, np.diag(inverse) * spread, np.nan),
         mean_square=float((rest**2).sum() / dof),
@@ -207,20 +202,6 @@ def run_data(
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
         without=without,
     )
-
-
-def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
-    """Raises MethodError unless every run has a positive standard error, as weighting by them needs."""
-    fix = 'give each run a positive error or use weighting = "equal"'
-    if standard_errors is None:
-        raise MethodError(f'{name}: weighting = "replicates" needs the errors of the runs; {fix}')
-    errors = np.atleast_1d(np.asarray(standard_errors, float))
-    bad = np.flatnonzero(~(np.isfinite(errors) & (errors > 0)))
-    if bad.size:
-        raise MethodError(
-            f'{name}: the error of run {bad[0] + 1} is {errors[bad[0]]:g}, but weighting = "replicates" needs '
-            f"positive ones; {fix}"
-        )
 
 
 def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:

@@ -36,7 +36,6 @@ from doe.response_surface.adequacy import (
     find,
     goodness,
     model_error,
-    observation_variance,
     p_text,
 )
 from doe.response_surface.least_squares import (
@@ -44,7 +43,6 @@ from doe.response_surface.least_squares import (
     Data,
     backward,
     box_cox,
-    check_errors,
     check_matrix,
     check_positive,
     check_size,
@@ -158,7 +156,6 @@ def _inside(place: Array, points: Array) -> bool:
     return in_box and bool(np.linalg.norm(place) <= np.linalg.norm(points, axis=1).max())
 
 
-Weighting = Literal["equal", "replicates"]
 # Range of values over the largest value, below which sums of squares have too few digits.
 LEAST_SPREAD = 1e-9
 Transform = Literal["none", "box_cox"] | float
@@ -173,10 +170,9 @@ class Surface(Record):
 
     - ``coefficients`` (p,), ``covariance`` (p, p): by ``terms``, in coded units and units of the response or its transform
     - ``transform``: exponent of Box and Cox, None without one
-    - ``residual_mean_square``: scale of the covariance, on ``residual_dof`` degrees of freedom. With weights 1 / variance it
-      has no unit, and `known_variance` has its expected value.
+    - ``residual_mean_square``: scale of the covariance, on ``residual_dof`` degrees of freedom
     - ``lack_of_fit``, ``pure_error``: error of the surface beyond the scatter of replicates, and that scatter
-    - ``observation_variance``: of a new run about the surface, or of the mean run if they differ
+    - ``observation_variance``: of a new run about the surface
     - ``r2``, ``adjusted_r2``, ``predicted_r2``: without the differences of blocks
     - ``blocks``: effects by label about the mean over all runs, which the surface predicts
     - ``vif``: by ``terms``, NaN for "1"
@@ -214,11 +210,10 @@ class Surface(Record):
     )
     covariance: Array
     residual_dof: int
-    observation_variance: float
+    observation_variance: float = derived(lambda self: self.residual_mean_square)
     actual_coefficients: dict[str, float] = derived(
         lambda self: self._named(in_actual_units(self.terms, self.coefficients, self.data.centre, self.data.step))
     )
-    weighting: Weighting
     transform: float | None
     box_cox: BoxCox | None
     blocks: dict[str, float]
@@ -264,7 +259,7 @@ class Surface(Record):
     def refit(self, rows: Rows) -> "Surface":
         """The same kind of surface fitted to these runs alone. Raises MethodError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
-        return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform, advised=False)
+        return _fit(self.name, self.data.rows(rows), self.model, transform, advised=False)
 
     @property
     def interval_dof(self) -> int:
@@ -307,7 +302,6 @@ def fit(
     step: ArrayLike,
     standard_errors: ArrayLike | None = None,
     replicates: ArrayLike | None = None,
-    weighting: Weighting = "equal",
     block: ArrayLike | None = None,
     transform: Transform | None = None,
     without: Collection[int] = (),
@@ -322,22 +316,19 @@ def fit(
         is at most 0.05, except terms that a remaining interaction or square needs by hierarchy.
     centre, step : actual value of each factor at coded 0 and its change over one coded unit, shape (k,).
     standard_errors : of each value by the replicates of the simulation, shape (n,), NaN where unknown. They are compared
-        with the scatter of the runs, and may weight the runs, see ``weighting``.
+        with the scatter of the runs.
     replicates : number behind each standard error, shape (n,); 0 for errors taken as exact.
-    weighting : "equal", or "replicates" for weights 1 / standard_error^2.
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
     without : indices of factors that the surface does not depend on.
 
     Raises MethodError when shapes differ, a value is not finite, all values are equal, or the model is unknown. It also
-    refuses runs that cannot determine the terms, a transform of values that are not positive, and such errors as weights.
+    refuses runs that cannot determine the terms, and a transform of values that are not positive.
     """
     if model not in MODELS:
         raise MethodError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
     data = run_data(name, coded, values, centre, step, standard_errors, replicates, block, without)
-    if weighting == "replicates":
-        check_errors(name, standard_errors)
-    return _fit(name, data, model, weighting, "none" if transform is None else transform, advised=True)
+    return _fit(name, data, model, "none" if transform is None else transform, advised=True)
 
 
 def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
@@ -345,7 +336,7 @@ def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
     return {key: row[key] for key in keys}
 
 
-def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool) -> Surface:
+def _fit(name: str, data: Data, model: Model, transform: Transform, advised: bool) -> Surface:
     terms = model_terms(data.points.shape[1], model, data.without)
     check_size(name, model, terms, data.block)
     check_matrix(name, model, terms, _columns(data, terms))
@@ -361,12 +352,11 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         )
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
-    weights = 1.0 / variances if weighting == "replicates" and variances is not None else None
     removed: list[Removal] = []
     if model == "reduced":
-        terms, removed = eliminate(terms, lambda subset: solve(_columns(data, subset), response, weights))
+        terms, removed = eliminate(terms, lambda subset: solve(_columns(data, subset), response))
     matrix = _columns(data, terms)
-    solution = solve(matrix, response, weights)
+    solution = solve(matrix, response)
     count = len(terms)
     covariance = (solution.mean_square * solution.inverse)[:count, :count]
     groups = replicate_groups(data.points, data.block)
@@ -396,8 +386,6 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         diagnostics=diagnose(solution, response),
         known_variance=known_variance,
         model_error=model_error(solution, matrix, groups, table, known_variance),
-        observation_variance=observation_variance(solution),
-        weighting=weighting,
         transform=exponent,
         box_cox=box_cox(matrix, data.values, name=name) if advised and open_to_transform else None,
         rival=None,

@@ -62,8 +62,6 @@ class Fitted(Strict):
 
     model: Model = "quadratic"
     """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
-    weighting: Literal["equal", "replicates"] = "equal"
-    """"replicates" weighs each run by the inverse of its variance, by the replicates of the simulation."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
     """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
 

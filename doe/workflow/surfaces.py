@@ -102,10 +102,9 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
         if len(surface.data.values) > MOST_RIVALLED:
             continue
         data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
-        errors = data.standard_errors if surface.weighting == "replicates" else None
         with suppress(MethodError):
             runs = data.points, data.values, surface.refit
-            rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
+            rival = compare(*runs, name=surface.name, matrix=matrix)
             results[place] = replace(surface, rival=rival)
     return results
 
@@ -356,11 +355,7 @@ def coefficient_root(surface: Surface) -> Array:
     """Root (p, n) of the covariance of the coefficients: their response to independent errors of variance 1 of the runs."""
     data = surface.data
     matrix = np.hstack([model_matrix(data.points, surface.terms), data.block_columns])
-    weights = np.ones(len(data.values))
-    if surface.weighting == "replicates" and data.standard_errors is not None:
-        scale = 1.0 if surface.transform is None else slope(data.values, surface.transform)
-        weights = 1.0 / (data.standard_errors * scale) ** 2
-    root = np.linalg.pinv(matrix * np.sqrt(weights)[:, None])[: len(surface.terms)]
+    root = np.linalg.pinv(matrix)[: len(surface.terms)]
     return np.asarray(root * np.sqrt(surface.residual_mean_square))
 
 
@@ -514,9 +509,7 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
         pure, scatter = surface.pure_error, None
         if pure["ms"] is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
-            # Mean squares of a weighted fit have no unit; the variance of a run has.
-            variance = pure["ms"] / surface.residual_mean_square * surface.observation_variance
-            single = math.sqrt(variance * sum(float(row[constant]) ** 2 for row in rows))
+            single = math.sqrt(pure["ms"] * sum(float(row[constant]) ** 2 for row in rows))
             scatter = float(stats.t.ppf(0.975, pure["df"])) * single
         gains.append(
             PredictedGain(

@@ -51,12 +51,12 @@ def with_errors() -> pd.DataFrame:
 
 def test_errors_replicates_and_blocks_of_a_table_reach_the_fit(tmp_path):
     with_errors().to_csv(tmp_path / "table.csv", index=False)
-    loaded = Study.load(study(tmp_path, ('model = "linear"', 'model = "linear"\nweighting = "replicates"')))
+    loaded = Study.load(study(tmp_path))
     runs = read_runs(loaded, tmp_path / "table.csv")
     assert runs.errors == pytest.approx(0.02 * runs.values)
     assert runs.replicates.tolist() == [8] * 20 and runs.block.tolist() == [0, 1] * 10
     surface = fit_surfaces(loaded, runs)[0]
-    assert surface.weighting == "replicates" and set(surface.blocks) == {"0", "1"}
+    assert set(surface.blocks) == {"0", "1"}
     assert surface.data.standard_errors == pytest.approx(0.02 * runs.values[:, 0] / 2.364624, rel=1e-6)
     assert surface.known_variance.dof == pytest.approx(7)
 
@@ -136,19 +136,13 @@ HEADER = ",".join(TABLE.columns)
         (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
         (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot separate B from the other terms"),
         (TABLE.assign(power_loss_W=9.0), ("", ""), "power_loss_W: all 20 values are 9, so there is nothing to fit"),
-        (TABLE, (MODEL, f"weighting = 'replicates'\n{MODEL}"), 'weighting = "replicates" needs'),
-        (
-            with_errors().assign(impact_force_N_error=-1.0),
-            (MODEL, f"weighting = 'replicates'\n{MODEL}"),
-            "impact_force_N_error in row 1 = -1.0: is below 0",
-        ),
+        (with_errors().assign(impact_force_N_error=-1.0), ("", ""), "impact_force_N_error in row 1 = -1.0: is below 0"),
         (
             TABLE.assign(impact_force_N=TABLE["impact_force_N"] - 200),
             (MODEL, f"transform = 'box_cox'\n{MODEL}"),
             "a power transform needs positive values",
         ),
         (TABLE, (MODEL, f"transform = 'log'\n{MODEL}"), "transform = 'log': choose one of 'none' or 'box_cox', or"),
-        (TABLE, (MODEL, f"weighting = 'none'\n{MODEL}"), "choose one of 'equal' or 'replicates'"),
         (TABLE.assign(block=0.5), ("", ""), "block in row 1 = 0.5: is not a whole number; write a plain one"),
         (TABLE.assign(power_loss_W_error="wide"), ("", ""), "power_loss_W_error in row 1 = 'wide': is not a finite"),
         (

@@ -82,19 +82,6 @@ def test_without_noise_the_whole_residual_is_model_error():
     assert quadratic.model_error is None and any("lack of fit is none" in line for line in describe(quadratic))
 
 
-def test_weights_from_few_replicates_are_no_model_error():
-    """Squared residuals over variances of eight replicates are 7/5 on average; of three, they have no mean."""
-    random, told = np.random.default_rng(4), {8: 0, 3: 0}
-    points = np.random.default_rng(5).uniform(-1.2, 1.2, (24, 3))
-    for _ in range(60):
-        for size in told:
-            runs = 5.0 + points.sum(axis=1) + random.normal(size=(size, 24))
-            errors = {"standard_errors": runs.std(axis=0, ddof=1) / np.sqrt(size), "replicates": np.full(24, size)}
-            surface = fit(points, runs.mean(axis=0), weighting="replicates", **errors, **KEYWORDS)
-            told[size] += surface.model_error is not None and surface.model_error.source == "known variance"
-    assert 10 <= told[8] <= 40 and told[3] == 0
-
-
 def test_variance_is_that_of_the_field_on_average():
     """Independent errors of one point each: the estimate is unbiased, here where hardly any fit is without."""
     random, found = np.random.default_rng(7), []

@@ -173,7 +173,7 @@ def test_json_has_the_contract_keys_and_no_nan(printed):
     assert list(result) == [
         *("model", "coefficients", "anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2"),
         *("press", "cv_percent", "adequate_precision", "stationary_point", "terms", "standard_errors", "vif"),
-        *("tests", "covariance", "residual_dof", "observation_variance", "actual_coefficients", "weighting"),
+        *("tests", "covariance", "residual_dof", "observation_variance", "actual_coefficients"),
         *("transform", "box_cox", "blocks", "elimination", "canonical", "known_variance", "model_error"),
         *("diagnostics", "rival", "sentences"),
     ]

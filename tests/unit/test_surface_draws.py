@@ -60,10 +60,9 @@ def drawn(surfaces, at, draws=4000, simulated=None):
 
 
 def test_invariant_roots_are_those_of_covariances():
-    """Invariant: roots times their transposes are the covariances, with weights and blocks and for a field over many points."""
+    """Invariant: roots times their transposes are the covariances, with blocks and for a field over many points."""
     random = np.random.default_rng(1)
-    errors, blocks = random.uniform(0.1, 0.3, len(DESIGN)), np.arange(len(DESIGN)) % 2
-    for options in ({}, {"weighting": "replicates", "standard_errors": errors}, {"block": blocks}):
+    for options in ({}, {"block": np.arange(len(DESIGN)) % 2}):
         surface = surfaces_of(random, **options)[0]
         root = coefficient_root(surface)
         assert root @ root.T == pytest.approx(surface.covariance, rel=1e-9, abs=1e-12)

@@ -124,9 +124,8 @@ def _anova(name: str, fitted: Record) -> Table:
         for row in fitted.get("anova") or []
         if "source" in row
     ]  # fmt: skip
-    weights = ", weights 1 / variance of the replicates" if fitted.get("weighting") == "replicates" else ""
     power = "" if fitted.get("transform") is None else f", Box-Cox exponent {fitted['transform']:.3g}"
-    model = f"{fitted['model'].replace('_', ' ')} model, coded units{weights}{power}" if fitted.get("model") else ""
+    model = f"{fitted['model'].replace('_', ' ')} model, coded units{power}" if fitted.get("model") else ""
     caption = f"Analysis of variance of {label(name)}: {model}".rstrip(": ")
     header = ("source", "sum of squares", "df", "mean square", "F", "p", "")
     return Table(caption, header, rows, LEGEND, text_columns=(6,), detail=Detail.USUAL)
@@ -169,9 +168,8 @@ def _quality(fitted: Record) -> str:
     figures = [f"{words} {shown(fitted[key], 5)}" for key, words in STATISTICS if fitted.get(key) is not None]
     residual: Record = next((row for row in fitted.get("anova") or [] if row.get("source") == "residual"), {})
     if residual.get("ms") is not None:
-        unit = "times the known error " if fitted.get("weighting") == "replicates" else ""
         freedom = counted(residual["df"], "degree") + " of freedom"
-        figures.append(f"residual standard deviation {shown(float(residual['ms']) ** 0.5, 5)} {unit}on {freedom}")
+        figures.append(f"residual standard deviation {shown(float(residual['ms']) ** 0.5, 5)} on {freedom}")
     return ", ".join(figures)
 
 
