@@ -139,8 +139,6 @@ class SimulationResult(Brief, SavedRecord):
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
       (``rbdyn.dynamics.part_figures``)
-    - ``pulse_rate_hz``, ``pulse_height_N``, ``pulse_impulse_N_s``: pulses in a second at one pocket, their mean height and impulse;
-      None unless numerics.pulse_threshold_N is stated
     """
 
     FORMAT = "rbdyn.simulation/5"
@@ -170,9 +168,6 @@ class SimulationResult(Brief, SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
     cage_orbit_radius_share: Quantity | None = None
-    pulse_rate_hz: Quantity | None = None
-    pulse_height_N: Quantity | None = None  # noqa: N815
-    pulse_impulse_N_s: Quantity | None = None  # noqa: N815
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
     part_figures: dict[str, Quantity] | None = None

@@ -26,10 +26,7 @@ def files() -> "dict[str, type[BaseModel]]":
 
 def kinds() -> "dict[str, type[BaseModel]]":
     """These, the tables of a scene that ``doe`` reads, and the tables of measurements, whose keys are columns."""
-    from doe.workflow.rig_columns import RigTable, SceneTables, SignalFile
+    from doe.workflow.rig_columns import RigTable, SceneTables
 
-    measured: dict[str, type[BaseModel]] = {
-        "measurements on a rig, column": RigTable,
-        "signal file, column": SignalFile,
-    }
-    return {**files(), "unknown inputs and calibration of a scene": SceneTables, **measured}
+    measured = "measurements on a rig, column"
+    return {**files(), "unknown inputs and calibration of a scene": SceneTables, measured: RigTable}

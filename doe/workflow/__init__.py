@@ -6,6 +6,6 @@
 - ``parts``: parts of a clearance and their grades; ``tolerances``: the widest tolerances of the pick
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges
   of outputs; ``robust``: judgement of the pick; ``duty``: the answer at every point of a duty
-- ``rig``: measurements; ``signals``: figures of raw ones; ``calibration``: inputs from measurements
+- ``rig``: measurements; ``calibration``: inputs from measurements
 - ``status``: stages and status of a command; ``whole``: the study
 """

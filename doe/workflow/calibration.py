@@ -51,7 +51,7 @@ from doe.workflow.input_sets import (
     tables_of,
     work_of_set,
 )
-from doe.workflow.rig import MOST_CONDITIONS, PULSE_OUTPUTS, SPEED, Rig, read_rig
+from doe.workflow.rig import MOST_CONDITIONS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.notes import Note, Notes
@@ -369,8 +369,9 @@ class _Rows:
         freedom = tables[2].reshape(shape)[:, conditions, names]
         if not (outputs > 0.0).all():
             name = self.outputs[names[int(np.argmin(outputs.min(axis=0)))]]
-            remedy = "lower threshold_N" if name in PULSE_OUTPUTS else "leave its column out"
-            raise RunError(f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; {remedy}")
+            raise RunError(
+                f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; leave its column out"
+            )
         return np.log(outputs), variances / outputs**2, freedom
 
 

@@ -1,4 +1,4 @@
-"""Measurements on a rig: a CSV table with a row for each operating condition, whose raw signals ``signals`` evaluates."""
+"""Measurements on a rig: a CSV table with a row for each operating condition."""
 
 import math
 import re
@@ -11,45 +11,29 @@ import numpy as np
 
 from doe.clearance import TEMPERATURES
 from doe.study_file.table import gap_notes
-from doe.workflow.signals import KINDS, LISTS, TRACES, PulseSetting, cage_speed, impact_pulses, whirl
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
 from rbdyn.scene.key_columns import key_values, unknown_keys
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
-PULSE_OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")
 # Of each output the accuracy of its sensor in percent, where a table states none: a force sensor with its mounting, a torque
 # sensor, pulses of a wheel, eddy-current probes (API 670: 5 %), a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
 ACCURACIES = {
     **dict.fromkeys(("impact_force_N", "impact_contact_force_N"), 10.0), "whirl_deviation_ratio": 5.0, "power_loss_W": 3.0,
-    "cage_speed_rpm": 0.1, **dict.fromkeys(PULSE_OUTPUTS, 10.0), **dict.fromkeys(TEMPERATURES, 1.5),
+    "cage_speed_rpm": 0.1, **dict.fromkeys(TEMPERATURES, 1.5),
 }  # fmt: skip
 OUTPUTS = tuple(ACCURACIES)
-SD, ACCURACY, TURNS, HOLD = "_sd", "_accuracy_percent", "turns", "hold"
-FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
-ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviation_ratio"
-THRESHOLD, BANDWIDTH, DEAD_TIME, MASS = "threshold_N", "bandwidth_hz", "dead_time_ms", "sensor_mass_g"
-# Columns that state how pulses are taken, and the outputs of each kind of signal.
-SETTINGS = (THRESHOLD, BANDWIDTH, DEAD_TIME)
-GIVES = {
-    "cage_pulses": (SPEED,), "cage_speed": (SPEED,), ORBIT: (WHIRL,),
-    **dict.fromkeys(TRACES, PULSE_OUTPUTS), **dict.fromkeys(LISTS, PULSE_OUTPUTS[:2]),
-}  # fmt: skip
-# Keys of the speeds whose runout is filtered out, and of the filter of the simulated whirl.
-SHAFTS = "operation.inner_speed_rpm", "operation.outer_speed_rpm"
-FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
-PULSE_KEYS = "numerics.pulse_threshold_N", "numerics.pulse_bandwidth_hz", "numerics.pulse_dead_time_ms"
+SD, ACCURACY, TURNS, HOLD, SPEED = "_sd", "_accuracy_percent", "turns", "hold", "cage_speed_rpm"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
-# Measured values in any unit in use; pulses per turn of the finest encoders.
-MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
-NOT_NEGATIVE, PERCENT = Limits(1e12, 1e-12, "not negative"), Limits(100.0, 1e-6, "not negative")
+# Measured values in any unit in use, and accuracies.
+MEASURED, PERCENT = Limits(1e12, 1e-12, "positive"), Limits(100.0, 1e-6, "not negative")
 # Fewest training rows; most rows, whose joint covariance is quickly solved; most conditions, each with its own seeds.
 FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 # The row in a sentence on a cell, and words on a cell that no other column's value has replaced.
-ROW, ABSENT = re.compile(r" in row (\d+)"), re.compile(r": is missing;|comes from")
+ROW, ABSENT = re.compile(r" in row (\d+)"), re.compile(r": is missing;")
 
 
 @dataclass(frozen=True)
@@ -70,7 +54,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on its signals.
+    """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on how it was read.
 
     ``accuracies``: by output, the standard deviation of an offset of all its rows, as a share."""
 
@@ -88,7 +72,7 @@ class Rig:
 
 
 def read_rig(path: Path) -> Rig:
-    """Read a rig's table with the signals that it names. Raises InputError with all faults of the table, or of the signals."""
+    """Read a rig's table. Raises InputError with all its faults."""
     sheet = read_sheet(path)
     keys, outputs = _keys_and_outputs(sheet)
     if len(sheet.rows) > MOST_ROWS:
@@ -101,18 +85,9 @@ def read_rig(path: Path) -> Rig:
     if training < FEWEST:
         faults.append(f"{path}: only {counted(training, 'row')} not on hold; at least {FEWEST} are needed")
     refuse(faults)
-    rows, notes = [], list[Note]()
-    for place in range(len(sheet.rows)):
-        try:
-            row, note = _row(cells, place, outputs)
-        except InputError as error:
-            faults += error.faults
-            continue
-        rows.append(row)
-        notes += [Note("measurement", note)] if note else []
-    refuse(faults)
+    rows = [_row(cells, place, outputs) for place in range(len(sheet.rows))]
     gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
-    rig = Rig(path, rows, keys, outputs, accuracies, (*sheet.notes, *gap_notes(path, gaps), *dict.fromkeys(notes)))
+    rig = Rig(path, rows, keys, outputs, accuracies, (*sheet.notes, *gap_notes(path, gaps)))
     if len(rig.conditions) > MOST_CONDITIONS:
         raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])
     return rig
@@ -148,26 +123,12 @@ class _Cells:
 
 
 def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Scene keys and outputs among the columns, or of signals. Raises InputError for any other column."""
+    """Scene keys and outputs among the columns. Raises InputError for any other column."""
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]
     keys = tuple(name for name in names if "." in name)
-    kinds = sheet.column(KIND).texts if KIND in sheet else ()
-    signals = [name for kind in kinds for name in GIVES.get(kind, ())]
-    outputs = tuple(dict.fromkeys([*(name for name in names if name in OUTPUTS), *signals]))
-    columns = {
-        *keys,
-        *outputs,
-        *(name + end for name in outputs for end in (SD, ACCURACY)),
-        TURNS,
-        HOLD,
-        FILE,
-        KIND,
-        PULSES,
-        CUTOFF,
-        STILL,
-    }
-    columns |= {*SETTINGS, MASS}
+    outputs = tuple(name for name in names if name in OUTPUTS)
+    columns = {*keys, *outputs, *(name + end for name in outputs for end in (SD, ACCURACY)), TURNS, HOLD}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
     faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in columns]
     if not outputs:
@@ -176,11 +137,6 @@ def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
         faults.append(
             f"{sheet.path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm"
         )
-    for column, set_keys in ((CUTOFF, FILTER), (THRESHOLD, PULSE_KEYS)):
-        if column in sheet:
-            faults += [
-                f"{sheet.path}: column {key}: {column} sets that key; remove one" for key in set_keys if key in sheet
-            ]
     refuse(faults)
     return keys, outputs
 
@@ -205,13 +161,10 @@ def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
     for name, column in columns.items():
         if name in keys:
             values[name], slips = key_values(column)
-        elif name in (HOLD, FILE, KIND, STILL):
+        elif name == HOLD:
             continue
         else:
-            limits = {PULSES: COUNTED, DEAD_TIME: NOT_NEGATIVE}.get(
-                name, PERCENT if name.endswith(ACCURACY) else MEASURED
-            )
-            numbers[name], slips = column.numbers(limits, UNKNOWN)
+            numbers[name], slips = column.numbers(PERCENT if name.endswith(ACCURACY) else MEASURED, UNKNOWN)
         faults += slips
     return _Cells(sheet.path, columns, numbers, values), faults
 
@@ -242,22 +195,12 @@ def _shifted(sheet: Sheet, faults: list[str]) -> list[str]:
 
 
 def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
-    """Sentences on cells of a row that are missing, twice there, or without use."""
-    kind = cells.text(KIND, place) if cells.states(FILE, place) else ""
-    signals = GIVES.get(kind, ())
-    if cells.states(FILE, place) and not signals:
-        yield cells.fault(KIND, place, f"is no kind of signal; choose {', '.join(KINDS)}")
-        return
+    """Sentences on cells of a row that are missing or without use."""
     measured = [name for name in outputs if cells.states(name, place)]
-    pulses = not set(PULSE_OUTPUTS).isdisjoint((*signals, *measured))
-    used = {PULSES: kind == "cage_pulses", STILL: kind == ORBIT, CUTOFF: WHIRL in (*signals, *measured)}
-    used |= {MASS: kind == "impact_acceleration", **dict.fromkeys(SETTINGS, pulses)}
-    used |= {KIND: cells.states(FILE, place)} | {name + SD: name in measured for name in outputs}
-    for name, serves in used.items():
-        if cells.states(name, place) and not serves:
-            yield cells.fault(
-                name, place, "has no use in this row; leave it out, or add the measurement that it belongs to"
-            )
+    for name in outputs:
+        if cells.states(name + SD, place) and name not in measured:
+            words = "has no use in this row; leave it out, or add the measurement that it belongs to"
+            yield cells.fault(name + SD, place, words)
     for name in measured:
         value, sd = cells.number(name, place), cells.number(name + SD, place)
         if value is not None and sd is not None and sd >= value:
@@ -268,66 +211,15 @@ def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
             yield cells.fault(
                 name + SD, place, f"is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
             )
-    for name in signals:
-        if name in measured:
-            yield cells.fault(name, place, f"comes from {FILE} too; leave out one")
-    needed = {
-        THRESHOLD: "the force above which a pulse counts",
-        BANDWIDTH: "the frequency below which the force counts",
-    }
-    for name, meaning in needed.items():
-        if pulses and not cells.states(name, place):
-            yield cells.fault(name, place, f"is missing; give {meaning}")
-    if used[MASS] and not cells.states(MASS, place):
-        yield cells.fault(MASS, place, "is missing; give the force over the acceleration of a tap with a hammer")
-    if kind == ORBIT and not cells.states(CUTOFF, place):
-        yield cells.fault(CUTOFF, place, "is missing; give the frequency below which the orbit counts")
-    if not measured and not cells.states(FILE, place):
+    if not measured:
         yield f"{cells.path}: row {place + 1}: nothing measured; remove it"
     if cells.text(HOLD, place).lower() not in (*YES, *NO):
         yield cells.fault(HOLD, place, "is neither yes nor no; write 1 for a row that is held out, else 0")
 
 
-def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | None]:
-    """A row without faults, and a note on its signal. Raises InputError for a signal that cannot be read."""
+def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> Row:
+    """A row without faults."""
     keys = {key: values[place] for key, values in cells.keys.items()}
     values = {name: value for name in outputs if (value := cells.number(name, place)) is not None}
     sds = {name: cells.number(name + SD, place) for name in values}
-    cutoff, turns, notches, note = cells.number(CUTOFF, place), cells.number(TURNS, place), tuple[float, ...](), None
-    setting = _pulse_setting(cells, place)
-    if cells.states(FILE, place):
-        signal, kind = cells.path.parent / cells.text(FILE, place), cells.text(KIND, place)
-        if kind == ORBIT:
-            assert cutoff is not None
-            notches = _runout(keys, values.get(SPEED))
-            rest_record = cells.path.parent / cells.text(STILL, place) if cells.states(STILL, place) else None
-            means = {WHIRL: whirl(signal, cutoff, notches, rest_record)}
-        elif SPEED in GIVES[kind]:
-            means = {SPEED: cage_speed(signal, kind, int(cells.number(PULSES, place) or 1))}
-        else:
-            assert setting is not None
-            means, note = impact_pulses(signal, kind, setting)
-        for name, mean in means.items():
-            values[name], sds[name], note = mean.value, mean.sd, mean.note or note
-    if cutoff is not None:
-        # The simulated whirl has the same filter.
-        keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
-    if setting is not None:
-        # So are the simulated pulses taken.
-        pulses = (setting.threshold, setting.bandwidth, 1e3 * setting.dead_time)
-        keys |= dict(zip(PULSE_KEYS, pulses, strict=True))
-    return Row(place + 1, keys, values, sds, turns, cells.text(HOLD, place).lower() in YES), note
-
-
-def _pulse_setting(cells: _Cells, place: int) -> PulseSetting | None:
-    """How pulses are taken in a row; None for a row without pulses."""
-    threshold, bandwidth, dead_time, mass = (cells.number(name, place) for name in (*SETTINGS, MASS))
-    if threshold is None or bandwidth is None:
-        return None
-    return PulseSetting(threshold, bandwidth, 1e-3 * (dead_time or 0.0), None if mass is None else 1e-3 * mass)
-
-
-def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
-    """Frequencies [Hz] of the row's shafts and cage, as far as the row states them."""
-    speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
-    return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)
+    return Row(place + 1, keys, values, sds, cells.number(TURNS, place), cells.text(HOLD, place).lower() in YES)

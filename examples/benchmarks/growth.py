@@ -181,16 +181,6 @@ def rig(rows: int, columns: int, folder: Path) -> list[str]:
     )
 
 
-def signal_rows(size: int, folder: Path) -> list[str]:
-    """Reading a signal of the cage's speed."""
-    draw = random.Random(1)
-    lines = (f"{row * 1e-4:.4f},{9000.0 + draw.gauss(0.0, 9.0):.2f}" for row in range(size))
-    (folder / "s.csv").write_text("\n".join(["t_s,cage_speed_rpm", *lines]), "utf-8")
-    return python(
-        "from doe.workflow.signals import cage_speed; cage_speed(Path(sys.argv[1]), 'cage_speed', 1)", folder / "s.csv"
-    )
-
-
 CASES = (
     Case("fit: rows", DECADES, fit_rows()),
     Case("fit: rows, each twice", DECADES, fit_rows(repeats=2)),
@@ -217,7 +207,6 @@ CASES = (
     Case("uncertainty: keys", (2, 4, 8, 16, 30), uncertain_keys),
     Case("rig: rows", DECADES, lambda size, folder: rig(size, 0, folder)),
     Case("rig: columns", (10, 30, 100, 300, 1000, 3000, 10_000, 30_000), lambda size, folder: rig(5, size, folder)),
-    Case("signal: rows", DECADES, signal_rows),
 )
 
 

@@ -76,7 +76,6 @@ CODES: dict[str, Code] = {
     "lost-runs": Code(WARNING, "runs or input sets failed and are left out"),
     "inputs": Code(WARNING, "what is known of unknown inputs is doubtful, or keys of the study override it"),
     "emulator": Code(WARNING, "an emulator explains too little, or too few input sets stand behind a range"),
-    "measurement": Code(WARNING, "a signal of a rig has gaps or noise, or its outputs do not say enough"),
     "advice": Code(WARNING, "the study can be made better by a setting, which the note names"),
     "jitter": Code(NOTE, "the cage only trembles, so that the whirl deviation ratio shows no whirl"),
     "oil-drag": Code(NOTE, "cage slip rests on the drag of oil films"),

@@ -75,15 +75,6 @@ def _figures(result: SimulationResult) -> "dict[str, Quantity]":
         "power loss [W]": result.power_loss_W,
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
-        **{words: pulses for words, pulses in _pulses(result).items() if pulses is not None},
-    }
-
-
-def _pulses(result: SimulationResult) -> "dict[str, Quantity | None]":
-    return {
-        "rate of pulses at one pocket [Hz]": result.pulse_rate_hz,
-        "mean height of the pulses [N]": result.pulse_height_N,
-        "mean impulse of the pulses [N s]": result.pulse_impulse_N_s,
     }
 
 

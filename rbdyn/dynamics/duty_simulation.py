@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Figures of which neither end is bad, and ends of the names of those whose least value is the worst one.
-NEUTRAL, LEAST = ("cage_speed_rpm", "pulse_rate_hz"), ("_clearance_um", "_film_um", "_lambda_ratio")
+NEUTRAL, LEAST = ("cage_speed_rpm",), ("_clearance_um", "_film_um", "_lambda_ratio")
 
 
 class SimulatedPoint(Record):

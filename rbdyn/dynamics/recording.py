@@ -28,7 +28,6 @@ from rbdyn.dynamics.integrators.advance import (
 from rbdyn.dynamics.parameters.state import group_of, scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.metrics import Companions, Replicate, filtered_speed, speed_sums
-from rbdyn.dynamics.statistics.pulses import low_passed, pulse_sums, pulses_of
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 
@@ -89,8 +88,6 @@ class Recording:
         self._looks = [self._look()]
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
         self._places, self._sampled = array("d"), list[int]()
-        # Loads of the pocket walls, roller by roller at each sample.
-        self._walls = array("f")
         self._cpu_s = 0.0
 
     def to(self, counted: float) -> Replicate:
@@ -131,7 +128,6 @@ class Recording:
             durations=np.diff(self._ends) * run.scene.turn_s,
             whirl=self._filtered_whirl() if self._places else speeds,
             orbit=places,
-            pulses=self._pulses() if self._walls else np.zeros((0, 3)),
             work=work,
             largest=largest,
             cage_angle=np.diff(cage),
@@ -153,33 +149,10 @@ class Recording:
         if per_turn:
             first = run.layout.first_body + CAGE_X
             while (sample := len(self._places) // 2 / per_turn) <= end:
-                self._reach(sample)
+                run.to(sample)
                 self._places.extend(run.carry.y[first : first + 2].tolist())
             self._sampled.append(len(self._places) // 2)
-        self._reach(end)
-
-    def _reach(self, turns: float) -> None:
-        """Go on to so many shaft turns. Steps end at the samples of pulses."""
-        run, per_turn = self.run, self.run.scene.pulse_samples_per_turn
-        if per_turn:
-            taken = len(self._walls) // run.bearing.rollers
-            due = math.floor(turns * per_turn + 1e-9) + 1 - taken
-            if due > 0:
-                walls = run.walls(taken / per_turn, per_turn, due)
-                self._walls.frombytes(walls.astype(np.float32).tobytes())
-        run.to(turns)
-
-    def _pulses(self) -> Array:
-        """Pulses, heights and impulses of each batch, summed over the pockets."""
-        scene = self.run.scene
-        numerics, rate = scene.numerics, scene.pulse_samples_per_turn / scene.turn_s
-        assert numerics.pulse_threshold_N is not None and numerics.pulse_bandwidth_hz is not None
-        walls = np.frombuffer(self._walls, np.float32).reshape(-1, self.run.bearing.rollers)
-        ends, dead_time = np.array(self._ends[1:]) * scene.turn_s, 1e-3 * numerics.pulse_dead_time_ms
-        sums = np.zeros((len(ends), 3))
-        for wall in low_passed(walls.astype(float), rate, numerics.pulse_bandwidth_hz).T:
-            sums += pulse_sums(pulses_of(wall, rate, numerics.pulse_threshold_N, dead_time), ends)
-        return sums
+        run.to(end)
 
     def _filtered_whirl(self) -> Array:
         scene = self.run.scene

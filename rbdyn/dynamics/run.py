@@ -37,7 +37,6 @@ from rbdyn.dynamics.integrators.advance import (
     Status,
     Tally,
     advance,
-    advance_sampled,
     carry_from,
     empty_tally,
 )
@@ -116,37 +115,15 @@ class Run:
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
         end = turns * self.scene.turn_s
-        self._go(lambda control: advance(self.bearing, control, self.carry, self.tally, end, self.sample_step))
-
-    def walls(self, turns: float, per_turn: int, samples: int) -> Array:
-        """Loads (samples, rollers) of the pocket walls [N], positive on the front one, ``per_turn`` a shaft turn.
-
-        The run goes on to the last of them; the first is at ``turns`` since the start. Raises RunError or CancelledError.
-        """
-        loads, filled = np.empty((samples, self.bearing.rollers)), 0
-        interval = self.scene.turn_s / per_turn
-
-        def step(control: Control) -> int:
-            nonlocal filled
-            start = turns * self.scene.turn_s + filled * interval
-            rows, status = advance_sampled(
-                self.bearing, control, self.carry, self.tally, start, interval, loads[filled:], self.sample_step
-            )
-            filled += rows
-            return int(status)
-
-        self._go(step)
-        return loads
-
-    def _go(self, step: Callable[[Control], int]) -> None:
-        """Repeat a ``step``, which gets its control and returns a status, until it has finished."""
         # The first choice compiles the methods that it compares.
         self.choose_method()
         started = time.perf_counter() - self.spent_s
         budget = self.control.step_budget
         while True:
             self.stop.check()
-            status = list(Status)[step(self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget)))]
+            control = self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget))
+            code = advance(self.bearing, control, self.carry, self.tally, end, self.sample_step)
+            status = list(Status)[code]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
                 turned = float(self.carry.clock[NOW]) / self.scene.turn_s

@@ -29,14 +29,7 @@ from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import (
-    TIGHT,
-    orbit_radius_share,
-    pulse_figures,
-    pulse_notes,
-    whirl_notes,
-    work_done,
-)
+from rbdyn.dynamics.statistics.metrics import TIGHT, orbit_radius_share, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
@@ -141,7 +134,6 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
-    pulses: dict[str, Any] = pulse_figures(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
     # The first concern the input, the next the figures of this run, the last what the model leaves out.
     notes: Notes = (
@@ -154,7 +146,6 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
         ),
         *whirl_notes(scene, orbit),
-        *pulse_notes(scene, pulses),
         *heat_notes(scene, figures["power_loss_W"].value),
         *friction_notes(maker),
         *race_notes(scene, races),
@@ -196,7 +187,6 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         scene=scene.model_dump(mode="json"),
         cage_orbit_radius_share=orbit,
         part_figures=part_figures(scene, runs, companions, ensemble.plan.share, ensemble.since, races),
-        **pulses,
     )
 
 

@@ -116,8 +116,6 @@ def short(scene: Scene) -> Scene:
         extend=False,
         whirl_cutoff_hz=None,
         whirl_notches_hz=[],
-        pulse_threshold_N=None,
-        pulse_bandwidth_hz=None,
     )
 
 

@@ -34,15 +34,7 @@ from rbdyn.scene.bearing import (
     section_notes,
     with_bar_stiffness_of_section,
 )
-from rbdyn.scene.laws import (
-    MOST_FORCES,
-    MOST_SAMPLES,
-    PULSE_SAMPLES_A_PERIOD,
-    SAMPLES_A_PERIOD,
-    Laws,
-    Numerics,
-    with_bar_stiffness_of_cage,
-)
+from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import (
     RHEOLOGY_OILS,
     Lubricant,
@@ -220,14 +212,6 @@ class Scene(SceneFile):
                 f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: needs {samples:.3g} samples a replicate, but memory holds "
                 f"{MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
             )
-        forces = self.pulse_samples_per_turn * (numerics.turns + numerics.warm_up_turns) * self.bearing.rollers
-        if forces * (numerics.replicates + numerics.companions) > MOST_FORCES:
-            yield (
-                f"numerics.pulse_bandwidth_hz = {numerics.pulse_bandwidth_hz:g}: needs {forces:.3g} forces a replicate, but "
-                f"memory holds {MOST_FORCES:g} in all; lower it or take fewer turns or replicates"
-            )
-        if self.pulse_samples_per_turn and self.model.pocket == "off":
-            yield "numerics.pulse_threshold_N: no pocket has a force with model.pocket = 'off'; leave out one of them"
 
     def _seizures(self) -> Iterator[str]:
         """Faults of cage clearances that fits, temperature and rotation reduce to the floor of their film."""
@@ -500,12 +484,6 @@ class Scene(SceneFile):
         cutoff = self.numerics.whirl_cutoff_hz
         # At least the lower limit of numerics.samples_per_turn, so that every batch has samples.
         return 0 if cutoff is None else max(math.ceil(SAMPLES_A_PERIOD * cutoff * self.turn_s), 8)
-
-    @property
-    def pulse_samples_per_turn(self) -> int:
-        """Samples of the pocket forces in a shaft turn for the pulses; 0 without pulses."""
-        bandwidth = self.numerics.pulse_bandwidth_hz
-        return 0 if bandwidth is None else max(math.ceil(PULSE_SAMPLES_A_PERIOD * bandwidth * self.turn_s), 8)
 
     @property
     def impact_window_turns(self) -> float:

@@ -31,7 +31,7 @@ Word = Annotated[
 ]
 AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, with which an editor completes TOML.")]
 # Unit of numbers and lengths in shaft turns, by the end of a key.
-TURNS = {"pulses_per_turn": "per cage turn", "_per_turn": "per shaft turn", "turns": "shaft turns"}
+TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
 
 
 class Part(NamedTuple):

@@ -16,12 +16,8 @@ AUTO_WARM_UP_TURNS = 20.0
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
 # Samples in a period of the whirl's cutoff: fewer make the velocity inaccurate and alias faster motion.
 SAMPLES_A_PERIOD = 10
-# Samples of a simulated pocket force in a period of the pulses' bandwidth: no sensor filters it before, so it needs more.
-PULSE_SAMPLES_A_PERIOD = 20
 # Most samples of filtered whirl over all replicates, before any extension.
 MOST_SAMPLES = 1e7
-# Most forces of pocket walls over all replicates, 0.4 GB, before any extension.
-MOST_FORCES = 1e8
 
 
 def with_bar_stiffness_of_cage(scene: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -175,14 +171,6 @@ class Numerics(Consistent):
     whirl_notches_hz: list[Positive] = []
     """Frequencies removed from the filtered whirl, such as the runout of a rig at cage and shaft rotation. A notch acts where a
     run has ten periods of it."""
-    pulse_threshold_N: Positive | None = None  # noqa: N815
-    """Force above which a force between a roller and its pocket counts as an impact pulse. Rate, mean height and mean impulse
-    are then reported, as a rig's sensor sees them. It needs pulse_bandwidth_hz. Default: no pulses, which take extra steps."""
-    pulse_bandwidth_hz: Positive | None = None
-    """Bandwidth of a Gaussian low-pass filter for the pulses, where it halves the power. Take it below that of the sensor. The
-    force is sampled twenty times in a period of it. A shorter pulse, of impulse J, gets a height of three times J times it."""
-    pulse_dead_time_ms: NonNegative = 0.0
-    """Time after a pulse in which further ones belong to it: the larger height counts, and the sum of the impulses."""
     companion: bool = True
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error. Where stability limits the
     steps of a slow bearing, they are repeated with steps that resolve its light contacts instead."""
@@ -210,12 +198,6 @@ class Numerics(Consistent):
     def faults(self) -> Iterator[str]:
         if self.whirl_notches_hz and self.whirl_cutoff_hz is None:
             yield "numerics.whirl_notches_hz: a notch needs the filter of numerics.whirl_cutoff_hz; give that too"
-        stated = {"pulse_threshold_N": self.pulse_threshold_N, "pulse_bandwidth_hz": self.pulse_bandwidth_hz}
-        missing = [name for name, value in stated.items() if value is None]
-        if len(missing) == 1:
-            yield f"numerics.{missing[0]}: is missing; pulses need a threshold and a bandwidth, so give both or neither"
-        if len(missing) == 2 and self.pulse_dead_time_ms:
-            yield "numerics.pulse_dead_time_ms: has no use without numerics.pulse_threshold_N; give that too"
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
             yield (
                 f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory "

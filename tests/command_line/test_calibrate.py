@@ -18,7 +18,6 @@ from doe.report.identity import scene_identity
 from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
 from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
 from doe.workflow.rig import read_rig
-from doe.workflow.signals import cage_speed
 from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
 
@@ -58,9 +57,6 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"header": HEADER.replace("impact_force_N", "impact")}, "column impact: neither a key of a scene"),
         ({"header": HEADER.replace("power_loss_W_sd", "cage_slip")}, "give cage_speed_rpm, which means the same"),
         ({"header": HEADER.replace("power_loss_W_sd", "cutof_hz")}, "column cutof_hz: neither a key of a scene"),
-        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,orbit" for row in ROWS]}, "cutoff_hz in row 1: is missing; give"),
-        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,x" for row in ROWS]}, "signal_kind in row 1 = 'x': is no kind of signal; choose"),
-        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,cage_speed" for row in ROWS]}, "a.csv: no such file"),
         ({"header": HEADER.replace("power_loss_W", "torque_sd", 1)}, "no output torque is measured here"),
         ({"header": "impact_force_N,impact_force_N_sd", "rows": ["40,1"] * 3}, "no operating condition"),
         ({"header": "operation.inner_speed_rpm,turns", "rows": ["12000,9"] * 3}, "no measured output"),
@@ -74,15 +70,6 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"rows": [*ROWS[:2], "24000,80,0,180,3"]}, "impact_force_N_sd in row 3 = 0: is not above 0; check the sign"),
         ({"rows": [*ROWS[:2], "24000,8e1_0,2,180,3"]}, "impact_force_N in row 3 = '8e1_0': is not a finite number"),
         ({"rows": [*ROWS[:2], "24000,,2,180,3"]}, "impact_force_N_sd in row 3 = 2: has no use in this row"),
-        ({"header": HEADER + ",cutoff_hz", "rows": [f"{row},9" for row in ROWS]}, "cutoff_hz in row 1 = 9: has no use"),
-        ({"header": HEADER + ",cage_speed_rpm,signal_file,signal_kind", "rows": [f"{row},4700,a.csv,cage_speed" for row in ROWS]},
-         "cage_speed_rpm in row 1 = 4700: comes from signal_file too; leave out one"),
-        ({"header": HEADER + ",signal_file,signal_kind,pulses_per_turn", "rows": [f"{row},a.csv,cage_pulses,{'9' * 5000}" for row in ROWS]},
-         "is longer than 400 characters; write a shorter number"),
-        ({"header": HEADER + ",signal_file,signal_kind,pulses_per_turn", "rows": [f"{row},a.csv,cage_pulses,1.5" for row in ROWS]},
-         "pulses_per_turn in row 1 = 1.5: is not a whole number"),
-        ({"header": HEADER + ",cutoff_hz,numerics.whirl_cutoff_hz", "rows": [f"{row},9,9" for row in ROWS]},
-         "column numerics.whirl_cutoff_hz: cutoff_hz sets that key; remove one"),
         ({"header": HEADER + ",", "rows": [f"{row},9" for row in ROWS]}, "column 6 has no name; name it or remove it"),
         ({"header": HEADER.replace("power_loss_W_sd", "whirl_accuracy_percent")}, "no output whirl is measured here"),
         ({"header": HEADER + ",power_loss_W_accuracy_percent", "rows": [f"{ROWS[0]},3", f"{ROWS[1]},", f"{ROWS[2]},5"]},
@@ -219,67 +206,14 @@ def test_options_that_no_run_would_have_are_refused(tmp_path: Path, options: lis
     assert read_question(Path(scene), Path(rig), free, ["cage.mass_g=46.0"]).case.scene.cage.mass_g == 46.0
 
 
-def _signal(folder: Path, name: str, lines: Sequence[str]) -> Path:
-    (folder / name).write_text("\n".join(lines) + "\n", "utf-8")
-    return folder / name
-
-
-def test_pulses_of_an_uneven_wheel_give_the_mean_speed_with_its_error(tmp_path: Path) -> None:
-    random = np.random.default_rng(3)
-    # Turns of a cage at 9400 rpm that scatter by 1 %, three uneven marks a turn, three of a turn lost.
-    turns = 60.0 / (9400.0 * (1.0 + 0.01 * random.standard_normal(400)))
-    starts = np.concatenate([[0.0], np.cumsum(turns)])
-    marks = (starts[:-1, None] + turns[:, None] * [0.0, 0.31, 0.69]).ravel()
-    path = _signal(tmp_path, "pulses.csv", ["t_s", *map(str, marks.tolist())])
-    value, sd, told = cage_speed(path, "cage_pulses", 3)
-    assert value == pytest.approx(60.0 * 399 / starts[399], rel=1e-9) and told is None
-    assert sd == pytest.approx(0.01 * 9400.0 / np.sqrt(399.0), rel=0.3)
-    lost = np.delete(marks, slice(300, 303))
-    value, _, told = cage_speed(_signal(tmp_path, "lost.csv", ["t_s", *map(str, lost.tolist())]), "cage_pulses", 3)
-    assert value == pytest.approx(9400.0, rel=2e-3) and told is not None and "1 of 398 turns lack pulses" in told
-
-
-def test_a_speed_signal_remembers_and_its_error_knows(tmp_path: Path) -> None:
-    random, speed = np.random.default_rng(4), [9400.0]
-    for _ in range(20_000):
-        speed.append(9400.0 + 0.98 * (speed[-1] - 9400.0) + 5.0 * random.standard_normal())
-    lines = [f"{0.001 * place:.4f},{value!r}" for place, value in enumerate(speed)]
-    value, sd, _ = cage_speed(_signal(tmp_path, "speed.csv", ["t_s,cage_speed_rpm", *lines]), "cage_speed", 1)
-    # Variance of the mean of an autoregression: s^2/((1 - r)^2 n).
-    assert sd == pytest.approx(5.0 / 0.02 / np.sqrt(20_000.0), rel=0.25)
-    assert value == pytest.approx(9400.0, abs=3.0 * sd)
-
-
-def test_a_row_takes_its_cage_speed_from_a_signal(tmp_path: Path) -> None:
-    lines = [f"{0.01 * place:.2f},{9400 + place % 3}" for place in range(60)]
-    _signal(tmp_path, "speed.csv", ["t_s,cage_speed_rpm", *lines])
-    header = HEADER + ",signal_file,signal_kind"
-    _files(tmp_path, header=header, rows=[*(f"{row},," for row in ROWS), "18000,60,1,99,2,speed.csv,cage_speed"])
-    rig = read_rig(tmp_path / "rig.csv")
-    assert rig.outputs == ("impact_force_N", "power_loss_W", "cage_speed_rpm")
-    assert [("cage_speed_rpm" in row.values) for row in rig.rows] == [False, False, False, True]
-    assert rig.rows[3].values["cage_speed_rpm"] == pytest.approx(9401.0, abs=0.1)
-    assert len(rig.conditions) == 3
-
-
 def test_a_rig_of_german_excel_with_gaps_is_read_with_notes_on_both(tmp_path: Path) -> None:
-    """Semicolons and decimal commas in the table and in its signal; a row without one output serves the other."""
-    lines = [f"{0.01 * place:.2f};{9400 + place % 3},5".replace(".", ",") for place in range(60)]
-    _signal(tmp_path, "speed.csv", ["t_s;cage_speed_rpm", *lines])
-    header = f"{HEADER},signal_file,signal_kind".replace(",", ";")
-    rows = [
-        "12000;40,5;1;40;1;;",
-        "18000;;;100;2,5;;",
-        "24000;80;2;180;3;;",
-        "18000;60;1;99;2;speed.csv;cage_speed",
-        ";" * 6,
-    ]
-    _files(tmp_path, header=header, rows=rows)
+    """Semicolons and decimal commas; a row without one output serves the other."""
+    rows = ["12000;40,5;1;40;1", "18000;;;100;2,5", "24000;80;2;180;3", "18000;60;1;99;2", ";" * 4]
+    _files(tmp_path, header=HEADER.replace(",", ";"), rows=rows)
     path = tmp_path / "rig.csv"
     rig = read_rig(path)
     assert [row.values.get("impact_force_N") for row in rig.rows] == [40.5, None, 80.0, 60.0]
     assert rig.rows[1].sds == {"power_loss_W": 2.5}
-    assert rig.rows[3].values["cage_speed_rpm"] == pytest.approx(9401.5, abs=0.1)
     assert rig.notes == (
         f"{path}: read with semicolons and decimal commas",
         f"{path}: impact_force_N has no value in row 2; it does without that row, which serves the others",

@@ -3,7 +3,6 @@
 import json
 import tomllib
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -14,8 +13,8 @@ from doe.cli import app as doe_app
 from doe.commands.keys import files as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
-from doe.workflow import rig, signals
-from doe.workflow.rig_columns import Kind, RigTable, SignalFile
+from doe.workflow import rig
+from doe.workflow.rig_columns import RigTable
 from rbdyn.base.words import label, quantity
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.plots.ball import label as axis_label
@@ -128,7 +127,7 @@ UNITS = {
     "um": """amplitude ball_diameter_errors ball_diameter_spread clearance_change height imbalance inner_interference
         land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
         roller_diameter_errors roller_diameter_spread roller_roughness""",
-    "N": "axial_load dynamic_capacity load lundberg_load preload pulse_threshold radial_load rotating_load static_capacity",
+    "N": "axial_load dynamic_capacity load lundberg_load preload radial_load rotating_load static_capacity",
     "C": "ambient cage_ceiling oil_ceiling oil_inlet_temperature housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature",
     "K": "cage_offset lower temperature_rise upper",
     "deg": "contact_angle gravity_direction phase tilt_direction",
@@ -137,7 +136,7 @@ UNITS = {
     "m_s": "blend_speed land_restitution_speed pocket_restitution_speed u_m",
     "s_m": "land_damping_alpha pocket_damping_alpha race_damping_alpha",
     "GPa": "bore_modulus elastic_modulus shaft_modulus",
-    "l_min": "oil_flow", "hz": "pulse_bandwidth whirl_cutoff whirl_notches", "ms": "pulse_dead_time",
+    "l_min": "oil_flow", "hz": "whirl_cutoff whirl_notches",
     "N_m": "pocket_bar_stiffness stiffness",
     "kg": "inner_ring_mass outer_ring_mass",
     "turns": "discard impact_window",
@@ -212,16 +211,11 @@ def test_lists_of_lists_are_told_in_plain_words():
     assert values["errors.ball_sphericity[].balls"] == "a list of whole numbers from 1"
 
 
-def test_keys_of_calibration_and_signals():
+def test_keys_of_calibration():
     """Command line: ``doe keys`` finds the settings of a calibration and every column that the rig's table may have."""
     assert "\ncalibrate.waves: whole number from 1 to 8, default 4\n" in printed(doe_app, "calibrate")
-    assert '\nsignal_kind: "cage_pulses" | "cage_speed"' in printed(doe_app, "signal")
-    settings = {rig.TURNS, rig.HOLD, rig.FILE, rig.KIND, rig.PULSES, rig.CUTOFF, rig.STILL, rig.MASS, *rig.SETTINGS}
     outputs = {name + end for name in rig.OUTPUTS for end in ("", rig.SD, rig.ACCURACY)}
-    assert set(RigTable.model_fields) == settings | outputs
-    assert set(get_args(Kind)) == set(signals.KINDS)
-    names = {unit for columns in signals.KINDS.values() for column in columns for unit in column.split(" or ")}
-    assert set(SignalFile.model_fields) == names
+    assert set(RigTable.model_fields) == {rig.TURNS, rig.HOLD} | outputs
     assert "calibrate" not in json.loads(printed(doe_app, "--schema"))["$defs"]["StudyFile"]["properties"]
 
 

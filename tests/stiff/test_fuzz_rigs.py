@@ -1,4 +1,4 @@
-"""Fuzz: rig tables, signals, samples and tables without a study are read as they are written, or refused in sentences; nothing is simulated."""
+"""Fuzz: rig tables, samples and tables without a study are read as they are written, or refused in sentences; nothing is simulated."""
 
 from __future__ import annotations
 
@@ -17,17 +17,15 @@ from mutations import EXTREMES, mutated, outcome
 
 from doe.study_file.study import study_of_table
 from doe.workflow.input_sets import read_sample
-from doe.workflow.rig import OUTPUTS, PULSE_OUTPUTS, Rig, read_rig
+from doe.workflow.rig import OUTPUTS, Rig, read_rig
 from doe.workflow.runs import read_runs
-from doe.workflow.signals import Mean, cage_speed, whirl
 from rbdyn.base.faults import InputError
 from rbdyn.scene.uncertain import Law
 
-PULSE_COLUMNS = {"threshold_N": "numerics.pulse_threshold_N", "bandwidth_hz": "numerics.pulse_bandwidth_hz"}
 # What a hand or another program writes for a number.
 SLIPS = ["", " ", "nan", "inf", "-1", "0", "-0", "1e400", "-1e-300", "1e13", "1e-13", "5000", "2", "0x10", "1_000", "１２", "3,5", "25O",
          "2024-01-01", "10:30", "true", "False", "yes", "no", "hold", "1.", ".5", "+7", "1e3", "9" * 399, "9" * 401, "9" * 5000, "1e-9",
-         "auto", "rigid", "outer", "\0", "a\nb", '"', ";", "orbit", "signal.csv", "none.csv", "\ufeff1", "12 N", "1e", "--1", "4e", "007"]  # fmt: skip
+         "auto", "rigid", "outer", "\0", "a\nb", '"', ";", "\ufeff1", "12 N", "1e", "--1", "4e", "007"]  # fmt: skip
 KEYS: dict[str, list[str]] = {
     "operation.inner_speed_rpm": ["12000", "18000.0", "2.4e4", "-9000"], "operation.radial_load_N": ["600", "1300.5", "2000"],
     "bearing.rollers": ["9", "10", "+11"], "model.pocket_film": ["true", "False"], "cage.guidance": ["outer", "inner"],
@@ -99,19 +97,16 @@ def changed(draw: random.Random, rows: list[list[str]]) -> bytes:
 
 
 def rig_rows(draw: random.Random) -> list[list[str]]:
-    """A rig's table: some keys, outputs, deviations or turns, rows on hold, and signals in some of the rows."""
+    """A rig's table: some keys, outputs, deviations or turns and rows on hold."""
     keys = draw.sample(list(KEYS), draw.randrange(1, 5))
     outputs = draw.sample(OUTPUTS, draw.randrange(1, 4))
-    signal = ["signal_file", "signal_kind"] if "cage_speed_rpm" not in outputs and draw.random() < 0.4 else []
-    pulses = ["threshold_N", "bandwidth_hz"] if not set(outputs).isdisjoint(PULSE_OUTPUTS) else []
     accuracy = [f"{name}_accuracy_percent" for name in outputs if draw.random() < 0.3]
-    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal, *pulses, *accuracy]
+    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *accuracy]
     rows = [header]
     for _ in range(draw.randrange(3, 9)):
         measured = [f"{draw.lognormvariate(3.0, 2.0):.{draw.randrange(1, 17)}g}" for _ in outputs]
         sds = [draw.choice(["", repr(0.05 * float(value)), "1e-3"]) for value in measured]
         turns = draw.choice(["40", "1e3"]) if "" in sds else ""
-        raw = draw.choice([["", ""], ["signal.csv", "cage_speed"]]) if signal else []
         rows.append(
             [
                 *(draw.choice(KEYS[key]) for key in keys),
@@ -119,8 +114,6 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
                 *sds,
                 turns,
                 draw.choice(["", "0", "no"]),
-                *raw,
-                *("20", "5e3")[: len(pulses)],
                 *(draw.choice(("", "4")) for _ in accuracy),
             ]
         )
@@ -146,16 +139,10 @@ def check_rig(data: bytes, rig: Rig) -> None:
                 assert (row.sds.get(name.removesuffix("_sd")) == number(text)) or blank
             elif name == "turns":
                 assert row.turns == number(text) or (blank and row.turns is None)
-            elif name == "hold":
-                assert row.hold == (text.lower() in ("1", "yes", "true"))
-            elif name in PULSE_COLUMNS:
-                assert row.keys[PULSE_COLUMNS[name]] == float(text)
-            elif name == "signal_kind":
-                assert "cage_speed_rpm" in row.values and texts["signal_file"]
             else:
-                assert name == "signal_file", f"{name} = {text!r} is ignored"
-        signal = {"cage_speed_rpm"} if "signal_file" in texts else set()
-        assert set(row.values) == signal | {name for name in texts if name in OUTPUTS and texts[name].lower() != "nan"}
+                assert name == "hold", f"{name} = {text!r} is ignored"
+                assert row.hold == (text.lower() in ("1", "yes", "true"))
+        assert set(row.values) == {name for name in texts if name in OUTPUTS and texts[name].lower() != "nan"}
 
 
 def check_value(name: str, text: str, value: Any) -> None:
@@ -202,16 +189,9 @@ def run_cases(
     assert min(ends.count("read"), ends.count("refused")) > count // 10
 
 
-def speeds(draw: random.Random) -> list[list[str]]:
-    """A signal of cage speed."""
-    times = np.cumsum([draw.uniform(0.5, 1.5) * 10.0 ** draw.randrange(-3, 1) for _ in range(draw.randrange(15, 120))])
-    return [["t_s", "cage_speed_rpm"], *([repr(float(t)), f"{draw.gauss(9400.0, 40.0):.6g}"] for t in times)]
-
-
 @pytest.mark.slow
 def test_rig_tables_are_read_as_written_or_refused(tmp_path, fuzz_cases):
-    """Fuzz: each row's conditions, measurements, deviations, turns, hold and signal are those of its cells."""
-    (tmp_path / "signal.csv").write_bytes(written([*speeds(random.Random(1)), ["1e4", "9400"]]))
+    """Fuzz: each row's conditions, measurements, deviations, turns and hold are those of its cells."""
     run_cases(tmp_path / "rig.csv", fuzz_cases, 1, rig_rows, read_rig, check_rig)
 
 
@@ -358,44 +338,3 @@ def test_tables_without_a_study_lose_no_column(tmp_path, fuzz_cases):
                 assert name in ("block", "run", "replicates") or noted or not any(texts), name
 
     run_cases(path, fuzz_cases, 4, make, read, check)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["cage_pulses", "cage_speed", "orbit"])
-def test_signals_are_read_as_written_or_refused(tmp_path, fuzz_cases, kind):
-    """Fuzz: a signal gives the mean that its numbers give when another program has read and written them."""
-
-    def make(draw: random.Random) -> list[list[str]]:
-        if kind == "cage_pulses":
-            times = np.cumsum([0.006 * draw.uniform(0.97, 1.03) for _ in range(draw.randrange(15, 100))])
-            return [["t_s"], *([repr(float(t))] for t in times)]
-        if kind == "cage_speed":
-            return speeds(draw)
-        count, rate = draw.choice((1500, 2100, 2600, 2600)), draw.choice((2e4, 2e4, 2.5e4))
-        time = np.arange(count) / rate
-        turn = 2.0 * np.pi * rate / draw.uniform(100.0, 900.0) * time
-        place = 30.0 * np.array([np.cos(turn), np.sin(turn)]) + np.random.default_rng(count).standard_normal((2, count))
-        return [
-            ["t_s", "x_um", "y_um"],
-            *([f"{t:.7f}", f"{x:.6g}", f"{y:.6g}"] for t, x, y in zip(time, *place, strict=True)),
-        ]
-
-    def read(path: Path) -> Mean:
-        return whirl(path, 2000.0, (400.0, 1e-9), None) if kind == "orbit" else cage_speed(path, kind, 2)
-
-    def check(data: bytes, mean: Mean) -> None:
-        header, rows = cells(data)
-        canonical = tmp_path / "canonical.csv"
-        names = ("t_s", "cage_speed_rpm", "x_um", "x_m", "y_um", "y_m")
-        used = [place for place, name in enumerate(header) if name in names]
-        again = [[header[place] for place in used], *([repr(number(row[place])) for place in used] for row in rows)]
-        canonical.write_bytes(written(again))
-        assert read(canonical)[:2] == mean[:2] and 0.0 < mean.sd < np.inf
-        if kind == "cage_speed":
-            times, values = (
-                np.array([number(row[header.index(name)]) for row in rows]) for name in ("t_s", "cage_speed_rpm")
-            )
-            steps = np.diff(times)
-            assert mean.value == pytest.approx(float((values[:-1] * steps).sum() / steps.sum()), rel=1e-9)
-
-    run_cases(tmp_path / "signal.csv", fuzz_cases, 3, make, read, check)

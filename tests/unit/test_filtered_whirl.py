@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rig_signals import whirl
 from scipy.special import ellipe
 
 from doe.workflow.calibration import cases_of
 from doe.workflow.input_sets import case_of
 from doe.workflow.rig import read_rig
-from doe.workflow.signals import whirl
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion import history
@@ -160,23 +160,14 @@ def test_a_cutoff_far_above_all_motion_is_no_filter(filtered: Scene) -> None:
     assert np.abs(speed - integrated)[200:-200].max() < 0.02 * integrated.max()
 
 
-HEADER = "operation.inner_speed_rpm,power_loss_W,power_loss_W_sd,cage_speed_rpm,cage_speed_rpm_sd,signal_file,signal_kind,cutoff_hz"
-
-
-def test_rows_with_an_orbit_are_conditions_of_which_the_run_filters_alike(tmp_path: Path) -> None:
-    _file(tmp_path, *_orbit(1.5, [SLOW, FAST]))
-    rows = ["12000,40,1,4700,10,orbit.csv,orbit,500", "18000,100,2,,,orbit.csv,orbit,400", "24000,180,3,,,,,"]
-    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
+def test_a_column_of_the_cutoff_filters_the_runs_of_its_row(tmp_path: Path) -> None:
+    header = "operation.inner_speed_rpm,numerics.whirl_cutoff_hz,whirl_deviation_ratio,whirl_deviation_ratio_sd"
+    rows = ["12000,500,0.3,0.01", "18000,400,0.3,0.01", "24000,400,0.4,0.01"]
+    (tmp_path / "rig.csv").write_text("\n".join([header, *rows]), "utf-8")
     rig = read_rig(tmp_path / "rig.csv")
-    assert rig.outputs == ("power_loss_W", "cage_speed_rpm", "whirl_deviation_ratio")
-    # This row tells the speed of its shaft alone, of 300 Hz.
-    assert [row.values.get("whirl_deviation_ratio") is None for row in rig.rows] == [False, False, True]
-    assert rig.rows[1].values["whirl_deviation_ratio"] == pytest.approx(_ratio(SLOW[1], FAST[1]), rel=0.02)
     declared = {"uncertain": {"defaults": "none", "cage.mass_g": {"law": "uniform", "low": 40.0, "high": 50.0}}}
     case = case_of("scene", read_toml(EXAMPLE) | declared, rig.outputs)
-    numerics = [each.scene.numerics for each in cases_of(case, rig)]
-    assert [each.whirl_cutoff_hz for each in numerics] == [500.0, 400.0, None]
-    assert [each.whirl_notches_hz for each in numerics] == [[200.0, pytest.approx(4700.0 / 60.0)], [300.0], []]
+    assert [condition.scene.numerics.whirl_cutoff_hz for condition in cases_of(case, rig)] == [500.0, 400.0, 400.0]
 
 
 @pytest.mark.parametrize(
@@ -208,18 +199,7 @@ def test_bad_orbits_end_in_a_sentence(tmp_path: Path, change: dict[str, Any], se
     assert sentence in error.value.faults[0] and len(error.value.faults) <= 2
 
 
-def test_an_orbit_needs_a_cutoff_and_notches_a_filter(tmp_path: Path, filtered: Scene) -> None:
-    rows = [f"{speed},40,1,,,orbit.csv,orbit," for speed in (12000, 18000, 24000)]
-    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
-    with pytest.raises(InputError, match="cutoff_hz in row 1: is missing"):
-        read_rig(tmp_path / "rig.csv")
-    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *(f"{row}-5" for row in rows)]), "utf-8")
-    with pytest.raises(InputError) as error:
-        read_rig(tmp_path / "rig.csv")
-    assert (
-        len(error.value.faults) == 1
-        and "cutoff_hz in row 1 = -5: is not above 0; check the sign" in error.value.faults[0]
-    )
+def test_notches_need_a_filter_and_a_cutoff_its_samples(filtered: Scene) -> None:
     with pytest.raises(InputError, match=r"a notch needs the filter of numerics\.whirl_cutoff_hz"):
         filtered.changed({"numerics.whirl_cutoff_hz": None, "numerics.whirl_notches_hz": [9.0]})
     with pytest.raises(InputError, match=r"whirl_cutoff_hz = 1e\+08: needs 3\.5e\+08 samples a replicate"):

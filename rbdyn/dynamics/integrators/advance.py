@@ -22,16 +22,7 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, law, routine
-from rbdyn.dynamics.forces.equations import (
-    LOADS,
-    POCKET_CONTACT_LOAD,
-    POCKET_LOAD,
-    POWERS,
-    cage_motion,
-    pocket_loads,
-    roller_count,
-    roller_pocket,
-)
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
 
@@ -305,23 +296,6 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 return STEP_UNDERFLOW if math.isfinite(error) else NOT_FINITE
             clock[STEP] = shorter
     return FINISHED
-
-
-@entry
-def advance_sampled(bearing, control, carry, tally, start, interval, walls, sample_step):
-    """``advance`` to the time ``start`` and on by ``interval`` [s] a row of ``walls`` (samples, rollers).
-
-    Each row gets the loads [N] of the pocket walls, positive on the front one. Returns the rows filled, and the status.
-    """
-    y, z = carry.y, roller_count(bearing)
-    for sample in range(walls.shape[0]):
-        status = advance(bearing, control, carry, tally, start + sample * interval, sample_step)
-        if status != FINISHED:
-            return sample, status
-        cage = cage_motion(y, PARTS * z)
-        for j in range(z):
-            walls[sample, j] = roller_pocket(bearing, y, cage, j).on_wall
-    return walls.shape[0], FINISHED
 
 
 @law

@@ -37,7 +37,7 @@ the amplitude at the cutoff. Runout turns with cage or shaft. Notches remove it,
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -48,7 +48,6 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate, student_factor
-from rbdyn.dynamics.statistics.pulses import as_short_as_the_filter
 from rbdyn.losses import POWER_TERMS
 from rbdyn.result import JITTER, Quantity
 from rbdyn.scene import Scene
@@ -64,7 +63,6 @@ class Replicate:
     impact window.
 
     - ``whirl``: samples, sum and sum of squares of the speed of the cage's centre
-    - ``pulses``: number of pulses on the pocket walls, sums of their heights and impulses; none unless the scene asks for them
     - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
     - ``work``: integrals of the powers in the order of ``POWER_TERMS`` and what follows there
     - ``largest``: loads in the order of ``equations``
@@ -91,7 +89,6 @@ class Replicate:
     method: str = "rk45"
     stiffness: Array = field(default_factory=lambda: np.zeros(3))
     orbit: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    pulses: Array = field(default_factory=lambda: np.zeros((0, 3)))
     group: int = 0
 
     def counted_from(self, first: int) -> "Replicate":
@@ -225,18 +222,6 @@ CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.
 ORBIT_RADIUS = Figure(_about_its_place, lambda sums: np.sqrt(sums[..., 1] / np.maximum(sums[..., 0], 1.0)))
 
 
-def _mean_of_pulses(sum_of: int) -> Figure:
-    """Mean over pulses of what column ``sum_of`` of their sums adds up; 0 without a pulse."""
-    return Figure(
-        lambda run: run.pulses[run.first :][:, [0, sum_of]], lambda sums: sums[..., 1] / np.maximum(sums[..., 0], 1.0)
-    )
-
-
-# Rate over all pockets [1/s], mean height [N] and mean impulse [N s] of the pulses on the pocket walls.
-PULSE_RATE = Figure(_timed(lambda run: run.pulses[:, 0]), mean)
-PULSE_HEIGHT, PULSE_IMPULSE = _mean_of_pulses(1), _mean_of_pulses(2)
-
-
 def mean_gap(runs: Sequence[Replicate]) -> float:
     """Size of the relative gap of the power balance, averaged over replicates with its sign."""
     return abs(sum(run.signed_power_gap for run in runs)) / len(runs)
@@ -285,39 +270,6 @@ def orbit_radius_share(scene: Scene, runs: Runs, companions: Runs, share: float)
     if play is None:
         return None
     return quantity(ORBIT_RADIUS, runs, companions, share, 0.0, 1.0 / play)
-
-
-def pulse_figures(scene: Scene, runs: Runs, companions: Runs, share: float) -> dict[str, Quantity]:
-    """Rate at a pocket, mean height and mean impulse of the pulses, by the fields of a result; none unless asked for.
-
-    ``share`` of the difference from the companions is the bias of the runs.
-    """
-    if not scene.pulse_samples_per_turn:
-        return {}
-    figures = {"pulse_rate_hz": PULSE_RATE, "pulse_height_N": PULSE_HEIGHT, "pulse_impulse_N_s": PULSE_IMPULSE}
-    per_pocket = {"pulse_rate_hz": 1.0 / scene.bearing.rollers}
-    return {
-        name: quantity(figure, runs, companions, share, 0.0, per_pocket.get(name, 1.0))
-        for name, figure in figures.items()
-    }
-
-
-def pulse_notes(scene: Scene, pulses: Mapping[str, Quantity]) -> Notes:
-    """A note on how pulses are defined, and one where their heights show the bandwidth."""
-    numerics = scene.numerics
-    if not pulses or numerics.pulse_bandwidth_hz is None:
-        return ()
-    definition = (
-        f"pulses: forces at one pocket above {numerics.pulse_threshold_N:g} N, below {numerics.pulse_bandwidth_hz:g} Hz, "
-        f"with a dead time of {numerics.pulse_dead_time_ms:g} ms"
-    )
-    height, impulse = pulses["pulse_height_N"].value, pulses["pulse_impulse_N_s"].value
-    if height == 0.0:
-        return (Note("few-samples", f"{definition}; none is so high, so lower numerics.pulse_threshold_N"),)
-    if as_short_as_the_filter(height, impulse, numerics.pulse_bandwidth_hz):
-        short = "pulses: as short as the bandwidth allows, so their height shows the impulse, not the stiffness"
-        return Note("definition", definition), Note("remark", short)
-    return (Note("definition", definition),)
 
 
 def whirl_notes(scene: Scene, share: Quantity | None) -> Notes:

@@ -1,27 +1,29 @@
-"""Impact pulses: synthetic trains by closed forms, a simulated force read back as a rig's signal, and bad signals."""
+"""Raw signals of a rig: cage speeds, trains of impact pulses by closed forms, a simulated force read back, and bad signals."""
 
-import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from rig_signals import (
+    Pulses,
+    PulseSetting,
+    cage_speed,
+    impact_pulses,
+    low_passed,
+    pulse_sums,
+    pulses_of,
+    simulated_pulses,
+    without_echoes,
+)
 
-from doe.cli import app
-from doe.workflow.rig import PULSE_OUTPUTS, read_rig
-from doe.workflow.signals import PulseSetting, impact_pulses
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion import history
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.recording import record
-from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.pulses import Pulses, low_passed, pulse_sums, pulses_of, without_echoes
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
+OUTPUTS = ("pulse_rate_hz", "pulse_height_N", "pulse_impulse_N_s")
 RATE, BANDWIDTH, THRESHOLD = 200_000.0, 10_000.0, 10.0
 
 
@@ -116,7 +118,7 @@ def test_a_train_of_pulses_is_recovered_within_its_error(tmp_path: Path, train: 
     else:
         path = written(tmp_path, time, force)
     means, note = impact_pulses(path, kind, setting)
-    assert note is None and set(means) == set(PULSE_OUTPUTS[: 2 if kind == "impact_pulses" else 3])
+    assert note is None and set(means) == set(OUTPUTS[: 2 if kind == "impact_pulses" else 3])
     assert abs(means["pulse_rate_hz"].value - rate) < 4.0 * means["pulse_rate_hz"].sd < 0.1 * rate
     # Of the scatter of the heights, uniform from 20 to 100 N, among 300 pulses.
     height = means["pulse_height_N"]
@@ -128,59 +130,20 @@ def test_a_train_of_pulses_is_recovered_within_its_error(tmp_path: Path, train: 
         assert means["pulse_impulse_N_s"].value == pytest.approx(impulse, rel=0.01)
 
 
-def test_a_simulated_force_read_back_as_a_signal_is_the_statistic_of_the_run(tmp_path: Path) -> None:
-    """Forces at samples are those of a history as long as round-off does not part them; figures of all pockets, statistically."""
-    changes: dict[str, Any] = {"turns": 40.0, "discard_turns": 0.0, "replicates": 1, "extend": False}
-    changes |= {"pulse_threshold_N": 10.0, "pulse_bandwidth_hz": 5000.0, "pulse_dead_time_ms": 0.1}
-    scene = Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in changes.items()})
-    assert scene.pulse_samples_per_turn == 250
-    run = record(Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop()))
-    motion = history(scene, 40.0, samples_per_turn=250)
-    rate = 250 / scene.turn_s
-    start = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
-    walls = start.walls(0.0, 250, 200)
-    assert walls == pytest.approx(motion.pocket_load[:200], abs=1e-4) and np.abs(walls).max() > 1.0
+def test_a_simulated_force_read_back_as_a_signal_gives_the_figures_of_the_motion(tmp_path: Path) -> None:
+    """The pockets one after the other as one trace, of half as many samples in a period of the bandwidth."""
+    scene, setting = Scene.load(EXAMPLE), PulseSetting(10.0, 5000.0, 1e-4)
+    motion = history(scene, 40.0, samples_per_turn=125)
     path = written(tmp_path, motion.time, motion.pocket_load[:, 0])
     with pytest.raises(InputError, match="at least 100 are needed, so measure longer or lower it"):
-        impact_pulses(path, "impact_force", PulseSetting(10.0, 5000.0, 1e-4))
+        impact_pulses(path, "impact_force", setting)
     joined = np.concatenate(motion.pocket_load.T)
-    path = written(tmp_path, np.arange(joined.size) / rate, joined)
-    means, _ = impact_pulses(path, "impact_force", PulseSetting(10.0, 5000.0, 1e-4))
-    total = run.pulses.sum(axis=0)
-    expected = [total[0] / run.durations.sum() / motion.pocket_load.shape[1], total[1] / total[0], total[2] / total[0]]
-    for name, value in zip(PULSE_OUTPUTS, expected, strict=True):
+    path = written(tmp_path, np.arange(joined.size) * scene.turn_s / 125, joined)
+    means, _ = impact_pulses(path, "impact_force", setting)
+    expected = simulated_pulses(scene, 40.0, setting)
+    assert expected.keys() == means.keys() and expected["pulse_height_N"] > 10.0
+    for name, value in expected.items():
         assert means[name].value == pytest.approx(value, rel=0.05)
-
-
-def test_a_result_reports_pulses_where_they_are_asked_for() -> None:
-    short = {"turns": 6.0, "discard_turns": 1.0, "replicates": 2, "extend": False, "companion": False}
-    scene = Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in short.items()})
-    plain = simulate(scene, notice=None)
-    assert "pulse_rate_hz" not in plain.as_dict()
-    pulses = {"numerics.pulse_threshold_N": 10.0, "numerics.pulse_bandwidth_hz": 5000.0}
-    result = simulate(scene.changed(pulses), notice=None)
-    record_ = result.as_dict()
-    assert type(result).from_dict(record_) == result
-    assert record_["pulse_height_N"]["value"] > 10.0 and record_["pulse_rate_hz"]["statistical_error"] > 0.0
-    assert any(note.startswith("pulses: forces at one pocket above 10 N, below 5000 Hz") for note in result.notes)
-    none = simulate(scene.changed({**pulses, "numerics.pulse_threshold_N": 1e6}), notice=None)
-    assert none.pulse_height_N is not None and none.pulse_height_N.value == 0.0
-    assert any(note.endswith("none is so high, so lower numerics.pulse_threshold_N") for note in none.notes)
-
-
-@pytest.mark.parametrize(
-    ("keys", "sentence"),
-    [
-        ({"pulse_threshold_N": 9.0}, "numerics.pulse_bandwidth_hz: is missing"),
-        ({"pulse_bandwidth_hz": 9e3}, "numerics.pulse_threshold_N: is missing"),
-        ({"pulse_dead_time_ms": 1.0}, "numerics.pulse_dead_time_ms: has no use"),
-        ({"pulse_threshold_N": 9.0, "pulse_bandwidth_hz": 1e8}, "pulse_bandwidth_hz = 1e+08: needs"),
-    ],
-)
-def test_bad_keys_of_pulses_end_in_a_sentence(keys: dict[str, float], sentence: str) -> None:
-    with pytest.raises(InputError) as error:
-        Scene.load(EXAMPLE).changed({f"numerics.{key}": value for key, value in keys.items()})
-    assert any(sentence in fault for fault in error.value.faults)
 
 
 @pytest.mark.parametrize(
@@ -216,75 +179,32 @@ def test_noise_a_clipped_sensor_and_short_pulses_are_noted(tmp_path: Path, train
     assert note is not None and "so their height shows the impulse, not the stiffness" in note
 
 
-HEADER = "operation.inner_speed_rpm,power_loss_W,power_loss_W_sd,signal_file,signal_kind,threshold_N,bandwidth_hz,dead_time_ms"
+def _signal(folder: Path, name: str, lines: Sequence[str]) -> Path:
+    (folder / name).write_text("\n".join(lines) + "\n", "utf-8")
+    return folder / name
 
 
-def test_rows_with_pulses_are_conditions_whose_runs_take_them_alike(tmp_path: Path, train: Any) -> None:
-    written(tmp_path, *train[:2])
-    rows = [
-        "12000,40,1,trace.csv,impact_force,10,9000,0.1",
-        "18000,100,2,trace.csv,impact_force,12,9000,",
-        "24000,180,3,,,,,",
-    ]
-    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
-    rig = read_rig(tmp_path / "rig.csv")
-    assert rig.outputs == ("power_loss_W", *PULSE_OUTPUTS)
-    assert [len(row.values) for row in rig.rows] == [4, 4, 1]
-    keys = [
-        [row.keys.get(f"numerics.pulse_{key}") for key in ("threshold_N", "bandwidth_hz", "dead_time_ms")]
-        for row in rig.rows
-    ]
-    assert keys == [[10.0, 9000.0, pytest.approx(0.1)], [12.0, 9000.0, 0.0], [None, None, None]]
+def test_pulses_of_an_uneven_wheel_give_the_mean_speed_with_its_error(tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    # Turns of a cage at 9400 rpm that scatter by 1 %, three uneven marks a turn, three of a turn lost.
+    turns = 60.0 / (9400.0 * (1.0 + 0.01 * random.standard_normal(400)))
+    starts = np.concatenate([[0.0], np.cumsum(turns)])
+    marks = (starts[:-1, None] + turns[:, None] * [0.0, 0.31, 0.69]).ravel()
+    path = _signal(tmp_path, "pulses.csv", ["t_s", *map(str, marks.tolist())])
+    value, sd, told = cage_speed(path, "cage_pulses", 3)
+    assert value == pytest.approx(60.0 * 399 / starts[399], rel=1e-9) and told is None
+    assert sd == pytest.approx(0.01 * 9400.0 / np.sqrt(399.0), rel=0.3)
+    lost = np.delete(marks, slice(300, 303))
+    value, _, told = cage_speed(_signal(tmp_path, "lost.csv", ["t_s", *map(str, lost.tolist())]), "cage_pulses", 3)
+    assert value == pytest.approx(9400.0, rel=2e-3) and told is not None and "1 of 398 turns lack pulses" in told
 
 
-@pytest.mark.parametrize(
-    ("row", "sentence"),
-    [
-        ("12000,40,1,trace.csv,impact_force,,9000,", "threshold_N in row 1: is missing; give the force above which"),
-        ("12000,40,1,trace.csv,impact_force,10,,", "bandwidth_hz in row 1: is missing; give the frequency"),
-        ("12000,40,1,,,10,9000,", "threshold_N in row 1 = 10: has no use in this row"),
-        ("12000,40,1,trace.csv,impact_force,10,9000,-1", "dead_time_ms in row 1 = -1: is below 0"),
-        (
-            "12000,40,1,trace.csv,impact_acceleration,10,9000,",
-            "sensor_mass_g in row 1: is missing; give the force over",
-        ),
-    ],
-)
-def test_bad_rows_of_pulses_end_in_a_sentence(tmp_path: Path, row: str, sentence: str) -> None:
-    rows = [row, "18000,100,2,,,,,", "24000,180,3,,,,,"]
-    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
-    with pytest.raises(InputError) as error:
-        read_rig(tmp_path / "rig.csv")
-    assert any(sentence in fault for fault in error.value.faults), error.value.faults
-
-
-@pytest.mark.slow
-def test_the_stiffness_of_the_bars_is_found_from_pulses_of_a_simulated_rig(tmp_path: Path) -> None:
-    """The traces of all pockets one after the other, of a cage whose stiffness is hidden, at four speeds; sensors are within 10 %."""
-    short = [
-        "numerics.turns=4", "numerics.discard_turns=2", "numerics.impact_window_turns=1", "numerics.replicates=2",
-        "numerics.extend=false", "numerics.companion=false",
-    ]  # fmt: skip
-    key, hidden, rows = "model.pocket_bar_stiffness_N_m", 2.5e7, list[str]()
-    for speed in (9000, 14000, 19000, 24000):
-        changes = {key: hidden, "operation.inner_speed_rpm": speed, "numerics.discard_turns": 2.0, "numerics.seed": 77}
-        scene = Scene.load(EXAMPLE).changed(changes)
-        per_turn = round(2.1e5 * scene.turn_s)
-        motion = history(scene, 12.0, samples_per_turn=per_turn)
-        force = np.concatenate(motion.pocket_load.T)
-        written(tmp_path, np.arange(force.size) * (motion.time[1] - motion.time[0]), force, name=f"{speed}.csv")
-        rows.append(f"{speed},{speed}.csv,impact_force,10,20000")
-    header = "operation.inner_speed_rpm,signal_file,signal_kind,threshold_N,bandwidth_hz"
-    (tmp_path / "rig.csv").write_text("\n".join([header, *rows]), "utf-8")
-    declared = (
-        f'\n[uncertain]\ndefaults = "none"\nset = {json.dumps(short)}\n'
-        f'"{key}" = {{ law = "log_uniform", low = 1e7, high = 2e8 }}\n[calibrate]\nwaves = 1\n'
-    )
-    (tmp_path / "scene.toml").write_text(EXAMPLE.read_text("utf-8") + declared, "utf-8")
-    command = ["calibrate", str(tmp_path / "scene.toml"), "--data", str(tmp_path / "rig.csv"), "--json"]
-    answer = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "out")])
-
-    record_ = json.loads(answer.stdout)
-    found = record_["inputs"][key]
-    assert found["low"] < hidden < found["high"] < 3.0 * found["low"] and found["seen"] == "learned"
-    assert record_["outputs"].keys() == set(PULSE_OUTPUTS)
+def test_a_speed_signal_remembers_and_its_error_knows(tmp_path: Path) -> None:
+    random, speed = np.random.default_rng(4), [9400.0]
+    for _ in range(20_000):
+        speed.append(9400.0 + 0.98 * (speed[-1] - 9400.0) + 5.0 * random.standard_normal())
+    lines = [f"{0.001 * place:.4f},{value!r}" for place, value in enumerate(speed)]
+    value, sd, _ = cage_speed(_signal(tmp_path, "speed.csv", ["t_s,cage_speed_rpm", *lines]), "cage_speed", 1)
+    # Variance of the mean of an autoregression: s^2/((1 - r)^2 n).
+    assert sd == pytest.approx(5.0 / 0.02 / np.sqrt(20_000.0), rel=0.25)
+    assert value == pytest.approx(9400.0, abs=3.0 * sd)

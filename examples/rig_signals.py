@@ -1,23 +1,49 @@
-"""Raw signals of a rig: mean cage speed, whirl and impact pulses, with errors by batch means.
+"""Values of a rig's table from raw signals: mean cage speed, whirl deviation ratio and impact pulses, with their deviations.
 
-A mean over time needs no filter. Pulses are counted by whole cage turns, so that uneven spacing of their marks cancels.
-Whirl needs a velocity: an orbit is filtered like the simulated one (``filtered_whirl``). So are the forces of impacts
-(``rbdyn.dynamics.statistics.pulses``), whose impulses and heights a sensor sees through its own bandwidth.
+    python examples/rig_signals.py cage_pulses pulses.csv --pulses-per-turn 3
+    python examples/rig_signals.py orbit orbit.csv --cutoff 500 --notch 200 --still rest.csv
+    python examples/rig_signals.py impact_force trace.csv --threshold 10 --bandwidth 5000
+    python examples/rig_signals.py simulated SCENE.toml --threshold 10 --bandwidth 5000
+
+Each prints columns of RIG.csv for ``doe calibrate``, or the pulses of a simulated motion. Errors are by batch means.
+
+A mean over time needs no filter. Pulses of a wheel are counted by whole cage turns, so that uneven spacing of their marks
+cancels. Whirl needs a velocity: an orbit is filtered as ``numerics.whirl_cutoff_hz`` filters the simulated one, so give the
+cutoff as a column of that key.
+
+Impact pulses: a force, sampled evenly, is low-passed and its absolute value is taken. A pulse is a stretch above the
+threshold. Its height is the largest force in it, at the vertex of the parabola through the largest sample and its neighbours.
+Its impulse is the integral of the force over it, and its time is that of its height. The dead time starts at a pulse: further
+pulses within it belong to the first, which gets the larger height and both impulses. Stretches that the record cuts at an end
+are left out.
+
+The low pass is a Gaussian that halves the power at the bandwidth f: exp(-ln 2/2 (nu/f)^2), of standard deviation
+sqrt(ln 2)/(2 pi f) = 0.133/f in time. It has no overshoot, so one pulse never makes two. A pulse far shorter than 1/f, of
+impulse J, becomes a Gaussian of height J f sqrt(2 pi/ln 2) = 3.01 J f. Its height then shows the impulse alone. Only pulses
+longer than that show the stiffness of what they hit: a half sine of height H lasts pi J/(2 H) = pi sqrt(m/k).
+
+A sensor sees every pulse through its own bandwidth and its sampling. So measured and simulated forces are low-passed by the
+same Gaussian, whose bandwidth lies below that of the sensor.
 """
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+import typer
+from scipy.ndimage import gaussian_filter1d
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.tables.sheet import Limits, read_sheet
 from rbdyn.base.words import counted
-
-if TYPE_CHECKING:
-    from rbdyn.dynamics.statistics.pulses import Pulses
+from rbdyn.dynamics.motion import history
+from rbdyn.dynamics.statistics.batch_means import estimate
+from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, WHIRL_DEVIATION_RATIO, filtered_speed, sums_until
+from rbdyn.scene import Scene
+from rbdyn.scene.laws import SAMPLES_A_PERIOD
 
 # Columns of each kind of signal; some may have one of two units.
 KINDS = {
@@ -52,6 +78,17 @@ CLEAR = 4.0
 CLIPPED = 0.01
 
 
+# Standard deviation in time, and height over impulse of a very short pulse, times and over the bandwidth.
+SPREAD = math.sqrt(math.log(2.0)) / (2.0 * math.pi)
+SHORTEST = math.sqrt(2.0 * math.pi / math.log(2.0))
+# Standard deviations after which the filter ends: the rest is 6e-7 of it.
+REACH = 5.0
+# Pulses at most this many times as long as the filter leaves the shortest ones: their heights show the impulse alone.
+AS_SHORT = 1.25
+# Samples of a simulated force in a period of the bandwidth: no sensor filters it before, so it needs more than a measured one.
+SIMULATED_SAMPLES = 20
+
+
 class Mean(NamedTuple):
     """A mean over a signal, its standard deviation, and a note on gaps or noise, if any."""
 
@@ -62,8 +99,6 @@ class Mean(NamedTuple):
 
 def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
     """Mean cage speed [rpm]. Raises InputError."""
-    from rbdyn.dynamics.statistics.batch_means import estimate
-
     time, *speeds = _columns(path, KINDS[kind])
     if not (np.diff(time) >= FINEST).all():
         row = int(np.argmin(np.diff(time) >= FINEST)) + 2
@@ -96,8 +131,6 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], rest_record: Path
     ``rest_record``: a record of the rig at rest. Noise of variance s^2 in each component adds 2 s^2 to the mean square of the
     speed v and, to first order, s^2/(2 v) to v. Raises InputError.
     """
-    from rbdyn.dynamics.statistics.batch_means import estimate
-    from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, WHIRL_DEVIATION_RATIO, sums_until
 
     speed, periods = _filtered(path, cutoff, notches, FEWEST_SAMPLES * PERIODS)
     quiet = np.zeros(1) if rest_record is None else _filtered(rest_record, cutoff, notches, STILL_PERIODS)[0]
@@ -125,8 +158,6 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], rest_record: Path
 
 def _filtered(path: Path, cutoff: float, notches: Sequence[float], least_periods: int) -> tuple[Array, float]:
     """Filtered speed [m/s] of an orbit, and its number of periods of the cutoff, ``least_periods`` at least."""
-    from rbdyn.dynamics.statistics.metrics import filtered_speed
-    from rbdyn.scene.laws import SAMPLES_A_PERIOD
 
     time, *place = _columns(path, KINDS["orbit"])
     rate = _rate(path, time, SAMPLES_A_PERIOD, "cutoff_hz", cutoff)
@@ -154,6 +185,79 @@ def _rate(path: Path, time: Array, fewest: int, name: str, frequency: float) -> 
     return rate
 
 
+class Pulses(NamedTuple):
+    """Pulses of one force in the order of their times [s]: heights [N] and impulses [N s]."""
+
+    time: Array
+    height: Array
+    impulse: Array
+
+
+def low_passed(force: Array, rate: float, bandwidth: float) -> Array:
+    """Force (samples, ...) sampled at ``rate`` [Hz], without what is faster than ``bandwidth`` [Hz]; the ends repeat."""
+    return np.asarray(gaussian_filter1d(force, SPREAD * rate / bandwidth, axis=0, mode="nearest", truncate=REACH))
+
+
+def pulses_of(force: Array, rate: float, threshold: float, dead_time: float) -> Pulses:
+    """Pulses of a force (samples,) [N] that is low-passed; ``rate`` [Hz], ``threshold`` [N], ``dead_time`` [s]."""
+    size = np.abs(force)
+    edges = np.diff((size >= threshold).astype(np.int8))
+    begins, ends = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    # A stretch from the first sample on has no begin, one to the last sample no end.
+    ends = ends[np.searchsorted(ends, begins[0]) :] if begins.size else ends[:0]
+    begins = begins[: ends.size]
+    if not begins.size:
+        return Pulses(np.zeros(0), np.zeros(0), np.zeros(0))
+    peaks = _highest(size, begins, ends)
+    before, top, after = size[peaks - 1], size[peaks], size[np.minimum(peaks + 1, size.size - 1)]
+    bend = np.minimum(before - 2.0 * top + after, 0.0)
+    shift = np.divide(0.5 * (before - after), bend, out=np.zeros(peaks.size), where=bend < 0.0)
+    heights = top - 0.25 * (before - after) * shift
+    pulses = Pulses((peaks + shift) / rate, heights, _impulses(size, begins, ends, threshold) / rate)
+    return without_echoes(pulses, dead_time)
+
+
+def _highest(size: Array, begins: Whole, ends: Whole) -> Whole:
+    """Places of the largest sample in each stretch, the first of equal ones."""
+    stretches = zip(begins.tolist(), ends.tolist(), strict=True)
+    return np.array([begin + int(size[begin:end].argmax()) for begin, end in stretches])
+
+
+def _impulses(size: Array, begins: Whole, ends: Whole, threshold: float) -> Array:
+    """Sums of trapezoids [N samples] over each stretch, from crossing to crossing of the threshold on straight lines."""
+    total = np.concatenate([[0.0], np.cumsum(size)])
+    inside = total[ends] - total[begins] - 0.5 * (size[begins] + size[ends - 1])
+    for first, beyond in ((begins, begins - 1), (ends - 1, ends)):
+        rise = size[first] - size[beyond]
+        share = np.divide(size[first] - threshold, rise, out=np.zeros(rise.size), where=rise > 0.0)
+        inside = inside + 0.5 * share * (size[first] + threshold)
+    return np.asarray(inside)
+
+
+def without_echoes(pulses: Pulses, dead_time: float) -> Pulses:
+    """The pulses, each with those that follow within the ``dead_time`` [s] as one."""
+    firsts, place = list[int](), 0
+    while place < pulses.time.size:
+        firsts.append(place)
+        place = max(int(np.searchsorted(pulses.time, pulses.time[place] + dead_time)), place + 1)
+    if len(firsts) == pulses.time.size:
+        return pulses
+    heights, impulses = np.maximum.reduceat(pulses.height, firsts), np.add.reduceat(pulses.impulse, firsts)
+    return Pulses(pulses.time[firsts], heights, impulses)
+
+
+def pulse_sums(pulses: Pulses, ends: Array) -> Array:
+    """Number of pulses, sums of heights [N] and of impulses [N s], (parts, 3), over parts that end at times ``ends`` [s]."""
+    parts = np.searchsorted(ends, pulses.time, side="left")
+    weights = (np.ones(pulses.time.size), pulses.height, pulses.impulse)
+    return np.column_stack([np.bincount(parts, weight, len(ends) + 1)[: len(ends)] for weight in weights])
+
+
+def as_short_as_the_filter(height: float, impulse: float, bandwidth: float) -> bool:
+    """Whether pulses of a mean height [N] and impulse [N s] are as short as a low pass [Hz] lets them be."""
+    return impulse * bandwidth * SHORTEST < AS_SHORT * height
+
+
 class PulseSetting(NamedTuple):
     """How impact pulses are taken: threshold [N], bandwidth [Hz], dead time [s].
 
@@ -172,8 +276,6 @@ def impact_pulses(path: Path, kind: str, setting: PulseSetting) -> tuple[dict[st
     A list of pulses has no impulses. Each figure's error is that of batch means over parts of the record; that of the rate
     covers one pulse too few or too many at least. Raises InputError.
     """
-    from rbdyn.dynamics.statistics.batch_means import estimate
-    from rbdyn.dynamics.statistics.pulses import Pulses, pulse_sums, without_echoes
 
     time, values = _columns(path, KINDS[kind])
     if kind in LISTS:
@@ -213,10 +315,8 @@ def impact_pulses(path: Path, kind: str, setting: PulseSetting) -> tuple[dict[st
 
 def _pulses_of_trace(
     path: Path, time: Array, force: Array, setting: PulseSetting
-) -> "tuple[Pulses, tuple[float, float], list[str]]":
+) -> tuple[Pulses, tuple[float, float], list[str]]:
     """Pulses of a sampled force [N], begin and end of the record [s], and notes. Raises InputError."""
-    from rbdyn.dynamics.statistics.pulses import as_short_as_the_filter, low_passed, pulses_of
-    from rbdyn.scene.laws import SAMPLES_A_PERIOD
 
     threshold, bandwidth = setting.threshold, setting.bandwidth
     rate = _rate(path, time, SAMPLES_A_PERIOD, "bandwidth_hz", bandwidth)
@@ -252,3 +352,64 @@ def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
             faults.append(repetition if units else f"{path}: column {name} is missing; add it")
     refuse(faults)
     return numbers
+
+
+def simulated_pulses(scene: Scene, turns: float, setting: PulseSetting) -> dict[str, float]:
+    """Rate at a pocket [Hz], mean height [N] and mean impulse [N s] of the pulses of one replicate, over all its pockets."""
+    per_turn = max(math.ceil(SIMULATED_SAMPLES * setting.bandwidth * scene.turn_s), 8)
+    motion = history(scene, turns, samples_per_turn=per_turn)
+    rate = per_turn / scene.turn_s
+    walls = low_passed(motion.pocket_load, rate, setting.bandwidth).T
+    pulses = [pulses_of(wall, rate, setting.threshold, setting.dead_time) for wall in walls]
+    heights, impulses = (
+        np.concatenate(column) for column in zip(*((p.height, p.impulse) for p in pulses), strict=True)
+    )
+    seconds = len(motion.time) / rate * len(walls)
+    number = max(heights.size, 1)
+    return {
+        "pulse_rate_hz": heights.size / seconds,
+        "pulse_height_N": float(heights.sum() / number),
+        "pulse_impulse_N_s": float(impulses.sum() / number),
+    }
+
+
+def main(
+    kind: Annotated[str, typer.Argument(help=f"Kind of signal: {', '.join(KINDS)}; or simulated.")],
+    path: Annotated[Path, typer.Argument(help="Signal file, or the scene of a simulated motion.")],
+    pulses_per_turn: Annotated[int, typer.Option(help="Pulses in a turn of the cage.")] = 1,
+    cutoff: Annotated[float, typer.Option(help="Frequency below which an orbit counts [Hz].")] = 500.0,
+    notch: Annotated[list[float] | None, typer.Option(help="Frequency of a runout [Hz]; repeatable.")] = None,
+    still: Annotated[Path | None, typer.Option(help="Record of the rig at rest.")] = None,
+    threshold: Annotated[float, typer.Option(help="Force above which a pulse counts [N].")] = 10.0,
+    bandwidth: Annotated[float, typer.Option(help="Gaussian low pass of the force [Hz].")] = 5000.0,
+    dead_time_ms: Annotated[float, typer.Option(help="Time after a pulse in which further ones belong to it.")] = 0.0,
+    sensor_mass_g: Annotated[float, typer.Option(help="Force over acceleration, from a tap with a hammer.")] = 1000.0,
+    turns: Annotated[float, typer.Option(help="Shaft turns of a simulated motion.")] = 100.0,
+) -> None:
+    """Print the columns of a rig's table that a signal gives, each with its standard deviation."""
+    mass = 1e-3 * sensor_mass_g if kind == "impact_acceleration" else None
+    setting = PulseSetting(threshold, bandwidth, 1e-3 * dead_time_ms, mass)
+    if kind == "simulated":
+        for name, value in simulated_pulses(Scene.load(path), turns, setting).items():
+            print(f"{name},{value:.6g}")
+        return
+    if kind not in KINDS:
+        raise typer.BadParameter(f"{kind}: is no kind of signal; choose {', '.join(KINDS)} or simulated")
+    try:
+        if kind == "orbit":
+            means, note = {"whirl_deviation_ratio": whirl(path, cutoff, notch or (), still)}, None
+        elif kind in (*TRACES, *LISTS):
+            means, note = impact_pulses(path, kind, setting)
+        else:
+            means, note = {"cage_speed_rpm": cage_speed(path, kind, pulses_per_turn)}, None
+    except InputError as error:
+        raise typer.BadParameter("; ".join(map(str, error.faults))) from None
+    for name, mean in means.items():
+        print(f"{name},{mean.value:.6g}\n{name}_sd,{mean.sd:.3g}")
+        note = mean.note or note
+    if note:
+        print(note)
+
+
+if __name__ == "__main__":
+    typer.run(main)
