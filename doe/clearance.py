@@ -22,7 +22,7 @@ from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcom
 from doe.running.store import Failure, Point, Store
 from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError, RunError, read_toml, refuse
+from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import verdict
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figure_names import NAMES
@@ -85,8 +85,7 @@ def _has_balance(study: Study) -> bool:
 
 def read_scene(study: Study) -> dict[str, Any]:
     """Tables of the study's scene file. Raises InputError for a missing file, or a factor's key that no scene has."""
-    path = study.path_of(study.scene.file)
-    data = read_toml(path)
+    path, data = study.path_of(study.scene.file), study.read(study.scene.file)
     keys = (*(factor.key for factor in study.file.factor), *(category.key for category in study.file.category))
     left_out = [
         dotted

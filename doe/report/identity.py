@@ -18,7 +18,9 @@ def study_identity(command: str, study: Study, data: Path | None = None) -> Iden
     scene: Mapping[str, Any] = {}
     if study.file.scene is not None:
         with suppress(InputError):
-            loaded = Scene.load(study.path_of(study.scene.file), study.scene.set)
+            loaded = Scene.from_dict(
+                study.read(study.scene.file), str(study.path_of(study.scene.file)), study.scene.set
+            )
             scene = loaded.model_dump(mode="json")
     named = [study.path, *named_files(study)] if study.file.scene is not None else [study.path]
     identity = identity_of(command, scene, [*named, *([] if data is None else [data])])

@@ -1,23 +1,11 @@
 """Tables of STUDY.toml: factors and the design; goals, the front, its search and the widest tolerances; dimension chains."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rbdyn.base.faults import (
-    Consistent,
-    Figure,
-    InputError,
-    Name,
-    NonNegative,
-    Number,
-    Positive,
-    Strict,
-    no_power_of_two,
-    read_toml,
-)
+from rbdyn.base.faults import Consistent, Figure, Name, NonNegative, Number, Positive, Strict, no_power_of_two
 
 # Smallest ratio of a step to its value, and of a resolution to its step; a finer one is lost in rounding.
 FINEST = 1e-9
@@ -307,31 +295,3 @@ class StudyChain(Consistent):
             yield "link: missing; give the links, or the file that has them"
         if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
             yield f"file = {self.file!r}: states the links with all their settings; leave out the file or these"
-
-
-def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float | None = None) -> Mapping[str, Any]:
-    """Contents of CHAIN.toml for a study's chain at a picked value [mm]; ``folder`` is that of the study.
-
-    ``half_width`` [mm] is used if the chain states none. Raises InputError without either, or if the chain is not in its
-    file.
-    """
-    half = chain.half_width_mm if chain.half_width_mm is not None else half_width
-    if half is None:
-        raise InputError(
-            [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
-        )
-    limits = {"lower_mm": value - half, "upper_mm": value + half}
-    if chain.file is not None:
-        table_of_file = _of_file(chain.name, folder / chain.file)
-        return {**{key: content for key, content in table_of_file.items() if key != "name"}, "closing_link": limits}
-    table = {"closing_link": limits, "link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
-    return table if chain.selective is None else table | {"selective": chain.selective}
-
-
-def _of_file(name: str, path: Path) -> Mapping[str, Any]:
-    """Table of the chain of that name in a file of chains."""
-    chains = read_toml(path).get("chain", [])
-    for chain in chains if isinstance(chains, list) else []:
-        if isinstance(chain, dict) and chain.get("name") == name:
-            return chain
-    raise InputError([f"{path}: no chain is named {name}; name it [[chain]] name = {name!r}"])

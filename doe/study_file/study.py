@@ -5,7 +5,7 @@ A study can also be made from a table alone, of which some columns are factors a
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -263,6 +263,8 @@ class Study:
     """Places of the values of its categories; by default the first of each, which are those of the baseline."""
     remaining: Remaining | None = field(default=None, compare=False)
     """What remains of the region where runs failed; None while none has."""
+    tables: dict[Path, dict[str, Any]] = field(default_factory=dict, compare=False, repr=False)
+    """Tables of the TOML files that it names, each read once."""
 
     def __post_init__(self) -> None:
         """Put a response for each limit at a point of the duty in the place of the limits of its figure."""
@@ -409,6 +411,40 @@ class Study:
     def path_of(self, name: str) -> Path:
         """Path of a file that the study names."""
         return self.path.parent / name
+
+    def read(self, name: str) -> dict[str, Any]:
+        """Tables of a TOML file that the study names, which is read once. Raises InputError."""
+        path = self.path_of(name)
+        if path not in self.tables:
+            self.tables[path] = read_toml(path)
+        return self.tables[path]
+
+    def chain_table(self, chain: StudyChain, value: float, half_width: float | None = None) -> Mapping[str, Any]:
+        """Contents of CHAIN.toml for a chain at a picked value [mm].
+
+        ``half_width`` [mm] is used if the chain states none. Raises InputError without either, or if the chain is not in its
+        file.
+        """
+        half = chain.half_width_mm if chain.half_width_mm is not None else half_width
+        if half is None:
+            raise InputError(
+                [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
+            )
+        limits = {"lower_mm": value - half, "upper_mm": value + half}
+        if chain.file is not None:
+            table = self._chain_of_file(chain.name, chain.file)
+            return {**{key: content for key, content in table.items() if key != "name"}, "closing_link": limits}
+        selective = {} if chain.selective is None else {"selective": chain.selective}
+        own = {"link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
+        return {"closing_link": limits, **own, **selective}
+
+    def _chain_of_file(self, name: str, file: str) -> Mapping[str, Any]:
+        """Table of the chain of that name in a file of chains."""
+        chains = self.read(file).get("chain", [])
+        for chain in chains if isinstance(chains, list) else []:
+            if isinstance(chain, dict) and chain.get("name") == name:
+                return chain
+        raise InputError([f"{self.path_of(file)}: no chain is named {name}; name it [[chain]] name = {name!r}"])
 
 
 # Beginning of a text that is nearly a number.

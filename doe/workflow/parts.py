@@ -18,7 +18,7 @@ from doe.dimension_chain.closing import NoValueError
 from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import Part as ChainPart
 from doe.study_file import Study
-from doe.study_file.sections import StudyChain, chain_table
+from doe.study_file.sections import StudyChain
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.tolerances import STANDARD_TOLERANCES
@@ -209,7 +209,7 @@ def _chain_at(study: Study, chain: StudyChain | None, value: float, half_width: 
         return None
     free = chain.model_copy(update={"half_width_mm": None})
     try:
-        return chain_from(chain_table(free, study.path.parent, value, half_width), chain.name)
+        return chain_from(study.chain_table(free, value, half_width), chain.name)
     except InputError:
         # The solution of the chain names its faults.
         return None

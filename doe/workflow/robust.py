@@ -5,6 +5,7 @@ until the further runs that the study allows are spent. The robust front holds p
 """
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -507,7 +508,7 @@ def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
 def case_of_study(study: Study) -> Case:
     """The study's scene with its unknown inputs; factors are none of them."""
     path = study.path_of(study.scene.file)
-    data = clearance.read_scene(study)
+    data = deepcopy(clearance.read_scene(study))
     for override in study.scene.set:
         set_key(data, override, f"{study.path}: scene.set")
     keys = *(factor.key for factor in study.file.factor), *(category.key for category in study.file.category)

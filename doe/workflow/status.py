@@ -142,7 +142,7 @@ def _samples(study: Study) -> list[str]:
     if study.file.uncertain is not None and study.file.uncertain.sample is not None:
         return [study.file.uncertain.sample]
     with suppress(InputError):
-        declared = read_toml(study.path_of(study.scene.file)).get("uncertain")
+        declared = study.read(study.scene.file).get("uncertain")
         if isinstance(declared, dict) and isinstance(name := declared.get("sample"), str):
             return [str(Path(study.scene.file).parent / name)]
     return []

@@ -25,7 +25,6 @@ from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress
 from doe.running.store import Failure, Store
 from doe.study_file import Study
-from doe.study_file.sections import chain_table
 from doe.threads import one_thread
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
@@ -208,7 +207,7 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
     half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else known_tolerances(study).get(chain.factor)
     source = f"{study.path}: chain {chain.name}"
     try:
-        table = chain_table(chain, study.path.parent, float(point[factor]), half_width)
+        table = study.chain_table(chain, float(point[factor]), half_width)
     except InputError as error:
         raise InputError([f"{study.path}: {fault}" for fault in error.faults]) from None
     return chain_from(table, source)

@@ -12,7 +12,8 @@ from short_studies import short_study
 
 from doe.dimension_chain import chain_from, fit_limits, read_chains, solve
 from doe.report.sections.chain import chain_blocks
-from doe.study_file.sections import StudyChain, chain_table
+from doe.study_file import Study
+from doe.study_file.sections import StudyChain
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError, read_toml
@@ -22,6 +23,7 @@ from rbdyn.properties.materials import Material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BEARING = EXAMPLES / "bearing_chains.toml"
+STUDY = Study.load(EXAMPLES / "clearance_study.toml")
 
 
 @pytest.fixture(scope="module")
@@ -126,15 +128,13 @@ def test_one_refused_chain_among_several_refuses_the_file(tmp_path):
 def test_a_study_takes_its_own_width_or_the_tolerance_found():
     link = [{"name": "a", "coefficient": 1.0, "nominal_mm": 0.3}]
     own = StudyChain(name="pocket", factor="p", half_width_mm=0.005, link=link)
-    assert chain_table(own, EXAMPLES, 0.3, 0.02)["closing_link"] == {"lower_mm": 0.295, "upper_mm": 0.305}
+    assert STUDY.chain_table(own, 0.3, 0.02)["closing_link"] == {"lower_mm": 0.295, "upper_mm": 0.305}
     found = StudyChain(name="pocket", factor="p", link=link)
-    assert chain_table(found, EXAMPLES, 0.3, 0.02)["closing_link"] == pytest.approx(
-        {"lower_mm": 0.28, "upper_mm": 0.32}
-    )
+    assert STUDY.chain_table(found, 0.3, 0.02)["closing_link"] == pytest.approx({"lower_mm": 0.28, "upper_mm": 0.32})
     with pytest.raises(InputError, match="chain pocket: half_width_mm: missing"):
-        chain_table(found, EXAMPLES, 0.3)
+        STUDY.chain_table(found, 0.3)
     beside = StudyChain(name="guide", factor="g", half_width_mm=0.02, file="bearing_chains.toml")
-    table = chain_table(beside, EXAMPLES, 0.15)
+    table = STUDY.chain_table(beside, 0.15)
     assert [each["name"] for each in table["link"]] == ["guide_land", "cage_outside"]
     assert table["closing_link"] == pytest.approx({"lower_mm": 0.13, "upper_mm": 0.17})
 

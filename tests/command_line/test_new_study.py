@@ -7,11 +7,13 @@ import tomllib
 
 import pytest
 from doe_command import doe
+from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
 from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
-from doe.study_file.sections import StudyChain, chain_table
+from doe.study_file import Study
+from doe.study_file.sections import StudyChain
 from doe.workflow.parts import clearance_parts
 from rbdyn.base.faults import InputError
 from rbdyn.properties.tolerances import grade_tolerances
@@ -101,6 +103,7 @@ def test_command_line_chains_resolve_to_the_clearances(scene, names, tmp_path):
     text, study = written(scene, "--chains")
     assert [chain["name"] for chain in study["chain"]] == names and "tolerances" not in study
     drawn = Scene.load(scene)
+    loaded = Study.load(EXAMPLES / "clearance_study.toml")
     clearances = {
         "radial_clearance_mm": drawn.bearing.radial_clearance_mm,
         "guide_clearance_mm": drawn.cage.guide_clearance_mm,
@@ -109,7 +112,7 @@ def test_command_line_chains_resolve_to_the_clearances(scene, names, tmp_path):
     for chain in study["chain"]:
         closed = sum(link["coefficient"] * link["nominal_mm"] for link in chain["link"])
         assert closed == pytest.approx(clearances[chain["factor"]], abs=1e-9)
-        table = chain_table(StudyChain(**chain), tmp_path, clearances[chain["factor"]])
+        table = loaded.chain_table(StudyChain(**chain), clearances[chain["factor"]])
         solved = solve(chain_from(table, "study"), samples=2000)
         grades = {part.grade for part in solved.allocation if part.grade}
         assert len(grades) == 1 and f"# {grades.pop()} (ISO 286-1): " in text
