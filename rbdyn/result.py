@@ -5,7 +5,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, derived, json_fields
+from rbdyn.base.table import Column, Sheet, each
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
@@ -71,13 +72,66 @@ def full_status(result: Any) -> str:
     return f"{result.status}: {reason}" if reason and result.status != "ok" else str(result.status)
 
 
-def figure_columns(figures: Mapping[str, Quantity]) -> dict[str, float | None]:
-    """Cells of a row of a table: each figure with its two errors."""
-    columns: dict[str, float | None] = {}
-    for name, figure in figures.items():
-        columns[name] = figure.value
-        columns |= {f"{name}_{kind}": getattr(figure, kind) for kind in ("statistical_error", "numerical_error")}
-    return columns
+# What the manual says of columns of figures.
+OF_FIGURE: dict[str, Any] = {"unit": "of the figure", "screen": False}
+HALF_WIDTHS = "half widths of the 95 % intervals"
+
+
+def figure_columns(names: Iterable[str]) -> tuple[Column[Any], ...]:
+    """Columns of files with each figure and its two errors, of rows that have ``figures`` by name."""
+    value = Column[Any](
+        "{}",
+        at=("figures", "{}", "value"),
+        meaning="each figure of the bearing, and of its parts: power terms, operating "
+        "clearances, contact pressures and films",
+        **OF_FIGURE,
+    )
+    errors = (
+        Column[Any](f"{{}}_{kind}", at=("figures", "{}", kind), meaning=HALF_WIDTHS, **OF_FIGURE)
+        for kind in ("statistical_error", "numerical_error")
+    )
+    return each(names, value, *errors)
+
+
+def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]:
+    """A row a figure by its name, or its words."""
+
+    def error(kind: str) -> Column[tuple[str, Quantity]]:
+        return Column(
+            f"{kind}_error",
+            error_alone,
+            f"{kind} error (95 %)",
+            "of the figure",
+            HALF_WIDTHS,
+            at=lambda row: getattr(row[1], f"{kind}_error"),
+            missing="not estimated",
+        )
+
+    columns: tuple[Column[tuple[str, Quantity]], ...] = (
+        Column("figure", at=lambda row: row[0], meaning="name of the figure, its unit at the end"),
+        Column(
+            "value",
+            unit="of the figure",
+            at=lambda row: row[1].value,
+            cell=lambda row: row[1].value_text,
+            meaning="mean over all turns and replicates",
+        ),
+        error("statistical"),
+        error("numerical"),
+        Column(
+            "effective_samples",
+            screen=False,
+            at=lambda row: row[1].effective_samples,
+            meaning="independent samples behind the statistical error",
+        ),
+        Column(
+            "degrees_of_freedom",
+            screen=False,
+            at=lambda row: row[1].degrees_of_freedom,
+            meaning="those of Student's t in the statistical error",
+        ),
+    )
+    return Sheet("", columns, tuple(figures.items()), file="figures.csv", content="A row a figure of `rbdyn simulate`.")
 
 
 class SavedRecord(Record):
@@ -204,10 +258,7 @@ class SimulationResult(Brief, SavedRecord):
 
     def table(self) -> "pd.DataFrame":
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
-        import pandas as pd
-
-        rows = {key: figure.as_dict() for key, figure in self.quantities.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
+        return figure_sheet(self.quantities).frame.set_index("figure").astype(float)
 
 
 def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[str, Any]], Saved]) -> Saved:

@@ -121,6 +121,11 @@ def columns_of(kind: type[R]) -> tuple[Column[R], ...]:
     )
 
 
+def each(names: Iterable[str], *columns: Column[R]) -> tuple[Column[R], ...]:
+    """The columns of every name in its turn, see ``Column.of``."""
+    return tuple(column for name in names for template in columns for column in template.of((name,)))
+
+
 @dataclass(frozen=True)
 class Sheet(Generic[R]):
     """A table of rows by its columns.

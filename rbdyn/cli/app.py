@@ -13,7 +13,6 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
-from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
 from rbdyn.cli.ball import ball
@@ -218,26 +217,28 @@ def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     spent = f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}"
-    answer = [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks() if duty else [])]
+    answer = [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks if duty else [])]
     return with_notes((*mapped.notes, *(duty.notes if duty else ())), answer)
 
 
 def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png, with a duty also duty.csv; returns the file names."""
+    from rbdyn.dynamics.slip_map import map_sheet
+    from rbdyn.life.duty import life_sheet
     from rbdyn.plots.roller import draw_slip_map
     from rbdyn.result import write_json
 
     write_json(folder / "map.json", _map_record(mapped, duty))
-    save_table(mapped.table(), folder / "map.csv")
+    map_sheet(mapped.points).save(folder)
     draw_slip_map(mapped, folder / "map.png", duty.marks if duty else {})
     if duty is None:
         return ["map.json", "map.csv", "map.png"]
-    save_table(duty.table(), folder / "duty.csv")
+    life_sheet(duty.points).save(folder)
     return ["map.json", "map.csv", "duty.csv", "map.png"]
 
 
 def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
-    return mapped.as_dict() | ({} if duty is None else {"duty": duty.as_record()})
+    return mapped.as_dict() | ({} if duty is None else {"duty": duty.as_dict()})
 
 
 @app.command("map")

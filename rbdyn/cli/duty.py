@@ -4,24 +4,21 @@ Both show its points with speed and load, and the life there and over the duty.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rbdyn.base.blocks import Block, Paragraph, Table, with_notes
 from rbdyn.base.faults import key_path
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import finite, plain, save_table
+from rbdyn.base.records import Record, finite
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import quantity, shown, with_error
-from rbdyn.life.duty import life_notes
+from rbdyn.life.duty import PointLife, life_notes, life_sheet
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from rbdyn.dynamics.duty_simulation import DutySimulation, SimulatedPoint, Worst
-    from rbdyn.life.duty import DutyLife
     from rbdyn.result import Quantity
 
 # Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
@@ -36,67 +33,27 @@ CLEARANCES = {name: (f"{name}_operating_clearance_um", 1.0) for name in ("radial
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 
 
-@dataclass(frozen=True)
-class MapDuty:
-    """Points of a duty with the scene at each, the life over it, and notes on what a map does not show of it."""
+class MapDuty(Record):
+    """Points of a duty, the life over it, and notes on what a map does not show of it."""
 
-    points: Sequence[DutyPoint]
-    scenes: Sequence[Scene]
-    life: "DutyLife"
+    points: tuple[PointLife, ...]
+    life: dict[str, float | None]
     notes: Notes
 
     @property
     def marks(self) -> dict[str, tuple[float, float]]:
         """Speed [rpm] and load [N] by the name of the point."""
-        return {point.name: _place(scene) for point, scene in zip(self.points, self.scenes, strict=True)}
+        return {point.name: (point.inner_speed_rpm, point.radial_load_N) for point in self.points}
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """A row a point: share of the time, place on the map, life there, share of the damage."""
-        times = zip(self.points, shares_of_time(self.points), strict=True)
-        lives = zip(self.life.point_hours, self.life.damage, strict=True)
-        return [
-            {
-                "name": point.name,
-                "share": share,
-                "inner_speed_rpm": speed,
-                "radial_load_N": load,
-                "L10_h": finite(hours),
-                "damage_share": damage,
-            }
-            for (point, share), (speed, load), (hours, damage) in zip(times, self.marks.values(), lives, strict=True)
-        ]
-
-    def as_record(self) -> dict[str, Any]:
-        """JSON of the duty."""
-        return {"points": self.rows, "life": self.life.as_record(), "notes": plain(self.notes)}
-
-    def table(self) -> "pd.DataFrame":
-        """A row a point; units in the names."""
-        import pandas as pd
-
-        return pd.DataFrame(self.rows)
-
     def blocks(self) -> list[Block]:
         """The points with their lives, and the life over the duty."""
-        return duty_blocks(self.rows, self.life.as_record())
+        return duty_blocks(self.points, self.life)
 
 
-def duty_blocks(points: Sequence[Mapping[str, Any]], life: Mapping[str, float | None]) -> list[Block]:
+def duty_blocks(points: "Sequence[PointLife | SimulatedPoint]", life: Mapping[str, float | None]) -> list[Block]:
     """Table of points with name, share, speed, load, life and share of the damage, and the life over the duty."""
-    header = ("point", "share of time", "speed [rpm]", "load [N]", "life [h]", "share of damage")
-    rows = [
-        (
-            row["name"],
-            f"{100.0 * row['share']:.4g} %",
-            f"{row['inner_speed_rpm']:g}",
-            f"{row['radial_load_N']:g}",
-            shown(row["L10_h"], 3),
-            "" if row["damage_share"] is None else f"{100.0 * row['damage_share']:.3g} %",
-        )
-        for row in points
-    ]
-    return [Table("Duty", header, rows), Paragraph(life_sentence(life))]
+    return [life_sheet(points).block, Paragraph(life_sentence(life))]
 
 
 def life_sentence(life: Mapping[str, float | None]) -> str:
@@ -117,14 +74,21 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
     from rbdyn.dynamics.duty import roller_duty_life
     from rbdyn.dynamics.simulate import steady_scene
 
-    points = read_duty(path)
-    scenes = [steady_scene(hot) for hot in duty_scenes(scene, points, str(path))]
-    life = roller_duty_life(scenes, shares_of_time(points))
-    notes = (
-        *life_notes(life.hours, sum(point.share for point in points)),
-        *_notes(points, scenes, speeds_rpm, loads_N),
+    stated = read_duty(path)
+    scenes = [steady_scene(hot) for hot in duty_scenes(scene, stated, str(path))]
+    shares = shares_of_time(stated)
+    life = roller_duty_life(scenes, shares)
+    points = tuple(
+        PointLife(point.name, share, *_place(scene), finite(hours), damage)
+        for point, share, scene, hours, damage in zip(
+            stated, shares, scenes, life.point_hours, life.damage, strict=True
+        )
     )
-    return MapDuty(points, scenes, life, notes)
+    notes = (
+        *life_notes(life.hours, sum(point.share for point in stated)),
+        *_notes(stated, scenes, speeds_rpm, loads_N),
+    )
+    return MapDuty(points, life.as_record(), notes)
 
 
 def _notes(
@@ -159,20 +123,21 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
-        *duty_blocks([point.as_dict() for point in found.points], found.life or {}),
+        *duty_blocks(found.points, found.life or {}),
         Paragraph("" if found.life else f"Life over the duty: unknown, for there is none at {', '.join(lifeless)}."),
     ]
     return with_notes(found.notes, blocks)
 
 
-def _point_table(caption: str, found: "DutySimulation", columns: Mapping[str, tuple[str, float]]) -> Table:
-    """A row a point that has figures; ``columns``: figure and factor by heading."""
-    rows = [
-        (_marked(point), *(_with_error(point.figures.get(name), factor) for name, factor in columns.values()))
-        for point in found.points
-        if point.figures
-    ]
-    return Table(caption, ("point", *columns), rows).without_empty_columns()
+def _point_table(caption: str, found: "DutySimulation", figures: Mapping[str, tuple[str, float]]) -> Table:
+    """A row a point that has figures; ``figures``: name and factor by heading."""
+
+    def column(heading: str, name: str, factor: float) -> "Column[SimulatedPoint]":
+        return Column(name, words=heading, cell=lambda point: _with_error(point.figures.get(name), factor))
+
+    point_name: Column[SimulatedPoint] = Column("name", words="point", cell=_marked)
+    columns = [point_name, *(column(heading, *figure) for heading, figure in figures.items())]
+    return Sheet(caption, columns, [point for point in found.points if point.figures]).block.without_empty_columns()
 
 
 def _marked(point: "SimulatedPoint") -> str:
@@ -197,5 +162,4 @@ def _worst(name: str, worst: "Worst") -> str:
 def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
     """Write duty.json and points.csv; returns their names."""
     found.save(folder / "duty.json")
-    save_table(found.table(), folder / "points.csv", "%.8g")
-    return ["duty.json", "points.csv"]
+    return ["duty.json", found.sheet.save(folder, "%.8g")]

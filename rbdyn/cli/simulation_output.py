@@ -7,7 +7,7 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
 from rbdyn.dynamics.figure_names import POWERS
-from rbdyn.result import SimulationResult
+from rbdyn.result import SimulationResult, figure_sheet
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
         Verdict(result.notes),
-        _table(figures),
+        figure_sheet(figures).block,
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *_temperatures(result),
@@ -52,7 +52,7 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     from rbdyn.dynamics.motion import history, most_turns
 
     result.save(folder / "result.json")
-    save_table(result.table().reset_index(), folder / "figures.csv", "%.8g")
+    figure_sheet(result.quantities).save(folder, "%.8g")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
     motion = history(scene, turns, notice=None)
     save_table(motion.table(), folder / "history.csv", "%.6g")
@@ -76,15 +76,6 @@ def _figures(result: SimulationResult) -> "dict[str, Quantity]":
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
     }
-
-
-def _table(figures: "dict[str, Quantity]") -> Table:
-    header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)")
-    rows = [
-        (words, figure.value_text, _error(figure.statistical_error), _error(figure.numerical_error))
-        for words, figure in figures.items()
-    ]
-    return Table("", header, rows)
 
 
 def _error(error: float | None) -> str:

@@ -4,7 +4,7 @@ A point that cannot go on is a record with the reason, and the others go on.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +13,12 @@ from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes
+from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
@@ -78,12 +79,24 @@ class DutySimulation(SavedRecord, kw_only=True):
         """Points without figures that hold."""
         return [point for point in self.points if point.status != "ok"]
 
-    def table(self) -> "pd.DataFrame":
+    @property
+    def sheet(self) -> Sheet[SimulatedPoint]:
         """A row a point; figures with their 95 % errors, units in the names."""
-        import pandas as pd
+        return points_sheet(self.points, dict.fromkeys(name for point in self.points for name in point.figures))
 
-        rows = [{**point.as_dict(), **figure_columns(point.figures)} for point in self.points]
-        return pd.DataFrame(rows).drop(columns="figures")
+    def table(self) -> "pd.DataFrame":
+        """The sheet for pandas."""
+        return self.sheet.frame
+
+
+def points_sheet(points: Sequence[SimulatedPoint], figures: Iterable[str]) -> Sheet[SimulatedPoint]:
+    """A row a point, with its ``figures``."""
+    status: Column[Any] = Column("status", meaning="ok, or why the point failed")
+    place, life = (life_sheet(points).columns[part] for part in (slice(4), slice(4, None)))
+    columns = (*place, status, *life, *figure_columns(figures))
+    return Sheet(
+        "", columns, points, file="points.csv", content="A row a point of the duty, of `rbdyn simulate --duty`."
+    )
 
 
 def simulate_duty(

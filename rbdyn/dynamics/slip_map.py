@@ -6,7 +6,7 @@ cause, and the others go on. A file may keep finished points, so that an interru
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -18,6 +18,7 @@ from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
 from rbdyn.base.storage import Checkpoint, code_version, run_key
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
@@ -50,6 +51,18 @@ class Point(Record):
     figures: dict[str, Quantity] = spread()
     power_gap: float | None = keyed("power_balance", "relative_gap")
     notes: Notes | None = None
+
+
+def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Point]:
+    """A row a point, with its ``figures`` and their errors."""
+    columns: tuple[Column[Point], ...] = (
+        Column("inner_speed_rpm", meaning="operating point"),
+        Column("radial_load_N"),
+        *figure_columns(figures or dict.fromkeys(name for point in points for name in point.figures)),
+        Column("power_gap", meaning="share of the power that the balance does not account for"),
+        Column("status", meaning="ok, or why the point failed"),
+    )
+    return Sheet("", columns, points, file="map.csv", content="A row a speed and load of `rbdyn map`.")
 
 
 class SlipMap(Record):
@@ -85,13 +98,7 @@ class SlipMap(Record):
 
     def table(self) -> "pd.DataFrame":
         """A row a point; figures with their 95 % errors."""
-        import pandas as pd
-
-        rows = []
-        for point in self.points:
-            place: dict[str, Any] = {"inner_speed_rpm": point.inner_speed_rpm, "radial_load_N": point.radial_load_N}
-            rows.append(place | figure_columns(point.figures) | {"power_gap": point.power_gap, "status": point.status})
-        return pd.DataFrame(rows)
+        return map_sheet(self.points).frame
 
     def grid(self, figure: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Values of a figure, shape (loads, speeds); NaN where a point failed."""

@@ -9,10 +9,12 @@ P_m gives the same damage wherever each life is (C/P_i)^p.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import finite
+from rbdyn.base.records import Record, finite, shown
+from rbdyn.base.table import Sheet, columns_of
 from rbdyn.life import Life
 
 BALL_EXPONENT, ROLLER_EXPONENT = 3.0, 10.0 / 3.0
@@ -58,6 +60,37 @@ class DutyLife:
             "L10_Mrev": finite(self.million_turns),
             "equivalent_load_N": finite(self.equivalent_load),
         }
+
+
+class PointLife(Record):
+    """A point of a duty: share of the time, speed and load, life of ISO/TS 16281 there and share of the damage over the duty.
+
+    The life is None where it has no end or is unknown.
+    """
+
+    name: str = shown("point", meaning="point, and its share of the time")
+    share: float = shown("share of time", ".4g %")
+    inner_speed_rpm: float = shown("speed [rpm]", "g", meaning="speed and load of the point")
+    radial_load_N: float = shown("load [N]", "g")  # noqa: N815
+    L10_h: float | None = shown(
+        "life [h]",
+        3,
+        meaning="life by ISO/TS 16281 if the machine ran at this point alone, by static loads at the operating clearance",
+    )
+    damage_share: float | None = shown(
+        "share of damage", ".3g %", meaning="share of the damage that the point does (Palmgren and Miner)"
+    )
+
+
+def life_sheet(points: Sequence[Any]) -> Sheet[Any]:
+    """Points of a duty with their lives."""
+    return Sheet(
+        "Duty",
+        columns_of(PointLife),
+        points,
+        file="duty.csv",
+        content="A row a point of the duty, of `rbdyn map --duty`.",
+    )
 
 
 def equivalent_load(cases: Sequence[LoadCase], exponent: float) -> float:

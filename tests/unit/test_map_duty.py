@@ -17,7 +17,7 @@ from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import FIGURES, Point, SlipMap
 from rbdyn.life.duty import life_notes
 from rbdyn.result import Quantity
-from rbdyn.scene.duty import read_duty
+from rbdyn.scene.duty import duty_scenes, read_duty
 
 SPEEDS, LOADS = (6000.0, 12000.0, 24000.0), (150.0, 1300.0)
 DUTY = """
@@ -55,11 +55,11 @@ def mapped() -> SlipMap:
 def test_unit_points_have_their_lives_and_notes(outer, path):
     """Unit: speed, load and life of each point from its scene; off the map and other keys are noted."""
     duty = map_duty(outer, path, SPEEDS, LOADS)
-    assert [row["name"] for row in duty.rows] == ["idle", "cruise", "take-off"]
+    assert [point.name for point in duty.points] == ["idle", "cruise", "take-off"]
     assert duty.marks == {"idle": (6000.0, 150.0), "cruise": (18000.0, 725.0), "take-off": (30000.0, 1300.0)}
-    for row, scene in zip(duty.rows, duty.scenes, strict=True):
-        assert row["L10_h"] == static_life(scene).hours(*scene.operation.speeds)
-    assert sum(row["damage_share"] for row in duty.rows) == pytest.approx(1.0)
+    for point, scene in zip(duty.points, duty_scenes(outer, read_duty(path), "duty"), strict=True):
+        assert point.L10_h == static_life(scene).hours(*scene.operation.speeds)
+    assert sum(point.damage_share for point in duty.points) == pytest.approx(1.0)
     assert duty.notes == (
         "duty 'cruise': sets lubricant.temperature_C too, which the map keeps at the scene's values",
         "duty 'take-off': 30000 rpm and 1300 N are off the map, so its mark is at the edge; widen --speed or --load",
@@ -76,10 +76,10 @@ def test_unit_map_files_with_a_duty(outer, path, mapped, tmp_path, drawn):
     with_duty = json.loads((tmp_path / "map.json").read_text())
     # Columns 0, 1.5 and 2 of the cells, the last at the edge; rows 0, 0.5 and 1.
     assert {0.0, 1.5, 2.0, 0.5, 1.0} <= set(np.round(drawn["map.png"], 9).tolist())
-    assert (tmp_path / "duty.csv").read_text().splitlines()[0] == ",".join(duty.rows[0])
+    assert (tmp_path / "duty.csv").read_text().splitlines()[0] == ",".join(duty.points[0].as_dict())
     assert write(mapped, None, tmp_path) == ["map.json", "map.csv", "map.png"]
     without = json.loads((tmp_path / "map.json").read_text())
-    assert with_duty.pop("duty") == json.loads(json.dumps(duty.as_record())) and with_duty == without
+    assert with_duty.pop("duty") == json.loads(json.dumps(duty.as_dict())) and with_duty == without
 
 
 def test_unit_blocks_state_the_life_over_the_duty(outer, path, mapped):
@@ -87,7 +87,7 @@ def test_unit_blocks_state_the_life_over_the_duty(outer, path, mapped):
     duty = map_duty(outer, path, SPEEDS, LOADS)
     text = terminal_text(map_blocks(mapped, duty), width=200)
     assert "take-off" in text and "share of damage" in text
-    assert f"{duty.life.equivalent_load:.1f} N" in text and "Life over the duty, L10r" in text
+    assert f"{duty.life['equivalent_load_N']:.1f} N" in text and "Life over the duty, L10r" in text
 
 
 @pytest.mark.parametrize(
@@ -122,9 +122,9 @@ def test_unit_shares_are_normalised_on_request(outer, tmp_path):
         hours = hours.replace(f"share = {share}\n", f"share = {float(share) * 2000.0}\n")
     (tmp_path / "hours.toml").write_text(f"normalise_shares = true\n{hours}")
     of_hours, of_shares = (map_duty(outer, tmp_path / f"{name}.toml", SPEEDS, LOADS) for name in ("hours", "shares"))
-    assert of_hours.life.hours == pytest.approx(of_shares.life.hours)
+    assert of_hours.life["L10_h"] == pytest.approx(of_shares.life["L10_h"])
     assert [point.share for point in read_duty(tmp_path / "hours.toml")] == [500.0, 1400.0, 100.0]
-    assert [row["share"] for row in of_hours.rows] == pytest.approx([0.25, 0.7, 0.05])
+    assert [point.share for point in of_hours.points] == pytest.approx([0.25, 0.7, 0.05])
 
 
 def test_command_map_refuses_a_bad_duty(command, tmp_path):
