@@ -9,15 +9,12 @@ with Loading():
     from doe.commands.study import status, study
     from doe.commands.unknown import calibrate, uncertainty
     from rbdyn.base import streams
-    from rbdyn.base.command import Program, Version, refusing
+    from rbdyn.base.command import Program, Version
 
 app = Program()
 
-for command in (new, status, design, fit, chain, uncertainty, calibrate, keys):
+for command in (new, status, design, fit, chain, uncertainty, calibrate, keys, study, front):
     app.command()(command)
-former = refusing({"--direct": "run python examples/benchmarks/direct_front.py STUDY.toml --out DIR"})
-app.command(cls=former)(study)
-app.command(cls=former)(front)
 
 
 @app.callback()

@@ -40,10 +40,6 @@ from rbdyn.base.tables.workbook import split_path
 from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
-FORMER_TABLE = (
-    "[direct] is no table any more; take it out and run python examples/benchmarks/direct_front.py STUDY.toml"
-)
-
 MOST_FACTORS = 8
 REPLICATES = ("numerics", "replicates")
 
@@ -315,13 +311,7 @@ class Study:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
         data = read_toml(path)
-        faults = [f"{path}: {FORMER_TABLE}"] if data.pop("direct", None) is not None else []
-        try:
-            file = validated(StudyFile, data, str(path))
-        except InputError as error:
-            raise InputError([*faults, *error.faults]) from None
-        refuse(faults)
-        return cls(path, file)
+        return cls(path, validated(StudyFile, data, str(path)))
 
     @property
     def scene(self) -> SceneFile:

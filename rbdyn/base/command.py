@@ -237,21 +237,6 @@ class Program(typer.Typer):
         return super().command(name, cls=cls, **options)
 
 
-def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
-    """A class of command, for ``cls``, that refuses ``former`` options and names the replacement of each."""
-
-    class Refusing(Command):
-        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            """Refuse former options before any other."""
-            option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
-            if option is not None:
-                with guarded("--json" in args):
-                    raise InputError([f"{option}: this option was removed; {former[option]}"])
-            return super().parse_args(ctx, args)
-
-    return Refusing
-
-
 def folder_option(says: str, default: str = "nothing is written") -> Any:
     """``--out`` of a command whose files differ from those of ``Out``."""
     return valued("DIR", says, default, "--out")

@@ -48,25 +48,6 @@ SHOW_FILES = (
 
 app = command.Program()
 
-# Former options of ``rbdyn accuracy``, and what replaces them.
-SCRIPT = "run python examples/benchmarks/{}"
-FORMER = {
-    **{
-        f"--{name}": f"write rbdyn accuracy SCENE.toml {name}"
-        for name in ("methods", "coverage", "options", "stability")
-    },
-    "--slices": SCRIPT.format("slicing.py SCENE.toml"),
-    "--replicates": SCRIPT.format("replication.py SCENE.toml"),
-    "--scaling": SCRIPT.format("scaling.py SCENE.toml"),
-    "--battery": SCRIPT.format("ball_battery.py SCENE.toml"),
-    "--scenes": SCRIPT.format("ball_battery.py SCENE.toml --scenes N"),
-    "--page": SCRIPT.format("measured_page.py FILE"),
-    "--part": SCRIPT.format("measured_page.py FILE --part NAME"),
-    "--repeats": "rbdyn accuracy SCENE.toml coverage makes 200 repeats",
-    "--trajectory": "rbdyn accuracy SCENE.toml tolerances compares motions over 0.25 turns",
-    "--sought-percent": "rbdyn accuracy SCENE.toml tolerances judges biases of 1 %",
-}
-
 app.command()(ball)
 app.command()(compare)
 app.command("keys")(describe_keys)
@@ -173,7 +154,7 @@ def _over_duty(
     return command.FAILED if found.failed else 0
 
 
-@app.command(cls=command.refusing(FORMER))
+@app.command()
 def accuracy(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
     study: Annotated[
@@ -333,7 +314,6 @@ def show(
     turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, command.flag("--animate", says="Also a moving picture and a player.")] = False,
-    lyapunov: Annotated[bool, command.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: Annotated[bool, command.verbose_flag("Also peaks of the spectra.")] = False,
@@ -347,9 +327,7 @@ def show(
         folder.claim(request.path)
         with command.progress_bar("showing", quiet or as_json) as progress:
             notice = command.notice(quiet or as_json)
-            record = folder.write(
-                lambda stage: motion_output.write(request, stage, animate, lyapunov, progress, notice)
-            )
+            record = folder.write(lambda stage: motion_output.write(request, stage, animate, progress, notice))
         command.hand_over(
             lambda: record,
             as_json,

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.orbit/2"
 SHOWN_TURNS = 20.0
-LYAPUNOV_TURNS = 100.0
 # Fewer samples show no motion.
 FEWEST_SAMPLES = 32
 PEAKS = 5
@@ -82,12 +81,7 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
 
 
 def write(
-    request: Request,
-    folder: Path,
-    animate: bool,
-    lyapunov: bool,
-    progress: Callable[[int, int], None],
-    notice: "Notice" = None,
+    request: Request, folder: Path, animate: bool, progress: Callable[[int, int], None], notice: "Notice" = None
 ) -> dict[str, Any]:
     """Compute the motion, write everything into ``folder``; returns the record that is also in orbit.json."""
     from rbdyn.dynamics.motion import history
@@ -97,7 +91,7 @@ def write(
         "history.csv": partial(save_table, motion.table(), float_format="%.6g"),
         **_pictures(request, motion),
     }
-    steps = 1 + len(tasks) + animate + lyapunov
+    steps = 1 + len(tasks) + animate
     files: list[str] = []
     for step, (name, make) in enumerate(tasks.items(), 1):
         progress(step, steps)
@@ -111,12 +105,6 @@ def write(
         files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
         (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
     record = {**_record(request, motion), "notes": plain(request.notes), "versions": versions()}
-    if lyapunov:
-        from rbdyn.dynamics.motion import lyapunov_exponent
-
-        progress(steps - 1, steps)
-        turns = min(LYAPUNOV_TURNS, request.scene.numerics.turns)
-        record["lyapunov"] = lyapunov_exponent(request.scene, turns, request.replicate).as_dict()
     record["files"] = ["orbit.json", *files]
     write_json(folder / "orbit.json", record)
     progress(steps, steps)
@@ -229,12 +217,6 @@ def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:
     if life["L10_h"] is not None:
         hours = f"{shown(life['L10_h'], 3)} h, {shown(life['L10_Mrev'], 3)} million turns"
         rows.append(("reference life L10 of these loads", hours))
-    if "lyapunov" in record:
-        chaos = record["lyapunov"]
-        width = chaos["per_turn_half_width"]
-        error = " error not estimated" if width is None else " (95 %)"
-        words = f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns"
-        rows.append((words, f"{with_error(chaos['per_turn'], width)}{error}"))
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Motion of one replicate over time, on request: its history, what that shows of cage and contacts, and how chaotic it is.
+"""Motion of one replicate over time, on request: its history, and what that shows of cage and contacts.
 
 A history has every motion, and load, slip and heat of every contact, at uniform samples; SI throughout. It gives the rating
 life of the bearing by the loads of every roller (ISO/TS 16281) instead of static ones.
@@ -6,14 +6,9 @@ life of the bearing by the loads of every roller (ISO/TS 16281) instead of stati
 Whirl, sections, spectra, loads and sliding are functions of a history. They work on its samples and show nothing faster
 than half the sampling rate. Their largest forces are those of this replicate at the samples; a result keeps those of every
 step.
-
-The largest Lyapunov exponent is the rate at which two runs with almost the same start separate; positive means chaos. It
-follows two trajectories with repeated renormalisation (Benettin, Galgani, Giorgilli and Strelcyn 1980). The second starts a
-small separation away. Every tenth of a turn its growth is noted, and the separation is reset to its first size.
 """
 
 import math
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,16 +19,13 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.base.pace import Notice
-from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import Brief, Figure
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.ensemble import Pace, Stop, log
 from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads
-from rbdyn.dynamics.integrators.advance import DERIVATIVES
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing, rolling_contacts
-from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of
-from rbdyn.dynamics.run import Run, with_numerics
-from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.dynamics.run import Run
 from rbdyn.life import turning_rings
 from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.scene import Scene, rollers_only
@@ -426,91 +418,3 @@ def largest(history: History, loads: Array) -> Largest:
             force -= 0.25 * (before - after) * shift
             time += shift * float(history.time[1] - history.time[0])
     return Largest(force, time, int(roller) if loads.ndim == 2 else None)
-
-
-RENORMALISE_TURNS = 0.1
-# In the norm of the error control: lengths in approaches of a race contact (about a micrometre), speeds likewise.
-SEPARATION = 1e-3
-# Per step and in the same norm: the errors of some hundred steps, after a little growth, stay below the separation.
-RTOL = 1e-7
-# Turns in which the separation turns into the direction of fastest growth; they do not count.
-ALIGN_TURNS = 3.0
-# The interval comes from the scatter of blocks, none shorter than a turn: longer than the memory of the growth.
-BLOCKS, SHORTEST_BLOCK_TURNS = 20, 1.0
-
-
-class LyapunovExponent(Record):
-    """Largest exponent [1/s] and a shaft turn, with the half-widths of their 95 % intervals, None where there is one block.
-
-    ``blocks``: exponents of the parts of the run [1/s], (blocks,); ``separation``, ``rtol``: in the norm of the errors.
-    """
-
-    per_second: float
-    half_width: float | None = keyed("per_second_half_width")
-    per_turn: float = derived(lambda self: self.per_second * self.turn_s)
-    per_turn_half_width: float | None = derived(
-        lambda self: None if self.half_width is None else self.half_width * self.turn_s
-    )
-    turns: float
-    separation: float
-    rtol: float
-    cost: dict[str, float]
-    turn_s: float = outside_json()
-    blocks: Array = outside_json()
-
-
-def lyapunov_exponent(
-    scene: Scene, turns: float = 100.0, replicate: int = 0, separation: float = SEPARATION, rtol: float = RTOL
-) -> LyapunovExponent:
-    """Largest Lyapunov exponent over ``turns`` counted shaft turns, after the discarded ones. Raises RunError.
-
-    ``separation`` and ``rtol`` are fractions of the same error scales; the exponent does not depend on them as long as
-    rtol << separation << 1 (a ratio of 1e-4; at 1e-2 the errors of the integrator part the runs, not the motion). The
-    half-width is Student's t over blocks of a twentieth of the turns; None for less than two turns.
-    """
-    started = time.perf_counter()
-    scene = with_numerics(scene, turns=turns + ALIGN_TURNS)
-    bearing, stop = roller_bearing(scene), Stop()
-    leader = Run(scene, bearing, replicate, rtol, stop)
-    follower = Run(scene, bearing, replicate, rtol, stop)
-    begin = scene.numerics.warm_up_turns
-    follower.choose_method()
-    leader.to(begin)
-    follower.carry.clock[:] = leader.carry.clock
-    # The clock of a scene that depends on time has no scale, and both runs share it.
-    weight = 1.0 / absolute_tolerance(scene, bearing, 1.0)
-    draw = np.random.default_rng(np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate, 1)))
-    apart = np.where(weight > 0.0, draw.standard_normal(weight.size), 0.0)
-    apart[weight > 0.0] /= weight[weight > 0.0]
-    derivatives = int(leader.carry.counts[DERIVATIVES])
-    intervals = round((turns + ALIGN_TURNS) / RENORMALISE_TURNS)
-    growth = np.empty(intervals)
-    for index in range(intervals):
-        # Back to the size of the separation, in the direction in which the runs parted.
-        apart *= separation / _norm(apart, weight)
-        follower.carry.y[:] = leader.carry.y + apart
-        # The first stage is that of the new state.
-        leader.carry.counts[DERIVATIVES] = follower.carry.counts[DERIVATIVES] = 0
-        until = begin + (index + 1) * RENORMALISE_TURNS
-        for run in (leader, follower):
-            run.to(until)
-            derivatives += int(run.carry.counts[DERIVATIVES])
-        apart = np.where(weight > 0.0, follower.carry.y - leader.carry.y, 0.0)
-        growth[index] = math.log(_norm(apart, weight) / separation)
-    counted = growth[round(ALIGN_TURNS / RENORMALISE_TURNS) :] / (RENORMALISE_TURNS * scene.turn_s)
-    count = max(min(BLOCKS, int(turns / SHORTEST_BLOCK_TURNS)), 1)
-    blocks = np.array([part.mean() for part in np.array_split(counted, count)])
-    return LyapunovExponent(
-        per_second=float(counted.mean()),
-        half_width=student_half_width(blocks),
-        turn_s=scene.turn_s,
-        blocks=blocks,
-        turns=turns,
-        separation=separation,
-        rtol=rtol,
-        cost={"wall_s": time.perf_counter() - started, "rhs_evaluations": derivatives},
-    )
-
-
-def _norm(difference: Array, weight: Array) -> float:
-    return float(np.linalg.norm(difference * weight))

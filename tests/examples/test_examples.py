@@ -443,3 +443,15 @@ def test_oracle_table_4_agrees_with_itself_alone():
     assert frame["rank"].to_numpy() == pytest.approx(np.tile([1.0, 1.0, -1.0], 3))
     assert frame["signs"].tolist() == [3, 3, 0] * 3
     assert module.told(frame)[-1] == "all three responses together: 1 of 3 input sets"
+
+
+def test_literature_the_cage_moves_chaotically(outer):
+    """Literature: two runs part exponentially, whatever separation and tolerance show it (Benettin et al. 1980)."""
+    lyapunov_exponent = script("lyapunov").lyapunov_exponent
+    found = [
+        lyapunov_exponent(outer, 12.0, separation=separation, rtol=1e-4 * separation) for separation in (1e-3, 1e-4)
+    ]
+    for exponent in found:
+        assert exponent.per_turn - exponent.half_width > 1.0
+    wide, fine = found
+    assert abs(wide.per_turn - fine.per_turn) < wide.half_width + fine.half_width

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 import replication
 import slicing
-from conftest import ROOT, lacking
+from conftest import lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy import methods, tolerances
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.cli.app import FORMER
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.plots.style import SMALLEST_BIAS
 
@@ -142,11 +141,6 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--methods", "--slices"), "--methods: this option was removed; write rbdyn accuracy SCENE.toml methods"),
-        (("--slices",), "run python examples/benchmarks/slicing.py SCENE.toml"),
-        (("--repeats=3", "--coverage"), "--repeats: this option was removed; "),
-        (("--trajectory", "0.5"), "compares motions over 0.25 turns"),
-        (("--page", "x.md"), "run python examples/benchmarks/measured_page.py FILE"),
         (
             ("slices",),
             "slices: is no study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods or ",
@@ -155,19 +149,11 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
     ],
 )
 def test_command_accuracy_refuses(command, words, says):
-    """Command line: one sentence and exit code 2 for studies that cannot be; a former option names what took its place."""
+    """Command line: one sentence and exit code 2 for studies that cannot be."""
     bad = command("accuracy", EXAMPLE, *words, "--json")
     assert bad.returncode == 2 and "Traceback" not in bad.stderr
     (fault,) = json.loads(bad.stdout)["faults"]
     assert says in fault and fault in bad.stderr
-
-
-def test_command_former_options_need_no_scene(command):
-    """Command line: what was asked for without a scene is refused by the same sentence; the scripts named are there."""
-    bad = command("accuracy", "--page", "x.md")
-    assert bad.returncode == 2 and bad.stderr.startswith("--page: this option was removed")
-    named = [words.split()[2] for words in FORMER.values() if words.startswith("run python ")]
-    assert len(named) == 7 and all((ROOT / script).exists() for script in named)
 
 
 def test_unit_package_is_cheap_to_import():

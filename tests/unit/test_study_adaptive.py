@@ -277,17 +277,10 @@ def test_faults_of_categories_and_whole_numbers(tmp_path, old, new, words):
 
 def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
-    for folder, more, words in (
-        (
-            "small",
-            [],
-            "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 6 fresh runs at the end do not fit; give at",
-        ),
-        ("former", ["--direct"], "--direct: this option was removed; run python examples/benchmarks/direct_front.py "),
-    ):
-        path = written(tmp_path / folder, budget=30)
-        ended = doe("study", str(path), "--adaptive", *more, "--out", str(tmp_path / folder / "out"))
-        assert ended.returncode == 2 and words in ended.stderr and ended.stderr.count("\n") == 1
+    path = written(tmp_path / "small", budget=30)
+    ended = doe("study", str(path), "--adaptive", "--out", str(tmp_path / "small" / "out"))
+    words = "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 6 fresh runs at the end do not fit; give at"
+    assert ended.returncode == 2 and words in ended.stderr and ended.stderr.count("\n") == 1
     limit = (
         'name = "power_loss_W"\nmodel = "quadratic"\n',
         'name = "power_loss_W"\nmodel = "quadratic"\nupper = -5.0\n',

@@ -230,11 +230,6 @@ def test_rounding_does_not_leave_the_region(tmp_path):
         ("limit_probability = 0.95", "limit_probability = 0.4", "limit_probability"),
         ("limit_probability = 0.95", "limit_probability = 1.0", "limit_probability"),
         ("tries = 4", "tries = 0", "tries"),
-        (
-            "[tolerances]",
-            "[direct]\nturns = 10\n\n[tolerances]",
-            r"study\.toml: \[direct\] is no table any more; take it out and run",
-        ),
     ],
 )
 def test_bad_settings_are_refused(tmp_path, old, new, words):
