@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
@@ -19,6 +20,7 @@ from rbdyn.base.words import counted, quantity, with_error
 if TYPE_CHECKING:
     from doe.response_surface import Surface
     from doe.study_file import Study
+    from doe.workflow.asked import Asked
 
 
 def notes_record(notes: Notes) -> dict[str, Any]:
@@ -104,7 +106,7 @@ class FitAnswer(Answer):
             for name, fitted in drop_undefined(self.record["responses"]).items()
             for block in fit_blocks(name, fitted, self.factors)
         ]
-        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits, {})], judged=False)
+        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits)], judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
         return fit_rows(self.record["responses"])
@@ -261,14 +263,15 @@ class FrontAnswer(Answer):
     ``asked``: factors and responses of the study.
     """
 
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    asked: "Asked | None" = None
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.front import front_blocks
         from doe.report.sections.record import drop_undefined, readable
 
-        clean = drop_undefined({"asked": self.asked, "front": self.as_dict()})
-        return with_notes(self.record.get("notes", ()), readable(front_blocks(clean), clean))
+        assert self.asked is not None
+        summary = SimpleNamespace(asked=self.asked, front=drop_undefined(self.as_dict()))
+        return with_notes(self.record.get("notes", ()), readable(front_blocks(summary), self.asked))
 
     def rows(self) -> Mapping[str, Rows]:
         picks = {"baseline": self.record["baseline"], **self.record["picks"]}
@@ -318,9 +321,9 @@ def front(
     import numpy as np
 
     from doe.report.identity import study_identity
-    from doe.report.sections.answer import asked_record
     from doe.report.sections.front import front_record, front_tables, given_point_record
     from doe.study_file import Study
+    from doe.workflow.asked import Asked
     from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
 
@@ -344,7 +347,7 @@ def front(
         if values is not None:
             record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
         identity = study_identity("doe front", study, table)
-        answer = FrontAnswer(record, folder, asked=asked_record(study), identity=identity)
+        answer = FrontAnswer(record, folder, asked=Asked.of(study), identity=identity)
         return replace(answer, files=saved(output, "front.json", answer, partial(front_tables, record)))
 
 

@@ -48,6 +48,7 @@ class StudyAnswer(Answer):
 
     def rows(self) -> Mapping[str, Rows]:
         from doe.report.sections.duty import duty_rows
+        from doe.report.summary import restored
 
         record = self.record
         fits = fit_rows(record["fit"]["responses"])
@@ -72,7 +73,7 @@ class StudyAnswer(Answer):
             ],
             "parts": part_rows(record["chains"]),
             **{name: fits[name] for name in ("quality", "anova", "coefficients")},
-            **({"duty": duty_rows(record)} if "duty" in record else {}),
+            **({"duty": duty_rows(restored(record))} if "duty" in record else {}),
         }
 
     def _front(self) -> list[dict[str, Any]]:

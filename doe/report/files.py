@@ -8,17 +8,9 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.duty import main_scene
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
-from doe.report.sections.answer import (
-    asked_record,
-    changes,
-    confirmation_record,
-    first_screen,
-    gains_record,
-    judged_limits_record,
-)
+from doe.report.sections.answer import changes, confirmation_record, first_screen, gains_record, judged_limits_record
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
 from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
@@ -37,8 +29,8 @@ from doe.report.sections.search import (
 from doe.report.sections.unknown import robust_record
 from doe.report.summary import restored
 from doe.running.store import grouped
-from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
+from doe.workflow.asked import Settings
 from doe.workflow.confirmation import statement
 from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import RUNS_TABLE, evaluation
@@ -77,7 +69,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
     if outcome.duty is not None:
-        tables["duty_points.csv"] = duty_rows(record)
+        tables["duty_points.csv"] = duty_rows(restored(record))
     if outcome.robust is not None:
         tables |= robust_tables(record["robust"])
     if outcome.reference_values is not None:
@@ -95,9 +87,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(restored(record), folder / pictures[-1])
-    if outcome.duty is not None and gain_stills(record):
+    if outcome.duty is not None and gain_stills(restored(record)):
         pictures.append("duty_gains.png")
-        plots.duty_gains(record, folder / pictures[-1])
+        plots.duty_gains(restored(record), folder / pictures[-1])
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
     texts = {"report.html": html_report(record, clearance.motion_record(motions)), "answer.txt": answer_text(record)}
@@ -135,7 +127,7 @@ def blocks(record: dict[str, Any]) -> list[Block]:
             *notes(clean, {}).blocks,
             *(replace(block, detail=Detail.ALL) for block in details),
         ],
-        clean,
+        clean.asked,
     )
 
 
@@ -151,7 +143,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "obstacles": outcome.obstacles.as_dict(),
         "tried": outcome.tries,
         "edge": outcome.edge.as_dict(),
-        "asked": settings_record(study),
+        "asked": Settings.of_runs(study).as_dict(),
         "design": study_design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
@@ -220,20 +212,6 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
         "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
         "share": float(pick.shares[pick.row]),
         "next": {"row": rival, "share": float(others[rival])} if others[rival] > 0.0 else None,
-    }
-
-
-def settings_record(study: Study) -> dict[str, Any]:
-    """Scene, factors with their ranges, responses with their goals."""
-    scene = main_scene(clearance.design_scenes(study, study.baseline[None])[0])
-    return {
-        "study_file": study.path.name,
-        "scene_file": study.scene.file,
-        "scene": scene.model_dump(mode="json", exclude_none=True),
-        **asked_record(study),
-        "replicates": scene.numerics.replicates,
-        "turns": scene.numerics.turns,
-        "confirmation_replicates": study.file.confirmation.replicates,
     }
 
 

@@ -18,21 +18,9 @@ from doe.report.sections import answer, bearing, chain, design, duty, fit, front
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import bounds, complete, fronts, picks
-from doe.report.sections.record import (
-    Factor,
-    Record,
-    drop_undefined,
-    factors,
-    fits,
-    is_ratio,
-    notes_of,
-    part,
-    readable,
-    record_table,
-    response_label,
-    responses,
-)
+from doe.report.sections.record import Record, drop_undefined, factors, fits, notes_of, part, readable, record_table
 from doe.report.summary import restored
+from doe.workflow.asked import Factor, Response
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
 from rbdyn.base.page import identity_section, page
@@ -67,15 +55,14 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
     data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
-    opening = "".join(map(html.render, readable([Verdict(notes_of(record))], record)))
+    opening = "".join(map(html.render, readable([Verdict(notes_of(record))], record.asked)))
     return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
 
 
 def title(summary: Record) -> str:
-    """The title of the study, or the name of its file in words."""
-    settings = part(summary, "asked") or {}
-    stem = PurePath(settings.get("study_file") or "clearance study").stem.replace("_", " ")
-    return settings.get("title") or stem[:1].upper() + stem[1:]
+    """The name of the file of the study in words."""
+    stem = PurePath(summary.asked.study_file).stem.replace("_", " ")
+    return stem[:1].upper() + stem[1:]
 
 
 def window_title(summary: Record) -> str:
@@ -87,7 +74,7 @@ def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[S
     """Sections with something to say, of a record without undefined values (``drop_undefined``)."""
     record = restored(summary)
     chapters = [chapter(record, motion or {}) for chapter in CHAPTERS]
-    whole = [replace(section, blocks=readable(section.blocks, record)) for section in chapters if section]
+    whole = [replace(section, blocks=readable(section.blocks, record.asked)) for section in chapters if section]
     return [section for section in whole if section.blocks]
 
 
@@ -120,11 +107,11 @@ def _json(record: Mapping[str, Any]) -> str:
 def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     """Factors, surfaces, runs, fronts and motion, ready for JSON."""
     inputs = factors(summary)
-    names = [response["name"] for response in responses(summary)]
+    names = summary.asked.names
     marks = picks(summary)
     record = {
         "factors": [_factor(summary, factor) for factor in inputs],
-        "responses": [{"name": name, **_named(summary, name)} for name in names],
+        "responses": [{"name": response.name, **_named(response)} for response in summary.asked.responses],
         "surfaces": _surfaces(summary),
         "runs": [
             {
@@ -158,13 +145,9 @@ def _factor(summary: Record, factor: Factor) -> dict[str, Any]:
     return {key: getattr(factor, key) for key in keys} | {"tolerance": rounded_down(tolerance) if tolerance else None}
 
 
-def _named(summary: Record, name: str) -> dict[str, str]:
-    words, unit = quantity(name)
-    return (
-        {"words": response_label(summary, name), "unit": ""}
-        if is_ratio(summary, name)
-        else {"words": words, "unit": unit}
-    )
+def _named(response: Response) -> dict[str, str]:
+    words, unit = quantity(response.name)
+    return {"words": response.label, "unit": ""} if response.is_ratio else {"words": words, "unit": unit}
 
 
 def _point(point: Record, inputs: Sequence[Factor], names: Sequence[str]) -> dict[str, Any]:
@@ -213,7 +196,7 @@ def _surfaces(summary: Record) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "bounds": limits.get(name, []),
-                **_named(summary, name),
+                **_named(summary.asked.response(name)),
                 "terms": list(coefficients),
                 "coefficients": list(coefficients.values()),
                 "covariance": covariance,

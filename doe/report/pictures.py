@@ -14,10 +14,11 @@ from matplotlib.ticker import MaxNLocator
 from doe.report import still
 from doe.report.sections.duty import gain_stills
 from doe.report.sections.front_pictures import drawn_pairs, near
-from doe.report.sections.record import Record, response_label
+from doe.report.sections.record import Record
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
 from doe.study_file import Study
+from doe.workflow.asked import Asked
 from doe.workflow.robust import RobustFront
 from doe.workflow.runs import design_of
 from doe.workflow.whole import StudyResult
@@ -29,7 +30,7 @@ COLUMNS = 3
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
     """Surface over the first factor and each other one, the rest at their centre, with contours below."""
-    factors = len(study.factors)
+    factors, response = len(study.factors), Asked.of(study).response(surface.name)
     reach = design_of(study).reach
     grid = np.linspace(-reach, reach, 41)
     figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
@@ -45,7 +46,7 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         floor = values.min() - 0.35 * span
         axis.contour(x, y, values, zdir="z", offset=floor, cmap="viridis", levels=10, linewidths=0.9)
         top = values.max()
-        for bound in _bounds(study, surface.name):
+        for bound in response.bounds:
             if floor < bound < top + 0.5 * span:
                 corners = [np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)]
                 plane = np.full((2, 2), bound)
@@ -56,11 +57,11 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        axis.set_zlabel(_label(study, surface.name))
+        axis.set_zlabel(response.label)
         rest = [place for place in range(1, factors) if place != panel]
         named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
         fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
-        notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in _bounds(study, surface.name))]
+        notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in response.bounds)]
         axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
         axis.tick_params(labelsize=8)
         for one in (axis.xaxis, axis.yaxis, axis.zaxis):
@@ -69,16 +70,6 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
-
-
-def _label(study: Study, name: str) -> str:
-    aggregates = {response.name: response.aggregate for response in study.file.response} if study.shares else {}
-    return response_label({"duty": {"aggregate": aggregates}}, name)
-
-
-def _bounds(study: Study, name: str) -> list[float]:
-    response = next(entry for entry in study.file.response if entry.name == name)
-    return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
 def adaptive_search(record: Record, path: Path) -> None:
@@ -94,7 +85,7 @@ def duty_gains(record: Record, path: Path) -> None:
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
     """Pairs of goals: the fronts, and baseline and pick both on the surfaces and simulated."""
-    study, surfaces = outcome.study, outcome.surfaces
+    study, surfaces, asked = outcome.study, outcome.surfaces, Asked.of(outcome.study)
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
     if outcome.front.tolerance_aware is not None:
         clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))
@@ -102,7 +93,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
         search = outcome.adaptive.search
         clouds.append(("front predicted by emulators", search.predictions[search.representatives], "tab:olive"))
         clouds.append(("its points, simulated anew", outcome.adaptive.front.values, "tab:green"))
-    for axis, (i, j) in _pairs(drawn_pairs([response.goal for response in study.file.response]), path):
+    for axis, (i, j) in _pairs(drawn_pairs([response.goal for response in asked.responses]), path):
         for words, values, color in clouds:
             axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
         for words, point, marker, color in (
@@ -116,10 +107,10 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
                 axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
         for draw, response in ((axis.axvline, i), (axis.axhline, j)):
             shown = [outcome.baseline.values[response], outcome.pick.values[response], *clouds[0][1][:, response]]
-            for bound in near(_bounds(study, surfaces[response].name), shown):
+            for bound in near(asked.responses[response].bounds, shown):
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label="limit")
-        axis.set_xlabel(_label(study, surfaces[i].name))
-        axis.set_ylabel(_label(study, surfaces[j].name))
+        axis.set_xlabel(asked.responses[i].label)
+        axis.set_ylabel(asked.responses[j].label)
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:

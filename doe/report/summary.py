@@ -5,6 +5,7 @@ from dataclasses import fields
 from typing import Any
 
 from doe.report.sections.record import drop_undefined
+from doe.workflow.asked import Settings
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
@@ -24,7 +25,7 @@ class Summary(Record, kw_only=True):
     obstacles: Any
     tried: int
     edge: Any
-    asked: Any
+    asked: Settings
     design: Any
     fit: Any
     front: Any

@@ -95,7 +95,6 @@ def summary() -> dict[str, Any]:
         "tried": 1,
         "edge": {},
         "asked": {
-            "title": "Clearances of a made-up bearing",
             "study_file": "study.toml",
             "scene_file": "scene.toml",
             "scene": {"bearing": {"rollers": 10, "roller_diameter_mm": 9.0, "roller_profile": None}},
@@ -104,9 +103,13 @@ def summary() -> dict[str, Any]:
                  "low": limits[k][0], "high": limits[k][1], "resolution": 0.0005, "tolerance": None}
                 for k, name in enumerate(FACTORS)
             ],
-            "responses": [{"name": name, "goal": "min", "weight": 1.0, "model": "quadratic"} for name in RESPONSES],
+            "responses": [
+                {"goal": "min", "target": None, "lower": None, "upper": None, "weight": 1.0, "desired": None, "model": "quadratic",
+                 "transform": "none", "name": name} for name in RESPONSES
+            ],
             "replicates": 8,
             "turns": 40,
+            "confirmation_replicates": 16,
         },
         "design": {
             "kind": "central_composite",

@@ -66,6 +66,8 @@ def over_duty() -> dict:
         },
         "life": {"baseline": lives, "pick": {**lives, "L10_h": 8100.0}},
     }
+    for response in record["asked"]["responses"]:
+        response |= {"aggregate": record["duty"]["aggregate"][response["name"]], "points": None}
     record["limits"] = {
         f"idle: {POWER}": {"sense": "<=", "bound": 30.0, "value": 10.0, "error": 0.5, "verdict": "kept", "probability": 1.0},
         f"take-off: {POWER}": {"sense": "<=", "bound": 230.0, "value": 230.0, "error": 0.5, "verdict": "undecided", "probability": 0.5},
@@ -76,7 +78,7 @@ def over_duty() -> dict:
 def sentences(record: dict) -> dict[str, str]:
     """Roles of the sentences on the duty by their text, names in words."""
     clean = restored(record)
-    return {block.text: block.role for block in readable(at_points(clean), clean) if isinstance(block, Paragraph)}
+    return {block.text: block.role for block in readable(at_points(clean), clean.asked) if isinstance(block, Paragraph)}
 
 
 def test_without_a_duty_nothing_is_said_of_one():
@@ -203,7 +205,7 @@ def test_a_ratio_has_no_unit_anywhere():
 
 def test_the_table_has_a_row_a_response_at_a_point():
     """Unit: duty_points.csv has baseline, pick, gain, cost of the compromise and verdict on limits of each."""
-    rows = duty_rows(over_duty())
+    rows = duty_rows(restored(over_duty()))
     assert [(row["point"], row["response"]) for row in rows[:3]] == [
         ("idle", IMPACT),
         ("idle", POWER),
@@ -220,7 +222,7 @@ def test_the_manual_describes_every_column():
     """Report: the chapter on tables names each column of duty_points.csv."""
     text = (ROOT / "doe" / "manual" / "67_study_tables.md").read_text(encoding="utf-8")
     section = text.partition("### duty_points.csv")[2].partition("###")[0]
-    assert set(duty_rows(over_duty())[0]) == set(re.findall("`([^`]+)`", section))
+    assert set(duty_rows(restored(over_duty()))[0]) == set(re.findall("`([^`]+)`", section))
 
 
 @pytest.mark.parametrize("width", [80, 60, 40])
@@ -228,7 +230,9 @@ def test_no_word_of_a_header_is_broken(width):
     """Report: at any width each word of a header of the duty's tables stands whole in a line, and no line is longer."""
     clean = restored(over_duty())
     (chapter,) = (part for part in sections(clean) if part.key == "duty")
-    tables = [block for block in [*readable(at_points(clean), clean), *chapter.blocks] if isinstance(block, Table)]
+    tables = [
+        block for block in [*readable(at_points(clean), clean.asked), *chapter.blocks] if isinstance(block, Table)
+    ]
     assert len(tables) == 4
     for table in tables:
         lines = terminal.text([copy.copy(table)], Detail.ALL, width).splitlines()

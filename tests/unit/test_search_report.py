@@ -19,6 +19,7 @@ from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
 from doe.report.files import write
 from doe.report.sections.search import SURE, in_few_runs, limiting_sentence
+from doe.report.summary import restored
 from doe.study_file import Study
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
@@ -89,7 +90,9 @@ def test_the_page_draws_the_fronts_and_the_scale_is_that_of_the_history(studied)
 def test_the_picture_has_every_run_by_its_reason(studied):
     _, _, record, _ = studied
     progress, places = (
-        [picture() for picture in block.pictures] for block in in_few_runs(record) if isinstance(block, Figures)
+        [picture() for picture in block.pictures]
+        for block in in_few_runs(restored(record))
+        if isinstance(block, Figures)
     )
     adaptive = record["adaptive"]
     reasons = [each["why"] for each in adaptive["points"]]

@@ -5,7 +5,6 @@ The sections are blocks of the record of a study; the ``..._record`` functions w
 
 import re
 from collections.abc import Mapping, Sequence
-from string import ascii_uppercase
 from typing import Any
 
 from doe.clearance import TEMPERATURES
@@ -33,8 +32,7 @@ from doe.report.sections.record import (
     value_text,
 )
 from doe.study_file import Study
-from doe.study_file.duty import OverDuty
-from doe.study_file.sections import Goal
+from doe.workflow.asked import Response, Settings
 from doe.workflow.confirmation import (
     LOSS,
     NOISE,
@@ -47,8 +45,6 @@ from doe.workflow.confirmation import (
     point_words,
     statement,
 )
-from doe.workflow.front import known_tolerances
-from doe.workflow.runs import region_of
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
@@ -106,7 +102,7 @@ def _judged(summary: Record) -> list[Block]:
 
 def _command_for_odds(summary: Record) -> Paragraph:
     """The command that states the odds, where these are unknown."""
-    command = f"doe study {part(summary, 'asked', 'study_file') or 'STUDY'} --robust"
+    command = f"doe study {summary.asked.study_file} --robust"
     return Paragraph("" if part(summary, "robust") else f"{command} states the odds over the unknown inputs.")
 
 
@@ -344,65 +340,51 @@ def _verdict(limit: Record) -> tuple[str, str]:
     return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
 
 
-def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def settings(summary: Record, motion: Mapping[str, Any]) -> Section:
     """Factors, responses and scene as the study states them."""
-    record = part(summary, "asked")
-    if not record:
-        return None
-    blocks: list[Block] = []
-    effort = [
-        f"{shown(record[key])} {words}"
-        for key, words in (
-            ("replicates", "replicates per design run"),
-            ("turns", "counted shaft turns per replicate"),
-            ("confirmation_replicates", "replicates per confirmed point"),
-        )
-        if record.get(key) is not None
-    ]
-    files = [f"study {record['study_file']}"] if record.get("study_file") else []
-    files += [f"scene {record['scene_file']}"] if record.get("scene_file") else []
-    if text := "; ".join([", ".join(files), ", ".join(effort)]).strip("; "):
-        blocks.append(Paragraph(text[0].upper() + text[1:] + "."))
+    asked: Settings = summary.asked
+    effort = (
+        f"{shown(asked.replicates)} replicates per design run, {shown(asked.turns)} counted shaft turns per replicate, "
+        f"{shown(asked.confirmation_replicates)} replicates per confirmed point"
+    )
     rows = [
         (
             f"{factor.letter}: {label(factor.name)}",
-            factor.key or "",
+            factor.key,
             factor.text(factor.centre),
             shown(factor.step),
-            f"{factor.text(factor.low)} to {factor.text(factor.high)}" if factor.low is not None else "",
+            f"{factor.text(factor.low)} to {factor.text(factor.high)}",
             shown(factor.resolution),
             f"± {shown(factor.tolerance)}" if factor.tolerance else "",
         )
-        for factor in factors(summary)
+        for factor in asked.factors
     ]
     header = ("factor", "key of the scene", "centre", "step", "region", "resolution", "tolerance")
-    blocks.append(Table("Factors", header, rows, text_columns=(1,)))
-    goals = [(label(response["name"]), *_goal(response)) for response in responses(summary)]
+    goals = [(label(response.name), *_goal(response)) for response in asked.responses]
     columns = ("response", "goal", "limits", "weight", "model")
-    blocks.append(Table("Responses", columns, goals, text_columns=(1, 4)))
-    if scene := record.get("scene"):
-        settings = [
-            (f"{table}.{key}", shown(value, 6))
-            for table, keys in scene.items()
-            if isinstance(keys, Mapping)
-            for key, value in keys.items()
-            if value is not None and not isinstance(value, Mapping)
-        ]
-        blocks.append(Table("Scene: the bearing and its operation", ("key", "value"), settings, folded=True))
+    values = [
+        (f"{table}.{key}", shown(value, 6))
+        for table, keys in asked.scene.items()
+        if isinstance(keys, Mapping)
+        for key, value in keys.items()
+        if value is not None and not isinstance(value, Mapping)
+    ]
+    blocks: list[Block] = [
+        Paragraph(f"Study {asked.study_file}, scene {asked.scene_file}; {effort}."),
+        Table("Factors", header, rows, text_columns=(1,)),
+        Table("Responses", columns, goals, text_columns=(1, 4)),
+        Table("Scene: the bearing and its operation", ("key", "value"), values, folded=True),
+    ]
     return Section("asked", "What was asked", blocks)
 
 
-def _goal(response: Record) -> tuple[str, str, str, str]:
-    goal_key = str(response.get("goal") or "")
-    goal = {"min": "small", "max": "large", "none": "watched"}.get(goal_key, goal_key)
-    if response.get("target") is not None:
-        goal = f"at {shown(response['target'])}"
-    limits = [
-        f"{sign} {shown(response[key])}"
-        for key, sign in (("lower", "≥"), ("upper", "≤"))
-        if response.get(key) is not None
-    ]
-    return goal, ", ".join(limits), shown(response.get("weight")), str(response.get("model") or "")
+def _goal(response: Response) -> tuple[str, str, str, str]:
+    goal = {"min": "small", "max": "large", "none": "watched"}.get(response.goal, response.goal)
+    if response.target is not None:
+        goal = f"at {shown(response.target)}"
+    ends = ((response.lower, "≥"), (response.upper, "≤"))
+    limits = [f"{sign} {shown(bound)}" for bound, sign in ends if bound is not None]
+    return goal, ", ".join(limits), shown(response.weight), response.model
 
 
 def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -565,26 +547,4 @@ def point_record(study: Study, point: Array, values: Array, errors: Array) -> di
         "factors": study.by_factor(point),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
         "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
-    }
-
-
-def asked_record(study: Study) -> dict[str, Any]:
-    """Factors with their ranges and responses with their goals."""
-    reach, widths = region_of(study), known_tolerances(study)
-    low, high = (study.actual(side * reach) for side in (-1.0, 1.0))
-    return {
-        "factors": [
-            {
-                "letter": letter,
-                **factor.model_dump(include={"name", "key", "centre", "step", "resolution"}),
-                "low": float(low[index]),
-                "high": float(high[index]),
-                "tolerance": widths.get(factor.name),
-            }
-            for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
-        ],
-        "responses": [
-            response.model_dump(exclude=set() if study.shares else set(OverDuty.model_fields) - set(Goal.model_fields))
-            for response in study.file.response
-        ],
     }

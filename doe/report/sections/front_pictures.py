@@ -11,8 +11,9 @@ from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.record import Factor, Record, half_width, part
+from doe.report.sections.record import Record, half_width, part
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
+from doe.workflow.asked import Factor
 from rbdyn.base.words import label, quantity, shown
 
 if TYPE_CHECKING:

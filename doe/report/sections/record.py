@@ -6,11 +6,12 @@ Names and plain numbers are written by ``rbdyn.base.words``; here are gains, tol
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from doe.dimension_chain.links import size_text
 from doe.pareto.manufacture import Interval, percent
+from doe.workflow.asked import Asked, Factor
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, says
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import improvement, label, quantity, shown, with_error
@@ -36,55 +37,14 @@ def part(record: Record, *keys: str) -> Any:
     return value
 
 
-@dataclass(frozen=True)
-class Factor:
-    """A factor as its study states it; without a study only its name is known."""
-
-    name: str
-    letter: str
-    key: str | None = None
-    centre: float | None = None
-    step: float | None = None
-    low: float | None = None
-    high: float | None = None
-    resolution: float | None = None
-    tolerance: float | None = None
-
-    @property
-    def words(self) -> str:
-        """Its name without the unit."""
-        return quantity(self.name)[0]
-
-    @property
-    def unit(self) -> str:
-        return quantity(self.name)[1]
-
-    @property
-    def decimals(self) -> int:
-        """Decimals of the resolution of the drawing, or of a hundredth of the step."""
-        scale = self.resolution or (self.step / 100.0 if self.step else None)
-        return 4 if not scale else min(max(-math.floor(math.log10(scale) + 1e-9), 0), 9)
-
-    def text(self, value: float | None, further: int = 0) -> str:
-        """A value to the resolution of the drawing, or ``further`` decimals beyond."""
-        return "" if value is None else f"{value:.{self.decimals + further}f}"
-
-
 def factors(summary: Record) -> list[Factor]:
     """Factors in the study's order."""
-    rows = part(summary, "asked", "factors")
-    if rows:
-        return [Factor(**{key: row.get(key) for key in Factor.__dataclass_fields__}) for row in rows]
-    names = part(summary, "design", "factors") or list(part(summary, "pick") or {})
-    return [Factor(name, "ABCDEFGH"[place]) for place, name in enumerate(names)]
+    return list(summary.asked.factors)
 
 
 def responses(summary: Record) -> list[dict[str, Any]]:
     """Responses in the study's order: name, goal and their other settings."""
-    rows = part(summary, "asked", "responses")
-    if rows:
-        return [dict(row) for row in rows]
-    return [{"name": name} for name in part(summary, "design", "responses") or part(summary, "gains") or []]
+    return [response.as_dict() for response in summary.asked.responses]
 
 
 def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -147,31 +107,21 @@ def drop_undefined(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def readable(blocks: Iterable[Block], summary: Record) -> list[Block]:
-    """Blocks with something to say: quantities by their words in sentences, tables without empty columns.
+def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]:
+    """Blocks with something to say: what was ``asked`` by its words in sentences, tables without empty columns.
 
     A response that is a ratio to the baseline over a duty has no unit in tables and pictures.
     """
-    names = [*(factor.name for factor in factors(summary)), *(response["name"] for response in responses(summary))]
+    names = [] if asked is None else [*asked.columns, *asked.names]
     # The longest first, for a name may begin with another.
     words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
-    ratios = {label(name): response_label(summary, name) for name in names if is_ratio(summary, name)}
+    ratios = {label(each.name): each.label for each in (asked.responses if asked else ()) if each.is_ratio}
     return [_without_unit(_spelt(block, words), ratios) for block in blocks if says(block)]
 
 
 def notes_of(summary: Record) -> Notes:
     """Notes of a record."""
     return tuple(part(summary, "notes") or ())
-
-
-def is_ratio(summary: Record, name: str) -> bool:
-    """Whether a response is the worst ratio to the baseline over a duty."""
-    return bool(part(summary, "duty", "aggregate", name) == "worst_relative")
-
-
-def response_label(summary: Record, name: str) -> str:
-    """'impact force [N]' of a response; over a duty 'impact force, worst ratio' where it is one."""
-    return f"{quantity(name)[0]}, worst ratio" if is_ratio(summary, name) else label(name)
 
 
 def _without_unit(block: Block, ratios: Mapping[str, str]) -> Block:
