@@ -17,8 +17,10 @@ from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
-from rbdyn.base.records import Record, finite
-from rbdyn.base.words import Brief, Figure, counted, quantity
+from rbdyn.base.records import Record, finite, shown
+from rbdyn.base.table import Column, Sheet, columns_of
+from rbdyn.base.words import Brief, Figure, counted, label, quantity, signed_with_error, value_alone
+from rbdyn.base.words import shown as value_text
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, full_status
 from rbdyn.scene import BallScene, Scene, scene_of
 from rbdyn.scene.key_columns import default_of
@@ -44,11 +46,29 @@ class Input(Record):
     ``a_default``, ``b_default``: whether the value is the default of the key.
     """
 
-    key: str
-    a: Any
-    b: Any
-    a_default: bool
-    b_default: bool
+    key: str = shown("key", meaning="key of the scene, its unit at the end")
+    a: Any = shown("A", cell=lambda entry: value_words(entry.a, entry.a_default), text=True, unit="of the key",
+                   meaning="its values; empty where the scene has no such key")  # fmt: skip
+    b: Any = shown("B", cell=lambda entry: value_words(entry.b, entry.b_default), text=True)
+    a_default: bool = shown("", screen=False, meaning="whether the value is the default")
+    b_default: bool = shown("", screen=False)
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether only one scene has such a table, and the key there is at its default."""
+        return (self.a is None and self.b_default) or (self.b is None and self.a_default)
+
+
+def value_words(value: Any, is_default: bool) -> str:
+    """A value of a key, and whether it is the default."""
+    text = "not stated" if value is None else value_text(value, 8)
+    return f"{text} (default)" if is_default else text
+
+
+def input_sheet(inputs: Sequence[Input]) -> Sheet[Input]:
+    """A row a key that differs."""
+    content = "A row a key that differs, of `rbdyn compare`."
+    return Sheet("", columns_of(Input), inputs, file="inputs.csv", content=content)
 
 
 class Difference(Record):
@@ -70,6 +90,35 @@ class Difference(Record):
     def percent(self) -> float | None:
         """B less A over the size of A [%]; None without either, or where A is 0."""
         return None if self.difference is None or not self.a else 100.0 * self.difference / abs(self.a)
+
+    @property
+    def words(self) -> str:
+        """B less A with its error."""
+        if self.difference is None or self.verdict == EQUAL:
+            return "" if self.difference is None else "0"
+        return signed_with_error(self.difference, self.error_together)
+
+
+DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
+    Column("figure", label, at=lambda row: row[0], meaning="name of the figure, its unit at the end"),
+    Column("a", value_alone, "A", at=lambda row: row[1].a, error=lambda row: row[1].error_together, unit="of the figure",
+           meaning="its values, and B less A"),
+    Column("b", value_alone, "B", at=lambda row: row[1].b, error=lambda row: row[1].error_together),
+    Column("difference", words="B - A", at=lambda row: row[1].difference, cell=lambda row: row[1].words),
+    Column("error", screen=False, at=lambda row: row[1].error, unit="of the figure",
+           meaning="half width of the 95 % interval of this difference alone"),
+    Column("error_together", screen=False, at=lambda row: row[1].error_together, unit="of the figure",
+           meaning="half width that holds together with those of the other figures of the bearing, or of the parts"),
+    Column("verdict", words="difference", text=True, at=lambda row: row[1].verdict,
+           meaning="significant, within error (`error_together`), equal, error unknown, only in A, only in B"),
+    Column("percent", screen=False, unit="%", at=lambda row: row[1].percent, meaning="difference over the size of A"),
+)  # fmt: skip
+
+
+def difference_sheet(figures: Mapping[str, Difference]) -> Sheet[tuple[str, Difference]]:
+    """A row a figure."""
+    content = "A row a figure of `rbdyn compare`, those of the parts last."
+    return Sheet("", DIFFERENCES, tuple(figures.items()), file="differences.csv", content=content)
 
 
 class Side(Record):
@@ -113,13 +162,7 @@ class Comparison(Brief, SavedRecord, kw_only=True):
 
     def table(self) -> "pd.DataFrame":
         """A row a figure, those of the parts last; units in the names."""
-        import pandas as pd
-
-        rows = [
-            {"figure": name, **one.as_dict(), "percent": one.percent}
-            for name, one in (self.figures | self.parts).items()
-        ]
-        return pd.DataFrame(rows)
+        return difference_sheet(self.figures | self.parts).frame
 
 
 def compare(

@@ -121,6 +121,13 @@ def columns_of(kind: type[R]) -> tuple[Column[R], ...]:
     )
 
 
+def frame_of(columns: Iterable[Column[R]], series: R) -> "pd.DataFrame":
+    """A table whose rows are the places of arrays: each column takes its array from ``series``."""
+    import pandas as pd
+
+    return pd.DataFrame({column.key: column.value(series) for column in columns})
+
+
 def each(names: Iterable[str], *columns: Column[R]) -> tuple[Column[R], ...]:
     """The columns of every name in its turn, see ``Column.of``."""
     return tuple(column for name in names for template in columns for column in template.of((name,)))

@@ -8,7 +8,7 @@ from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_not
 from rbdyn.base.notes import status_notes
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, other_ranges, range_ends, shown
-from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, ball_sheet
 from rbdyn.scene import BallScene
 
 if TYPE_CHECKING:
@@ -65,8 +65,7 @@ def write(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list
         return ["result.json"]
     from rbdyn.plots.ball import pictures
 
-    save_table(result.table(), folder / "balls.csv", "%.8g")
-    files = ["result.json", "balls.csv", *pictures(result, folder)]
+    files = ["result.json", ball_sheet(result.row_reports).save(folder, "%.8g"), *pictures(result, folder)]
     if path is not None:
         save_table(path, folder / "runout.csv", "%.8g")
         files.append("runout.csv")
@@ -75,9 +74,6 @@ def write(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list
 
 def _row_tables(title: str, row: RowReport) -> list[Block]:
     """The balls; in full detail also the stiffness matrix and the cost of the search."""
-    header = ("azimuth [deg]", "inner angle [deg]", "outer angle", "inner load [N]", "outer load", "centrifugal [N]")
-    keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
-    balls = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     names = ("x", "y", "z", "tilt x", "tilt y")
     matrix = [
         (name, *(f"{value:.4g}" for value in values))
@@ -86,7 +82,7 @@ def _row_tables(title: str, row: RowReport) -> list[Block]:
     searches = "" if row.searches is None else f"{row.searches} searches, "
     spent = f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over"
     return [
-        Table(title, header, balls),
+        replace(ball_sheet({"": row}).block, caption=title),
         Table("Stiffness [N/m, N, N m]", ("", *names), matrix, detail=Detail.ALL),
         Paragraph(spent, detail=Detail.ALL),
     ]

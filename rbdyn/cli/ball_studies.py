@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -15,11 +15,12 @@ from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import identity_line, identity_of
 from rbdyn.base.page import write_with_report
-from rbdyn.base.records import plain, save_table
+from rbdyn.base.records import plain
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted, label, shown, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
-from rbdyn.quasistatic.result import remarks, ring_columns, row_columns, tipping
+from rbdyn.quasistatic.result import RACES, remarks, ring_columns, row_columns, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.lots import Lot, design
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
@@ -257,18 +258,27 @@ def write_study(name: str, record: dict[str, Any], table: SweepResult | None, fo
     """Write the record of a study, its points and their pictures, or the limits of race errors; returns the names of the files."""
     write_json(folder / f"{name}.json", record)
     if table is None:
-        save_table(limits_table(record), folder / f"{name}.csv")
-        return [f"{name}.json", f"{name}.csv"]
+        return [f"{name}.json", limit_sheet(record).save(folder)]
     from rbdyn.plots.ball import sweep_pictures
 
     table.save(folder / f"{name}.csv")
     return [f"{name}.json", f"{name}.csv", *sweep_pictures(table, folder)]
 
 
-def limits_table(record: Mapping[str, Any]) -> list[dict[str, Any]]:
+def limit_sheet(record: Mapping[str, Any]) -> Sheet[Mapping[str, Any]]:
     """A row a race: its largest roundness and side-sway [um]."""
-    names = ("roundness_um", "sway_um")
-    return [{"race": race, **{name: record[f"{race}_{name}"] for name in names}} for race in ("inner", "outer")]
+    columns: tuple[Column[Mapping[str, Any]], ...] = (
+        Column("race", meaning="inner or outer"),
+        Column(
+            "roundness_um", ".3g", "roundness up to [µm]", meaning="largest roundness and side-sway that meet the class"
+        ),
+        Column("sway_um", ".3g", "side-sway up to [µm]"),
+    )
+    rows = [
+        {"race": race, **{name: record.get(f"{race}_{name}") for name in ("roundness_um", "sway_um")}} for race in RACES
+    ]
+    content = "A row a race, of `rbdyn ball --race-limits`."
+    return Sheet("", columns, rows, file="race_limits.csv", content=content)
 
 
 def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
@@ -285,12 +295,10 @@ def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
 
 
 def _limits(record: dict[str, Any]) -> list[Block]:
-    of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
-    rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
     title = f"class {record['class']}: {record['radial_limit_um']:g} µm radial, {record['axial_limit_um']:g} µm axial runout"
     good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
     solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
     return [
-        Table(title, ("race", "roundness up to [µm]", "side-sway up to [µm]"), rows),
+        replace(limit_sheet(record).block, caption=title),
         Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
     ]

@@ -13,9 +13,8 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import Identity, identity_line, identity_of
 from rbdyn.base.page import REPORT_FILES, write_with_report
-from rbdyn.base.records import save_table
 from rbdyn.base.terminal import show
-from rbdyn.base.words import counted, improvement, label, quantity, shown, signed_with_error, value_alone
+from rbdyn.base.words import counted, improvement, quantity
 
 if TYPE_CHECKING:
     from rbdyn.comparison import Comparison, Difference, Input
@@ -147,41 +146,21 @@ def change(name: str, one: "Difference") -> str:
 
 def _input_table(inputs: Sequence["Input"]) -> Table:
     """The inputs; of a table that only one scene has without the keys at their defaults."""
-    rows = [
-        (one.key, _value(one.a, one.a_default), _value(one.b, one.b_default))
-        for one in inputs
-        if not ((one.a is None and one.b_default) or (one.b is None and one.a_default))
-    ]
+    from rbdyn.comparison import input_sheet
+
+    listed = [entry for entry in inputs if not entry.is_left_out]
     caption = "1 input differs" if len(inputs) == 1 else f"{len(inputs)} inputs differ"
-    left = len(inputs) - len(rows)
+    left = len(inputs) - len(listed)
     note = f"{counted(left, 'more key')} at the default, in tables that only A or only B has" if left else ""
-    return Table(caption, ("key", "A", "B"), rows, note, text_columns=(1, 2))
-
-
-def _value(value: Any, is_default: bool) -> str:
-    text = "not stated" if value is None else shown(value, 8)
-    return f"{text} (default)" if is_default else text
+    return replace(input_sheet(listed).block, caption=caption, note=note)
 
 
 def _figure_table(caption: str, figures: Mapping[str, "Difference"], detail: Detail = Detail.LEAST) -> Table:
-    rows = [
-        (
-            label(name),
-            "" if one.a is None else value_alone(one.a, one.error_together),
-            "" if one.b is None else value_alone(one.b, one.error_together),
-            _difference(one),
-            one.verdict,
-        )
-        for name, one in figures.items()
-        if one.a or one.b
-    ]
-    return Table(caption, ("figure", "A", "B", "B - A", "difference"), rows, text_columns=(4,), detail=detail)
+    """The figures that are not zero in both."""
+    from rbdyn.comparison import difference_sheet
 
-
-def _difference(one: "Difference") -> str:
-    if one.difference is None or one.verdict == "equal":
-        return "" if one.difference is None else "0"
-    return signed_with_error(one.difference, one.error_together)
+    listed = {name: one for name, one in figures.items() if one.a or one.b}
+    return replace(difference_sheet(listed).block, caption=caption, detail=detail)
 
 
 def _part_sentence(parts: Mapping[str, "Difference"]) -> str:
@@ -192,10 +171,9 @@ def _part_sentence(parts: Mapping[str, "Difference"]) -> str:
 
 def _write(found: "Comparison", folder: Path) -> list[str]:
     """Write comparison.json, inputs.csv and differences.csv; returns the names of the files."""
-    found.save(folder / FILES[0])
-    import pandas as pd
+    from rbdyn.comparison import difference_sheet, input_sheet
 
-    columns = ("key", "a", "b", "a_default", "b_default")
-    save_table(pd.DataFrame([one.as_dict() for one in found.inputs], columns=columns), folder / FILES[1])
-    save_table(found.table(), folder / FILES[2], "%.8g")
+    found.save(folder / FILES[0])
+    input_sheet(found.inputs).save(folder)
+    difference_sheet(found.figures | found.parts).save(folder, "%.8g")
     return list(FILES)

@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.base.pace import Notice
+from rbdyn.base.table import Column, Sheet, frame_of
 from rbdyn.base.words import Brief, Figure
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.ensemble import Pace, Stop, log
@@ -102,22 +103,39 @@ class History(Brief):
 
     def table(self) -> "pd.DataFrame":
         """A row a sample, units in the column names."""
-        import pandas as pd
+        rollers = range(1, self.scene.bearing.rollers + 1)
+        return frame_of(history_sheet(map(str, rollers)).columns, self)
 
-        columns: dict[str, Any] = {
-            "time_s": self.time,
-            "cage_x_um": self.cage_x * 1e6,
-            "cage_y_um": self.cage_y * 1e6,
-            "cage_speed_rpm": self.cage_speed * 30.0 / np.pi,
-            "inner_ring_x_um": self.ring_x * 1e6,
-            "inner_ring_y_um": self.ring_y * 1e6,
-            "land_N": self.land_load,
-        }
-        for name in ("pocket_load", "outer_load", "inner_load", "outer_slip", "inner_slip"):
-            unit = "N" if name.endswith("_load") else "m_s"
-            for j, values in enumerate(getattr(self, name).T):
-                columns[f"{name.removesuffix('_load')}_{j + 1}_{unit}"] = values
-        return pd.DataFrame(columns)
+
+def history_sheet(rollers: Iterable[str]) -> Sheet[History]:
+    """Columns of a history, of ``rollers`` by their numbers from 1."""
+    columns: tuple[Column[History], ...] = (
+        Column("time_s", at="time", meaning="time after the turns that are not counted"),
+        Column("cage_x_um", at=lambda motion: motion.cage_x * 1e6,
+               meaning="centre of the cage: along the load, and 90 degrees ahead of it"),
+        Column("cage_y_um", at=lambda motion: motion.cage_y * 1e6),
+        Column("cage_speed_rpm", at=lambda motion: motion.cage_speed * 30.0 / np.pi, meaning="speed of the cage"),
+        Column("inner_ring_x_um", at=lambda motion: motion.ring_x * 1e6, meaning="centre of the inner ring"),
+        Column("inner_ring_y_um", at=lambda motion: motion.ring_y * 1e6),
+        Column("land_N", at="land_load", meaning="force of the guide land on the cage"),
+    )  # fmt: skip
+
+    def column(series: str, key: str, roller: str, meaning: str) -> Column[History]:
+        return Column(
+            key.format(roller), at=lambda motion: getattr(motion, series)[:, int(roller) - 1], meaning=meaning
+        )
+
+    of_rollers = (
+        ("pocket_load", "pocket_{}_N", "force of roller j on its pocket: positive ahead, negative behind"),
+        ("outer_load", "outer_{}_N", "load of roller j on the outer and the inner race"),
+        ("inner_load", "inner_{}_N", ""),
+        ("outer_slip", "outer_slip_{}_m_s", "surface speed of the race minus that of roller j"),
+        ("inner_slip", "inner_slip_{}_m_s", ""),
+    )
+    numbers = tuple(rollers)
+    columns += tuple(column(series, key, j, meaning) for series, key, meaning in of_rollers for j in numbers)
+    content = "A row a sample of the motion, of `rbdyn simulate` and `rbdyn show`."
+    return Sheet("", columns, file="history.csv", content=content)
 
 
 def most_turns(scene: Scene) -> float:

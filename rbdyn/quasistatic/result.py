@@ -14,6 +14,7 @@ from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, outside_json, spread
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio
@@ -395,10 +396,29 @@ class BallResult(Brief, SavedRecord, kw_only=True):
 
     def table(self) -> "pd.DataFrame":
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""
-        import pandas as pd
+        return ball_sheet(self.row_reports).frame
 
-        layers = {name: pd.DataFrame(row.balls) for name, row in self.row_reports.items()}
-        return layers[""] if "" in layers else pd.concat(layers, names=["row", "ball"]).reset_index()
+
+BALL_COLUMNS: tuple[Column[Mapping[str, Any]], ...] = (
+    Column("azimuth_deg", ".1f", "azimuth [deg]", meaning="place from x towards y"),
+    Column("inner_angle_deg", ".4g", "inner angle [deg]", meaning="contact angles, signed"),
+    Column("outer_angle_deg", ".4g", "outer angle"),
+    Column("inner_load_N", ".4g", "inner load [N]", meaning="contact loads"),
+    Column("outer_load_N", ".4g", "outer load"),
+    Column("centrifugal_force_N", ".4g", "centrifugal [N]", meaning="outwards"),
+    Column("gyroscopic_moment_Nmm", screen=False, unit="N mm", meaning="negative with the inner ring turning"),
+)
+ROW_AND_BALL: tuple[Column[Mapping[str, Any]], ...] = (
+    Column("row", meaning="of a double-decker: which row, and the ball in it"),
+    Column("ball"),
+)
+
+
+def ball_sheet(rows: Mapping[str, RowReport]) -> Sheet[Mapping[str, Any]]:
+    """A row a ball of the rows by name; a single row has no name."""
+    balls = [{"row": name, "ball": place, **ball} for name, row in rows.items() for place, ball in enumerate(row.balls)]
+    columns = BALL_COLUMNS if "" in rows else (*ROW_AND_BALL, *BALL_COLUMNS)
+    return Sheet("", columns, balls, file="balls.csv", content="A row a ball of `rbdyn ball`.")
 
 
 def displacement_record(displacement: Array) -> dict[str, Any]:

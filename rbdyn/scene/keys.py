@@ -10,7 +10,7 @@ import inspect
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -20,6 +20,7 @@ from pydantic import BaseModel
 
 from rbdyn.base.command import flag, print_json
 from rbdyn.base.faults import InputError
+from rbdyn.base.table import Sheet
 from rbdyn.base.words import quantity
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -35,13 +36,14 @@ TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
 
 
 class Part(NamedTuple):
-    """Contribution of a package to the manual: its chapters, its command, the kinds of its input files, its drawings."""
+    """Contribution of a package to the manual: its chapters, its command, the kinds of its input files, its drawings, its tables."""
 
     package: str
     prose: Path  # folder of chapters, NN_name.md
     commands: Any  # group of commands, as typer makes it
     kinds: Mapping[str, type[BaseModel]]
     drawings: Callable[[Any], Mapping[str, Any]]  # sketches by name, of the scene that the manual draws
+    tables: Callable[[], Mapping[str, Sequence[Sheet[Any]]]]  # files of tables by heading
 
 
 class Key(NamedTuple):

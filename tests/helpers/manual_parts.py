@@ -27,7 +27,7 @@ def declared() -> dict[str, str]:
 
 def parts() -> list[Part]:
     """Parts in the order of the page."""
-    own = Part("rbdyn", Path(manual.__file__).with_name("prose"), get_command(app), kinds(), drawings)
+    own = Part("rbdyn", Path(manual.__file__).with_name("prose"), get_command(app), kinds(), drawings, manual.tables)
     return [own, *(EntryPoint(name, value, manual.GROUP).load()() for name, value in declared().items())]
 
 

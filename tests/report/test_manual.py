@@ -13,21 +13,21 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from doe_command import doe
 from manual_parts import ROOT, declared, parts, whole_page
-from short_studies import EXAMPLES, SHORT, short_study
+from short_studies import EXAMPLES
 
 import rbdyn
 from rbdyn.cli.manual.drawings import roller_bearing, scene_of
 from rbdyn.cli.manual.page import markdown, rendered
-from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.plots.sketches import clearances
+from rbdyn.quasistatic.sweep import SWEEPS, sweep
 from rbdyn.scene import Scene
 from rbdyn.scene.keys import keys, lines
 
 # A command with its options, as prose and code write it.
 CALL = re.compile(r"\b(rbdyn|doe) (?!=)([a-z]+)\b((?: [^\s`|]+)*)")
 VOID = {"meta", "input"}
+SPEED = "operation.inner_speed_rpm"
 
 
 class Read(HTMLParser):
@@ -212,68 +212,13 @@ def test_every_question_has_a_command_and_a_figure(floors):
         assert question.strip().endswith("?") and CALL.search(command) and figure.strip(), question
 
 
-def described(floors, name: str) -> list[str]:
-    """Columns of a table as the manual names them, with words in braces."""
-    texts = [path.read_text(encoding="utf-8") for part in floors for path in part.prose.glob("*_tables.md")]
-    (section,) = [
-        part for text in texts for part in text.split("\n### ")[1:] if name in part.partition("\n")[0].split(", ")
-    ]
-    rows = [line.split("|")[1] for line in section.split("\n## ")[0].splitlines() if line.startswith("| `")]
-    return [column for row in rows for column in re.findall("`([^`]+)`", row)]
-
-
-def undescribed(floors, path: Path, **names: list[str]) -> list[str]:
-    """Columns of a file that the manual does not describe; ``names``: what the words in braces stand for."""
-    choices = {"j": r"\d+", "key": r"[a-z_]+\.[\w.\[\]]+", **{word: "|".join(names[word]) for word in names}}
-    patterns = [
-        re.sub(r"\{(\w+)\}", lambda found: f"(?:{choices[found[1]]})", column.replace(".", r"\."))
-        for column in described(floors, path.name)
-        if set(re.findall(r"\{(\w+)\}", column)) <= set(choices)
-    ]
-    columns = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
-    assert len(columns) > 1
-    return [column for column in columns if not any(re.fullmatch(pattern, column) for pattern in patterns)]
-
-
-@pytest.mark.slow
-def test_every_column_that_commands_write_is_described(tmp_path, command, floors):
-    """Report: tables of a short simulation, a map, an equilibrium, a sweep and a short study have no column without a meaning."""
-    brief = [f"--set=numerics.{each}" for each in SHORT.split(",")]
-    rollers, balls = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "angular_contact_ball.toml"
-    figures = ["cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio"]
-    others = ["impact_contact_force_N", "cage_speed_rpm", "cage_orbit_radius_share"]
-    for name, *call in (
-        ("simulate", rollers, *brief),
-        (
-            "map",
-            rollers,
-            "--speed",
-            "20000:24000:2",
-            "--load",
-            "1300:1500:2",
-            "--duty",
-            EXAMPLES / "duty_study.toml",
-            *brief,
-        ),
-        ("simulate", rollers, "--duty", EXAMPLES / "duty_study.toml", *brief),
-        ("compare", balls, "--set", "operation.inner_speed_rpm=12000"),
-        ("ball", balls),
-        ("ball", balls, "--sweep", "operation.inner_speed_rpm=1000:2000:2"),
-        ("ball", balls, "--preload", "100:300:3"),
-    ):
-        folder = tmp_path / "_".join((name, *(str(word).strip("-") for word in call[1:2])))
-        assert command(name, *call, "--out", folder).returncode == 0
-        tables = list(folder.glob("*.csv"))
-        assert tables
-        for path in tables:
-            assert undescribed(floors, path, figure=[*figures, *others, *NAMES]) == [], path.name
-    study = short_study(tmp_path)
-    doe("study", str(study), "--out", str(tmp_path / "study"))
-    tables = sorted((tmp_path / "study").glob("*.csv"))
-    assert {"confirmation.csv", "part_dimensions.csv", "beside_reference.csv"} <= {path.name for path in tables}
-    factors = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
-    for path in tables:
-        assert undescribed(floors, path, factor=factors, response=figures[1:]) == [], path.name
+def test_every_column_of_a_sweep_is_described():
+    """Report: columns of sweeps of one row and of two, with and without a heat balance, have a meaning in the manual."""
+    named = {re.sub(r"^\{key\}$", SPEED, key) for key in SWEEPS.keys}
+    for scene in ("angular_contact_ball.toml", "double_decker.toml"):
+        table = sweep(EXAMPLES / scene, {SPEED: [1000.0, 2000.0]}).table()
+        columns = {re.sub("^(inner|outer)_row_", "", name) for name in table}
+        assert columns <= named, scene
 
 
 @pytest.mark.slow

@@ -8,13 +8,14 @@ Packages that build on ``rbdyn`` add their part by an entry point; their prose i
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from pydantic import BaseModel
 
 from rbdyn.base.command import Force, Json, folder_option, guarded, hand_over
 from rbdyn.base.folder import output_folder
+from rbdyn.base.table import Sheet
 from rbdyn.scene.keys import AsSchema, Word, run
 
 # Entry points of such packages: functions that return a ``Part``.
@@ -37,7 +38,7 @@ def manual(
         from rbdyn.scene.keys import Part
 
         folder.claim()
-        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings)
+        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings, tables)
         text = page([own, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
         folder.write(lambda stage: (stage / PAGE).write_text(text, encoding="utf-8"))
         hand_over(lambda: {"status": "ok", "page": str(out / PAGE)}, as_json, lambda: None, out, [PAGE])
@@ -55,3 +56,24 @@ def kinds() -> dict[str, type[BaseModel]]:
     from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
     return {"roller bearing": Scene, "ball bearing": SingleRowScene, "double-decker": DoubleDeckerScene}
+
+
+def tables() -> dict[str, list[Sheet[Any]]]:
+    """The files of tables that the commands write; those of ``rbdyn accuracy`` have the columns that its report explains."""
+    from rbdyn.cli.ball_studies import limit_sheet
+    from rbdyn.comparison import difference_sheet, input_sheet
+    from rbdyn.dynamics.duty_simulation import points_sheet
+    from rbdyn.dynamics.motion import history_sheet
+    from rbdyn.dynamics.slip_map import map_sheet
+    from rbdyn.life.duty import life_sheet
+    from rbdyn.quasistatic.result import ball_sheet
+    from rbdyn.quasistatic.runout.turn import RUNOUT
+    from rbdyn.quasistatic.sweep import SWEEPS
+    from rbdyn.result import figure_sheet
+
+    figures = ("{figure}",)
+    sheets: list[Sheet[Any]] = [
+        figure_sheet({}), history_sheet(("{j}",)), map_sheet((), figures), life_sheet(()), points_sheet((), figures), input_sheet(()),
+        difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, limit_sheet({}),
+    ]  # fmt: skip
+    return {"Tables of rbdyn": sheets}

@@ -197,12 +197,20 @@ def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
         "commands": commands_of,
         "equations": lambda part: equations(trees, part.package),
         "library": lambda part: library(trees, part.package),
+        "tables": tables_of,
         "notes": lambda part: [code_table()] if part is parts[0] else [],
     }
     for path in sorted((path for part in parts for path in part.prose.glob("*.md")), key=lambda path: path.name):
         name = path.stem.partition("_")[2]
         more = (block for part in parts for block in generated[name](part)) if name in generated else ()
         yield name, "\n\n".join((path.read_text(encoding="utf-8"), *more))
+
+
+def tables_of(part: Part) -> Iterator[str]:
+    """A heading for each group of tables, and each file with its columns."""
+    for heading, sheets in part.tables().items():
+        yield f"## {heading}"
+        yield from (sheet.manual for sheet in sheets)
 
 
 def code_table() -> str:

@@ -21,6 +21,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import MethodError, RunError
+from rbdyn.base.table import Column, Sheet, frame_of
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.newton import FIGURES, LARGEST_LOAD, RESIDUAL, Task, boundary_conditions, space, walk
@@ -211,13 +212,23 @@ class RingPath:
 
     def table(self) -> "pd.DataFrame":
         """A row a step, units in the column names."""
-        import pandas as pd
+        return frame_of(RUNOUT.columns, self)
 
-        columns = ("x_um", "y_um", "z_um", "tilt_x_urad", "tilt_y_urad")
-        frame = pd.DataFrame(1e6 * self.path, columns=list(columns))
-        frame.insert(0, "ring_angle_deg", np.degrees(self.ring_angle))
-        frame["largest_load_N"] = self.largest_load
-        return frame
+
+RUNOUT: Sheet[RingPath] = Sheet(
+    "",
+    (
+        Column("ring_angle_deg", at=lambda ring: np.degrees(ring.ring_angle), meaning="how far the ring has turned"),
+        Column("x_um", at=lambda ring: 1e6 * ring.path[:, 0], meaning="place of the inner ring"),
+        Column("y_um", at=lambda ring: 1e6 * ring.path[:, 1]),
+        Column("z_um", at=lambda ring: 1e6 * ring.path[:, 2]),
+        Column("tilt_x_urad", unit="µrad", at=lambda ring: 1e6 * ring.path[:, 3], meaning="its tilts"),
+        Column("tilt_y_urad", unit="µrad", at=lambda ring: 1e6 * ring.path[:, 4]),
+        Column("largest_load_N", at="largest_load", meaning="largest load of a ball"),
+    ),
+    file="runout.csv",
+    content="A row a step of the turning ring, of `rbdyn ball` with `[errors]` in the scene.",
+)
 
 
 def follow(
