@@ -1,4 +1,4 @@
-"""The bearing of a study: scenes from factors, their simulations, and the responses of these.
+"""Simulations of scenes, and the responses of these.
 
 It is the only module of this package that runs bearing simulations.
 """
@@ -17,19 +17,17 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from doe.duty import Duty, DutyResult, DutyScenes, Run, labelled_scenes, main_scene, over_duty, result_of, scenes_of
+from doe.duty import DutyResult, Run, labelled_scenes, result_of
 from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
 from doe.running.store import Failure, Point, Store
-from doe.study_file import Study
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError, RunError, refuse
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import verdict
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figure_names import NAMES
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.thermal import Temperatures, at_temperatures, first_guess_faults
-from rbdyn.scene.unknown import plain_values
+from rbdyn.scene.thermal import Temperatures, at_temperatures
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
@@ -51,57 +49,9 @@ ADAPTIVE_EXTENDED = 2.0
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 
-def check_responses(study: Study) -> None:
-    """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
-    heats = any(name in TEMPERATURES for name in study.figures) and _has_balance(study)
-    names = ", ".join(responses_of(heats))
-    refuse(
-        f"{study.path}: response.name = {name!r}: "
-        + (
-            f"{study.scene.file} has no [thermal], which computes temperatures; add that table there, or choose one of {names}"
-            if name in TEMPERATURES
-            else f"the simulation does not give it; choose one of {names}"
-        )
-        for name in study.figures
-        if name not in responses_of(heats)
-    )
-    refuse(
-        f'{study.path}: response.aggregate of {response.name} = "worst_relative": temperatures in °C have no ratio; write '
-        '"worst" or "mean"'
-        for response in study.file.response
-        if response.name in TEMPERATURES and response.aggregate == "worst_relative"
-    )
-
-
 def responses_of(heats: bool) -> tuple[str, ...]:
     """Names of all figures that may be responses; ``heats``: whether a heat balance gives temperatures."""
     return (*WHOLE, *(TEMPERATURES if heats else ()), *NAMES)
-
-
-def _has_balance(study: Study) -> bool:
-    """Whether the study's scene has a heat balance, in its file or by scene.set."""
-    return "thermal" in read_scene(study) or any(override.startswith("thermal.") for override in study.scene.set)
-
-
-def read_scene(study: Study) -> dict[str, Any]:
-    """Tables of the study's scene file. Raises InputError for a missing file, or a factor's key that no scene has."""
-    path, data = study.path_of(study.scene.file), study.read(study.scene.file)
-    keys = (*(factor.key for factor in study.file.factor), *(category.key for category in study.file.category))
-    left_out = [
-        dotted
-        for dotted in keys
-        for table, _, key in (dotted.rpartition("."),)
-        if not isinstance(data.get(table), dict) or key not in data[table]
-    ]
-    scene_values: Mapping[str, Any] = {}
-    with suppress(InputError):
-        scene_values = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else {}
-    refuse(
-        f"{study.path}: factor.key = {key!r}: no such key in {path}; write table.key as in that file"
-        for key in left_out
-        if key not in scene_values
-    )
-    return data
 
 
 def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
@@ -113,121 +63,6 @@ def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     if scene.thermal is not None:
         tables["lubricant"] = {"temperature_C": scene.lubricant.temperature_C, **tables["lubricant"]}
     return tables
-
-
-def scene_at(
-    study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str], kind: type[Scene] = Scene
-) -> Scene:
-    """The study's scene at factor values, with a seed, of this ``kind``. Raises InputError for an impossible value."""
-    path = study.path_of(study.scene.file)
-    scene = kind.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
-    keys = [factor.key for factor in study.file.factor]
-    refuse(f"{study.path}: factor.key = {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, keys))
-    return scene
-
-
-def assignments(study: Study, factors: Array) -> list[str]:
-    """Overrides "key=value" of the scene at factor values (k,) and at the study's categories, without inactive factors."""
-    numbers = zip(study.file.factor, map(float, factors), strict=True)
-    values, inactive = study.categories, [study.factors[place] for place in study.inactive]
-    return [
-        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers if factor.name not in inactive),
-        *(f"{category.key}={values[category.name]}" for category in study.file.category),
-    ]
-
-
-def baseline_scenes(study: Study) -> dict[str, Scene]:
-    """Scenes of the confirmation of the original design by point of the duty, if any response compares with them; else none."""
-    duty, original = Duty.of(study), study.with_levels(())
-    if duty is None or not duty.relative:
-        return {}
-    run = over_duty(study, partial(_confirmation_scene, original, original.baseline))
-    return dict(run.scenes) if isinstance(run, DutyScenes) else {}
-
-
-def duty_with_groups(study: Study) -> Duty | None:
-    """The duty of a study with its points that have one scene together; None without a duty. Raises InputError."""
-    duty = Duty.of(study)
-    if duty is None:
-        return None
-    (run,) = design_scenes(study, study.baseline[None])
-    keys, groups = [point.key for point in points_of(scenes_of(run), list(duty.shares))], dict[str, list[str]]()
-    for name, key in zip(duty.shares, keys, strict=True):
-        groups.setdefault(key, []).append(name)
-    return replace(duty, groups=tuple(map(tuple, groups.values())))
-
-
-def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Run]:
-    """Scenes of the design runs (n, k); runs at one point differ only by their seed.
-
-    ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. Raises
-    InputError, which names the point with an impossible value of a factor.
-    """
-    data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
-    places = range(len(points)) if order is None else order
-    baseline = baseline_scenes(study)
-
-    def run(place: int, point: Array) -> Run:
-        seed = first + place
-        return over_duty(study, lambda sets: _scene_in_region(study, data, point, seed, [*overrides, *sets]), baseline)
-
-    return [run(place, point) for place, point in zip(places, points, strict=True)]
-
-
-def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int, overrides: Sequence[str]) -> Scene:
-    try:
-        return scene_at(study, data, point, seed, overrides)
-    except InputError as error:
-        keys = [factor.key for factor in study.file.factor]
-        place = ", ".join(f"{name} = {value:.4g}" for name, value in study.by_factor(point).items())
-        raise InputError(
-            [
-                f"{study.path}: the region of the design reaches {place}, where {fault}, or narrow the region"
-                if any(key in fault for key in keys) and not fault.startswith(f"{study.path}: ")
-                else fault
-                for fault in map(str, error.faults)
-            ]
-        ) from None
-
-
-def confirmation_run(study: Study, point: Array) -> Run:
-    """Scenes of a confirmation run: more replicates, fresh seeds."""
-    return over_duty(study, partial(_confirmation_scene, study, point), baseline_scenes(study), baseline_errors=True)
-
-
-def confirmation_scene(study: Study, point: Array) -> Scene:
-    """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""
-    return main_scene(confirmation_run(study, point))
-
-
-def _confirmation_scene(study: Study, point: Array, sets: Sequence[str]) -> Scene:
-    settings, seed = study.file.confirmation, study.file.design.seed + CONFIRMATION_SEEDS
-    effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-    return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *sets, *effort, *settings.set])
-
-
-def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Run]:
-    """Scenes of runs (n, k) of an adaptive search, numbered from ``first``, each with its own replicates and seed."""
-    data, adaptive = read_scene(study), study.file.adaptive
-    usual = _usual_extension(study, data)
-    shared = ["numerics.companion=false", f"numerics.extend_limit={min(usual, ADAPTIVE_EXTENDED)!r}", *adaptive.set]
-    baseline = baseline_scenes(study)
-
-    def run(seed: int, point: Array, count: int) -> Run:
-        effort = [f"numerics.replicates={count}", *shared]
-        return over_duty(
-            study, lambda sets: scene_at(study, data, point, seed, [*study.scene.set, *sets, *effort]), baseline
-        )
-
-    seeds = range(adaptive.seed + ADAPTIVE_SEEDS + first, adaptive.seed + ADAPTIVE_SEEDS + first + len(points))
-    return [run(*numbered) for numbered in zip(seeds, points, replicates, strict=True)]
-
-
-def _usual_extension(study: Study, data: dict[str, Any]) -> float:
-    """Factor by which runs with drifting figures may become longer, the least over the duty."""
-    seed, overrides = study.file.adaptive.seed, study.scene.set
-    run = over_duty(study, lambda sets: scene_at(study, data, study.baseline, seed, [*overrides, *sets]))
-    return min(scene.numerics.extend_limit for scene in scenes_of(run))
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,11 @@ from doe.study_file import Study
 from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError, RunError, key_path, refuse
+from rbdyn.base.faults import RunError, key_path
 from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.figure_names import HARMONIC
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.thermal import first_guess_faults
 
 if TYPE_CHECKING:
     from doe.aggregation import Aggregated, Estimates
@@ -192,42 +191,6 @@ class DutyScenes:
 
 # What a study simulates at values of its factors: a scene, or one at each point of its duty.
 Run = Scene | DutyScenes
-
-
-def over_duty(
-    study: Study,
-    scene: Callable[[Sequence[str]], Scene],
-    baseline: Mapping[str, Scene] | None = None,
-    baseline_errors: bool = False,
-) -> Run:
-    """A run of a study: ``scene`` of no further overrides, or of those at each point of the duty.
-
-    ``baseline`` and ``baseline_errors``: as of `DutyScenes`. Raises InputError, which names the point with an impossible scene.
-    """
-    duty = Duty.of(study)
-    if duty is None:
-        return scene(())
-    points, faults = dict[str, Scene](), dict[str, list[str]]()
-    for name, overrides in duty.overrides.items():
-        try:
-            points[name] = scene(overrides)
-            refuse(
-                first_guess_faults(
-                    points[name].thermal, points[name].lubricant, {".".join(key_path(text) or ()) for text in overrides}
-                )
-            )
-        except InputError as error:
-            faults[name] = error.faults
-    # A fault at all points is none of the duty.
-    everywhere = set.intersection(*map(set, faults.values())) if len(faults) == len(duty.shares) else set[str]()
-    at_points = [
-        f"{study.path}: duty.set of {name}: {fault}"
-        for name, sentences in faults.items()
-        for fault in sentences
-        if fault not in everywhere
-    ]
-    refuse([*sorted(everywhere), *at_points])
-    return DutyScenes(duty, points, baseline or {}, baseline_errors)
 
 
 def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene | str]]) -> list[Run | str]:

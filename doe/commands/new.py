@@ -27,7 +27,7 @@ from rbdyn.base.command import (
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
-    from doe.study_file import Study
+    from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
@@ -102,9 +102,9 @@ def new(
 ) -> None:
     """Write a commented study of a scene's clearances."""
     with guarded(as_json):
-        from doe.study_file import Study
         from doe.study_file.study import StudyFile
         from doe.workflow.front import check_goals
+        from doe.workflow.problem import Problem
         from doe.workflow.region import region_that_runs
         from doe.workflow.whole import check_study
         from rbdyn.base.command import fill_template
@@ -122,12 +122,14 @@ def new(
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
 
-        def written(factors: list[Factor]) -> tuple[str, Study]:
+        def written(factors: list[Factor]) -> tuple[str, Problem]:
             text = template
             for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
                 text = text.replace(f"{{{name}}}", section)
             text = fill_template(text, {"quoted": json.dumps(str(base)), "hours": "true" if hours else None})
-            return text, Study(out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}"))
+            return text, Problem(
+                out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}")
+            )
 
         text, study = written(factors)
         check_goals(study)
@@ -243,7 +245,7 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
     return factors
 
 
-def _moved(factors: list[Factor], before: "Study", after: "Study") -> list[Factor]:
+def _moved(factors: list[Factor], before: "Problem", after: "Problem") -> list[Factor]:
     """The factors with the region of the study ``after`` it moved."""
     moved = []
     for factor, old, new in zip(factors, before.file.factor, after.file.factor, strict=True):

@@ -19,8 +19,8 @@ from rbdyn.base.words import counted, quantity, with_error
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-    from doe.study_file import Study
     from doe.workflow.asked import Asked
+    from doe.workflow.problem import Problem
 
 
 def notes_record(notes: Notes) -> dict[str, Any]:
@@ -65,21 +65,21 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     """
     from doe.report.identity import study_identity
     from doe.report.sections.design import design_record, design_tables
-    from doe.study_file import Study
+    from doe.workflow.design import augment_notes, evaluation
+    from doe.workflow.problem import Problem
     from doe.workflow.region import region_that_runs
-    from doe.workflow.runs import augment_notes, design_of, evaluation
     from doe.workflow.whole import check_study
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
     with step_folder(folder, "design", ("design",), force) as output:
-        study = Study.load(path)
+        study = Problem.load(path)
         # Without a scene the runs are made elsewhere, and only the design itself is checked.
         notes: Notes = ()
         if study.file.scene and study.path_of(study.scene.file).exists():
             with Effort().folder(folder) as store:
                 study, notes = region_that_runs(study, store)
             check_study(study)
-        points = design_of(study)
+        points = study.design
         notes += augment_notes(study)
         output.claim(path)
         record = design_record(study, points, evaluation(study, points)) | notes_record(notes)
@@ -199,13 +199,13 @@ def fit(
 
 def _study_or_table(
     path: Path | None, data: Path | None, factors: Any, responses: Any, model: str | None
-) -> "tuple[Study, Notes]":
+) -> "tuple[Problem, Notes]":
     """The study of the file, or else that of the table with the options that name its columns; and notes.
 
     Raises InputError.
     """
-    from doe.study_file import Study
     from doe.study_file.study import study_of_table
+    from doe.workflow.problem import Problem
 
     factors = texts_given(factors, "factors", '["pocket_clearance_mm"]')
     responses = texts_given(responses, "responses", '["impact_force_N"]')
@@ -214,15 +214,16 @@ def _study_or_table(
         refuse(
             f"--{option}: {path} states it; leave out one or the other" for option, value in options.items() if value
         )
-        return Study.load(path), ()
+        return Problem.load(path), ()
     if data is None:
         raise InputError(
             ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
         )
-    return study_of_table(data, factors, responses, model or "quadratic")
+    study, notes = study_of_table(data, factors, responses, model or "quadratic")
+    return Problem(study.path, study.file), notes
 
 
-def _read_later(study: "Study", data: Path | None) -> list[Path]:
+def _read_later(study: "Problem", data: Path | None) -> list[Path]:
     """Files that a step reads only as it runs: those that its study names, and the table of runs."""
     from doe.workflow.status import named_files
     from rbdyn.base.tables.workbook import split_path
@@ -232,14 +233,14 @@ def _read_later(study: "Study", data: Path | None) -> list[Path]:
 
 
 def _surfaces(
-    study: "Study", data: Path | None, out: Path | None, effort: Effort
-) -> "tuple[Study, list[Surface], Notes]":
+    study: "Problem", data: Path | None, out: Path | None, effort: Effort
+) -> "tuple[Problem, list[Surface], Notes]":
     """The study with its region, surfaces of it, of a table or of simulated runs, and notes on both.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
     from doe.workflow.region import region_that_runs
-    from doe.workflow.runs import design_of, read_runs, run_design, with_remaining
+    from doe.workflow.runs import read_runs, run_design, with_remaining
     from doe.workflow.surfaces import fit_surfaces
 
     if data is not None:
@@ -250,7 +251,7 @@ def _surfaces(
             study, folder, effort.workers, effort.scheduler, effort.retry, effort.progress, effort.notice
         )
         if effort.notice is not None:
-            effort.notice(f"{counted(len(design_of(study).coded), 'design run')}, {effort.threads} at once")
+            effort.notice(f"{counted(len(study.design.coded), 'design run')}, {effort.threads} at once")
         progress = effort.progress("design runs")
         runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
         return with_remaining(study, runs), fit_surfaces(study, runs), notes
@@ -322,17 +323,17 @@ def front(
 
     from doe.report.identity import study_identity
     from doe.report.sections.front import front_record, front_tables, given_point_record
-    from doe.study_file import Study
     from doe.workflow.asked import Asked
     from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
+    from doe.workflow.problem import Problem
 
     path = path_given(path, "path")
     table, folder = (
         None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
     )
     with step_folder(folder, "front", ("front",), force) as output, registered(path, folder):
-        study = Study.load(path)
+        study = Problem.load(path)
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
         output.claim(path, *_read_later(study, table))
@@ -363,7 +364,7 @@ def _point_text(point: Any) -> str:
     raise InputError([f"point = {shown}: must be values by factor, such as {{'pocket_clearance_mm': 0.3}}, or a list"])
 
 
-def _point(study: "Study", text: str) -> list[float]:
+def _point(study: "Problem", text: str) -> list[float]:
     """Factor values of ``--point``. Raises InputError with every fault."""
     from collections import Counter
     from math import nan

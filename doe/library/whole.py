@@ -147,14 +147,14 @@ def study(
     A broken limit is in ``answer["status"]`` and ``answer["limits_sentence"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
     """
-    from doe.study_file import Study
+    from doe.workflow.problem import Problem
     from doe.workflow.status import finished_record, inputs_digest
 
     path = path_given(path, "path")
     folder = Path(f"{path.stem}_results") if out is None else path_given(out, "out")
     effort = Effort(workers, scheduler, retry, progress, notice)
     with output_folder(folder, "doe", STUDY_FILES, force=force) as output, registered(path, folder):
-        loaded = Study.load(path)
+        loaded = Problem.load(path)
         digest = inputs_digest(loaded, adaptive, robust)
         if not retry and (record := finished_record(folder, digest)):
             return StudyAnswer(record, folder, tuple(record["files"]), finished_before=True)

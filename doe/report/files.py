@@ -32,8 +32,9 @@ from doe.running.store import grouped
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.asked import Settings
 from doe.workflow.confirmation import statement
+from doe.workflow.design import evaluation
 from doe.workflow.pick import SearchedPick
-from doe.workflow.runs import RUNS_TABLE, evaluation
+from doe.workflow.runs import RUNS_TABLE
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail, Verdict

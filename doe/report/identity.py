@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.status import named_files
 from rbdyn.base.faults import InputError
 from rbdyn.base.identity import Identity, identity_of
 from rbdyn.scene import Scene
 
 
-def study_identity(command: str, study: Study, data: Path | None = None) -> Identity:
+def study_identity(command: str, study: Problem, data: Path | None = None) -> Identity:
     """Identity of a study or of a step of it; ``data``: table of runs made elsewhere. A study without a scene has no bearing."""
     scene: Mapping[str, Any] = {}
     if study.file.scene is not None:
@@ -27,7 +27,7 @@ def study_identity(command: str, study: Study, data: Path | None = None) -> Iden
     return replace(identity, point=duty_words(study)) if study.shares and scene else identity
 
 
-def duty_words(study: Study) -> str:
+def duty_words(study: Problem) -> str:
     """'duty of idle 15 %, cruise 80 %, take-off 5 %': the points of operation of a study with their shares of the time."""
     points = (f"{point.name} {100.0 * study.shares[point.name]:.3g} %" for point in study.file.duty)
     return f"duty of {', '.join(points)}"

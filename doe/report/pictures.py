@@ -17,10 +17,9 @@ from doe.report.sections.front_pictures import drawn_pairs, near
 from doe.report.sections.record import Record
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
-from doe.study_file import Study
 from doe.workflow.asked import Asked
+from doe.workflow.problem import Problem
 from doe.workflow.robust import RobustFront
-from doe.workflow.runs import design_of
 from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 
@@ -28,10 +27,10 @@ from rbdyn.base.words import label, quantity
 COLUMNS = 3
 
 
-def response_surface(study: Study, surface: Surface, path: Path) -> None:
+def response_surface(study: Problem, surface: Surface, path: Path) -> None:
     """Surface over the first factor and each other one, the rest at their centre, with contours below."""
     factors, response = len(study.factors), Asked.of(study).response(surface.name)
-    reach = design_of(study).reach
+    reach = study.design.reach
     grid = np.linspace(-reach, reach, 41)
     figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
     for panel in range(1, factors):

@@ -24,12 +24,12 @@ from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.response_surface import Surface
 from doe.running.runner import Progress
 from doe.running.store import Failure, grouped
-from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
-from doe.workflow.runs import Runs, design_of, ordered_runs, region_of, runs_of
-from doe.workflow.surfaces import goals_of, independent_values, standard_errors
+from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs, runs_of
+from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, check_all, refuse
 
@@ -51,7 +51,7 @@ class Adaptive:
     name: ClassVar[str] = "adaptive"
     search: AdaptiveFront
     front: SimulatedFront
-    study: Study
+    study: Problem
     runs: Runs
     edges: Array
     failures: tuple[Failure, ...]
@@ -64,7 +64,7 @@ class Evaluator:
     A repeated search asks for the same runs in the same order, and the store answers at once.
     """
 
-    def __init__(self, study: Study, simulations: Simulations, progress: Progress, total: int) -> None:
+    def __init__(self, study: Problem, simulations: Simulations, progress: Progress, total: int) -> None:
         self._study, self._simulations = study, simulations
         self._progress, self._total = progress, total
         self.done = 0
@@ -89,7 +89,7 @@ class Evaluator:
         self._progress(points * self.done + count, max(points * self._total, points * self.done + total))
 
 
-def check_adaptive(study: Study, search: bool) -> None:
+def check_adaptive(study: Problem, search: bool) -> None:
     """Raises InputError if the ``search`` asked for is impossible, or if none is asked for and categories need one."""
     if not search:
         refuse(
@@ -99,32 +99,27 @@ def check_adaptive(study: Study, search: bool) -> None:
         return
     border_of(study)
     every = study.every_level
-    check_all(
-        [
-            partial(clearance.adaptive_scenes, study.with_levels(levels), study.baseline[None], [2], 0)
-            for levels in every
-        ]
-    )
+    check_all([partial(study.with_levels(levels).adaptive_scenes, study.baseline[None], [2], 0) for levels in every])
     try:
-        check_budget(plan_of(study), sum(len(design_of(study.with_levels(levels)).coded) for levels in every))
+        check_budget(plan_of(study), sum(len(study.with_levels(levels).design.coded) for levels in every))
     except MethodError as error:
         raise InputError([f"{study.path}: adaptive.{error}"]) from None
 
 
-def plan_of(study: Study) -> Plan:
+def plan_of(study: Problem) -> Plan:
     """Settings of the search; a fresh run at a finalist has the replicates of a design run."""
     settings = study.file.adaptive
-    usual = main_scene(clearance.design_scenes(study, study.baseline[None])[0]).numerics.replicates
+    usual = main_scene(study.design_scenes(study.baseline[None])[0]).numerics.replicates
     return Plan(settings.budget, settings.batch, settings.seed, usual=usual, pick=study.file.front.pick)
 
 
 @one_thread
-def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptive:
+def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adaptive:
     """Search the front, beginning with the runs of the design, in batches that do not depend on the number of workers.
 
     Raises RunError if the runs of a stage fail, InputError for impossible settings or limits, KeyboardInterrupt.
     """
-    plan, goals, start_s = plan_of(study), goals_of(study), time.perf_counter()
+    plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
     baseline_levels, *other_levels = study.every_level
     other_runs = {levels: _design_at(study.with_levels(levels), simulations) for levels in other_levels}
     runs_by_levels = {baseline_levels: runs, **other_runs}
@@ -132,7 +127,7 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
     region = region_in_units(study)
     counts = len(region.levels)
-    step = np.append(region_of(study) * study.step, np.ones(counts))
+    step = np.append(study.reach * study.step, np.ones(counts))
     with named_faults(study, goals, lambda point: point[: len(study.factors)], ""):
         try:
             search = adaptive_front(
@@ -165,47 +160,47 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     )
 
 
-def predicted_costs(study: Study, adaptive: Adaptive, points: Array) -> Array:
+def predicted_costs(study: Problem, adaptive: Adaptive, points: Array) -> Array:
     """Costs (n, q) that the emulators predict at points (n, k) of the drawing, with the pick's categories."""
     search = adaptive.search
     categories = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
-    coded = np.hstack([study.coded(points) / region_of(study), categories])
+    coded = np.hstack([study.coded(points) / study.reach, categories])
     means, _ = search.emulators.predict(search.region.snap(coded))
     return adaptive.front.goals.costs(means)
 
 
-def emulator_draws(study: Study, adaptive: Adaptive, coded: Array, draws: int, random: np.random.Generator) -> Array:
+def emulator_draws(study: Problem, adaptive: Adaptive, coded: Array, draws: int, random: np.random.Generator) -> Array:
     """Responses (d, n, m) at coded points (n, k), with the pick's categories, of functions drawn from the emulators.
 
     Their scatter about the means is stretched by the errors of the emulators at runs that were left out.
     """
     emulators = adaptive.search.emulators
     categories = np.tile(_coded_levels(study, adaptive.study.levels), (len(coded), 1))
-    points = np.hstack([coded / region_of(study), categories])
+    points = np.hstack([coded / study.reach, categories])
     means = emulators.predict(points)[0]
     return np.asarray(means + emulators.stretch * (emulators.draws(draws, random)(points) - means))
 
 
-def levels_at(study: Study, point: Array) -> tuple[int, ...]:
+def levels_at(study: Problem, point: Array) -> tuple[int, ...]:
     """Places of the categories' values at a point (k + c,) of the search."""
     counts = [len(category.categories) for category in study.file.category]
     coded = point[len(study.factors) :].tolist()
     return tuple(round(0.5 * (x + 1.0) * (count - 1)) for x, count in zip(coded, counts, strict=True))
 
 
-def _coded_levels(study: Study, levels: tuple[int, ...]) -> list[float]:
+def _coded_levels(study: Problem, levels: tuple[int, ...]) -> list[float]:
     counts = [len(category.categories) for category in study.file.category]
     return [2.0 * place / (count - 1) - 1.0 for place, count in zip(levels, counts, strict=True)]
 
 
-def _design_at(study: Study, simulations: Simulations) -> Runs:
+def _design_at(study: Problem, simulations: Simulations) -> Runs:
     words = ", ".join(study.categories.values())
-    ordered = ordered_runs(study)
+    ordered = study.plan
     ordered = replace(ordered, labels=[f"{label} with {words}" for label in ordered.labels])
     return runs_of(study, ordered, simulations, simulations.progress(f"design runs with {words}"))
 
 
-def _at_levels(study: Study, front: SimulatedFront, levels: tuple[int, ...]) -> SimulatedFront:
+def _at_levels(study: Problem, front: SimulatedFront, levels: tuple[int, ...]) -> SimulatedFront:
     """The points of a front with these levels of the categories, without the columns of the categories."""
     rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
     parts = ("points", "values", "standard_errors", "costs", "cost_errors", "freedom")
@@ -215,9 +210,9 @@ def _at_levels(study: Study, front: SimulatedFront, levels: tuple[int, ...]) -> 
     return replace(front, **columns, failures=failures, pick=int(np.flatnonzero(rows == front.pick)[0]))
 
 
-def region_in_units(study: Study) -> Region:
+def region_in_units(study: Problem) -> Region:
     """The region of the design, from -1 to 1, with its points at the resolution of the drawing."""
-    half = region_of(study) * study.step
+    half = study.reach * study.step
     finest = np.array([factor.finest or np.nan for factor in study.file.factor]) / half
     apart = np.where(np.isnan(finest), ALIKE, finest * (1.0 + 1e-9))
     levels = tuple(len(category.categories) for category in study.file.category)
@@ -232,9 +227,9 @@ def region_in_units(study: Study) -> Region:
     return Region(-ones, ones, origin, np.append(finest, between), np.append(apart, 0.5 * between), levels, inactive)
 
 
-def border_of(study: Study) -> Border | None:
+def border_of(study: Problem) -> Border | None:
     """Ends to which the region may grow; None if it may not. Raises InputError if ``allowed`` lies inside the region."""
-    reach = region_of(study) * study.step
+    reach = study.reach * study.step
     region_ends = np.column_stack([study.centre - reach, study.centre + reach])
     ends = np.array(
         [factor.allowed or bounds for factor, bounds in zip(study.file.factor, region_ends.tolist(), strict=True)]
@@ -253,7 +248,7 @@ def border_of(study: Study) -> Border | None:
         try:
             for corner in corners:
                 numbers = study.centre + reach * corner[: reach.size]
-                (run,) = clearance.adaptive_scenes(study.with_levels(levels_at(study, corner)), numbers[None], [2], 0)
+                (run,) = study.with_levels(levels_at(study, corner)).adaptive_scenes(numbers[None], [2], 0)
                 least_mm = min(scene.mounted_clearance_mm for scene in scenes_of(run))
                 if 1e3 * least_mm < study.file.adaptive.least_clearance_um:
                     return False
@@ -266,12 +261,12 @@ def border_of(study: Study) -> Border | None:
     return Border(np.append(low, -levels), np.append(high, levels), possible)
 
 
-def advice(study: Study, surfaces: list[Surface]) -> list[str]:
+def advice(study: Problem, surfaces: list[Surface]) -> list[str]:
     """Advice to search adaptively, for surfaces with significant lack of fit; else none."""
     lacking = [surface.name for surface in surfaces if (p := surface.lack_of_fit["p"]) is not None and p < SIGNIFICANT]
     if not lacking:
         return []
-    design = len(design_of(study).coded)
+    design = len(study.design.coded)
     return [
         f"the front on the surfaces is biased: lack of fit is significant for {', '.join(lacking)}; --adaptive searches the front "
         f"with emulators of the simulator, in {max(study.file.adaptive.budget - design, 0)} runs beyond the {design} of the design"
@@ -281,7 +276,7 @@ def advice(study: Study, surfaces: list[Surface]) -> list[str]:
 class _PointEvaluator(Evaluator):
     """Runs batches of points, each with its number of replicates; the bar shows the state of the search."""
 
-    def __init__(self, study: Study, simulations: Simulations, total: int) -> None:
+    def __init__(self, study: Problem, simulations: Simulations, total: int) -> None:
         super().__init__(study, simulations, simulations.progress("adaptive front"), total)
 
     def report(self, state: Batch, count: int, total: int) -> None:
@@ -297,25 +292,25 @@ class _PointEvaluator(Evaluator):
         for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):
             rounded_point = self._study.rounded(point[: len(self._study.factors)])
             study = self._study.with_levels(levels_at(self._study, point))
-            scenes += clearance.adaptive_scenes(study, rounded_point[None], [count], number)
+            scenes += study.adaptive_scenes(rounded_point[None], [count], number)
         values, errors, samples = self.run(scenes, "adaptive run")
         return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
 
-def _design_runs(study: Study, runs_by_levels: Mapping[tuple[int, ...], Runs], plan: Plan) -> SearchRuns:
+def _design_runs(study: Problem, runs_by_levels: Mapping[tuple[int, ...], Runs], plan: Plan) -> SearchRuns:
     """The runs of all designs as samples of the search."""
     parts = []
     for levels, runs in runs_by_levels.items():
         number = independent_values(runs)
         errors, count = standard_errors(runs.errors, number), len(runs.coded)
-        points = np.hstack([runs.coded / region_of(study), np.tile(_coded_levels(study, levels), (count, 1))])
+        points = np.hstack([runs.coded / study.reach, np.tile(_coded_levels(study, levels), (count, 1))])
         parts.append(SearchRuns(points, runs.values, errors, np.maximum(number - 1, 0), np.full(count, plan.usual)))
     return reduce(SearchRuns.plus, parts)
 
 
-def _samples_about_finalists(study: Study, search: AdaptiveFront, levels: tuple[int, ...]) -> Samples:
+def _samples_about_finalists(study: Problem, search: AdaptiveFront, levels: tuple[int, ...]) -> Samples:
     """Predictions of the emulators about the finalists, in factor units; slopes of the front are taken from them."""
-    reach, factors = region_of(study), len(study.factors)
+    reach, factors = study.reach, len(study.factors)
     offsets = HALF_LEVEL * (2.0 * qmc.Sobol(factors, seed=search.front.seed).random_base2(ABOUT) - 1.0)
     coded = (study.coded(search.front.points[:, :factors])[:, None] + offsets).reshape(-1, factors)
     categories = np.tile(_coded_levels(study, levels), (len(coded), 1))
@@ -339,7 +334,7 @@ class FrontComparison:
     fresh: tuple[float, float]
 
 
-def compare_fronts(study: Study, adaptive: Adaptive, on_surfaces: Array) -> FrontComparison:
+def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> FrontComparison:
     """Fronts of a search and of the surfaces, (n, k) in factor units, on one scale."""
     search, goals = adaptive.search, adaptive.search.front.goals
     costs = goals.costs(search.predictions)
@@ -373,9 +368,9 @@ class Pull(NamedTuple):
     face: Face | None
 
 
-def pulls(study: Study, adaptive: Adaptive, pick: Array) -> list[Pull]:
+def pulls(study: Problem, adaptive: Adaptive, pick: Array) -> list[Pull]:
     """For each factor of a point (k,) in factor units, the directions in which the responses with a goal improve."""
-    names = [study.responses[index] for index in goals_of(study).objectives]
+    names = [study.responses[index] for index in study.goals.objectives]
     span = np.ptp(adaptive.search.front.goals.costs(adaptive.search.predictions), axis=0)
     factor_pulls = []
     for index, (low, high) in enumerate(adaptive.edges.tolist()):
@@ -394,7 +389,7 @@ def pulls(study: Study, adaptive: Adaptive, pick: Array) -> list[Pull]:
     return factor_pulls
 
 
-def _face(study: Study, adaptive: Adaptive, index: int, position: float) -> Face | None:
+def _face(study: Problem, adaptive: Adaptive, index: int, position: float) -> Face | None:
     """The face at which a factor lies, as the search ended; None inside.
 
     If the search's own pick lay elsewhere, it is the "end" of a region that might have grown, or the "allowed" end.
@@ -409,7 +404,7 @@ def _face(study: Study, adaptive: Adaptive, index: int, position: float) -> Face
     return None
 
 
-def near_limits(adaptive: Adaptive, study: Study, limits: Sequence[Limit]) -> list[Limit]:
+def near_limits(adaptive: Adaptive, study: Problem, limits: Sequence[Limit]) -> list[Limit]:
     """The limits whose room is within `NEAR` of the response's range over all runs."""
     ranges = dict(zip(study.responses, np.ptp(adaptive.search.emulators.runs.values, axis=0).tolist(), strict=True))
     return [limit for limit in limits if limit.room <= NEAR * ranges[limit.response]]

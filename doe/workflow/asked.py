@@ -4,13 +4,10 @@ import math
 from string import ascii_uppercase
 from typing import Any, Self
 
-from doe import clearance
 from doe.duty import main_scene
-from doe.study_file import Study
 from doe.study_file.duty import OverDuty
 from doe.study_file.sections import Goal
-from doe.workflow.front import known_tolerances
-from doe.workflow.runs import region_of
+from doe.workflow.problem import Problem
 from rbdyn.base.records import Record, spread
 from rbdyn.base.words import label, quantity
 
@@ -96,9 +93,9 @@ class Asked(Record):
     responses: list[Response]
 
     @staticmethod
-    def of(study: Study) -> "Asked":
+    def of(study: Problem) -> "Asked":
         """What a study states."""
-        reach, widths = region_of(study), known_tolerances(study)
+        reach, widths = study.reach, study.known_tolerances
         low, high = (study.actual(side * reach).tolist() for side in (-1.0, 1.0))
         without = set() if study.shares else set(OverDuty.model_fields) - set(Goal.model_fields)
         return Asked(
@@ -141,9 +138,9 @@ class Settings(Asked):
     confirmation_replicates: int
 
     @classmethod
-    def of_runs(cls, study: Study) -> Self:
+    def of_runs(cls, study: Problem) -> Self:
         """What a study with a scene states."""
-        scene, asked = main_scene(clearance.design_scenes(study, study.baseline[None])[0]), Asked.of(study)
+        scene, asked = main_scene(study.design_scenes(study.baseline[None])[0]), Asked.of(study)
         return cls(
             factors=asked.factors,
             responses=asked.responses,

@@ -14,10 +14,10 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.duty import DutyResult
 from doe.running.store import Failure
-from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
-from doe.workflow.surfaces import gain_verdict, goals_of
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.intervals import chance_above, joint_freedom, joint_half_width, one_sided, standard_errors, times_wider
@@ -138,9 +138,9 @@ class LostPickError(RunError):
     """The pick could not be simulated."""
 
 
-def simulate_original(study: Study, simulations: Simulations) -> Confirmed:
+def simulate_original(study: Problem, simulations: Simulations) -> Confirmed:
     """The original design, simulated with fresh seeds. Raises RunError where it fails, InputError, KeyboardInterrupt."""
-    run = clearance.confirmation_run(study.with_levels(()), study.baseline)
+    run = study.with_levels(()).confirmation_run(study.baseline)
     (result,) = simulations.run([run], ["baseline"], simulations.progress("baseline"))
     if isinstance(result, Failure):
         raise RunError(f"the original design cannot be simulated: {result}")
@@ -149,13 +149,13 @@ def simulate_original(study: Study, simulations: Simulations) -> Confirmed:
 
 @one_thread
 def confirm(
-    study: Study, baseline: Confirmed, choices: Mapping[str, Choice], simulations: Simulations
+    study: Problem, baseline: Confirmed, choices: Mapping[str, Choice], simulations: Simulations
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
     """Simulate the choices with fresh seeds. Returns the simulated points, the ``baseline`` first, and the failures.
 
     Raises LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
-    runs = [clearance.confirmation_run(study, choice.point) for choice in choices.values()]
+    runs = [study.confirmation_run(choice.point) for choice in choices.values()]
     results = simulations.run(runs, list(choices), simulations.progress("confirmation"))
     confirmed, failures = {"baseline": baseline}, []
     for (name, choice), result in zip(choices.items(), results, strict=True):
@@ -168,7 +168,7 @@ def confirm(
     return confirmed, failures
 
 
-def confirmed_from(study: Study, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
+def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
     record = result.as_dict()
     quantities = [clearance.quantity_of(record, name) for name in study.responses]
@@ -195,9 +195,9 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult | Duty
     )
 
 
-def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
+def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
     """Improvements of all responses with a goal; the errors of both runs are independent."""
-    goals = goals_of(study)
+    goals = study.goals
     objectives = goals.objectives
     error, freedom = error_of_difference(baseline, pick)
     scale = 100.0 / np.abs(baseline.values[objectives])
@@ -215,9 +215,9 @@ def error_of_difference(first: Confirmed, second: Confirmed) -> tuple[Array, Arr
     return joint_half_width([*errors[0], *errors[1]], [*freedom[0], *freedom[1]])
 
 
-def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:
+def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
     """A warning that the whirl deviation ratio, which has a goal, is that of a trembling cage; else empty."""
-    objectives = [study.responses[index] for index in goals_of(study).objectives]
+    objectives = [study.responses[index] for index in study.goals.objectives]
     shares = {name: confirmed[name].orbit_share for name in ("baseline", "pick")}
     jitter_shares = {name: share for name, share in shares.items() if share is not None}
     if WHIRL not in objectives or not jitter_shares:
@@ -323,18 +323,16 @@ class Limit:
         return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {probability})"
 
 
-def every_limit(study: Study, confirmed: Confirmed) -> list[Limit]:
+def every_limit(study: Problem, confirmed: Confirmed) -> list[Limit]:
     """All limits of the study at a simulated point; the lower and the upper limit of a response are two."""
     freedom = confirmed.joint_freedom
     sides = one_sided(freedom, study.file.confirmation.limit_probability).tolist()
     columns = (confirmed.values.tolist(), confirmed.error.tolist(), sides, freedom.tolist())
     figures = list(zip(*columns, strict=True))
-    return [
-        Limit(study.responses[index], sense, bound, *figures[index]) for index, sense, bound in goals_of(study).limited
-    ]
+    return [Limit(study.responses[index], sense, bound, *figures[index]) for index, sense, bound in study.goals.limited]
 
 
-def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
+def limits_of(study: Problem, confirmed: Confirmed) -> list[Limit]:
     """The limits of the study at a simulated point, one per response.
 
     Of a lower and an upper limit it is the one with the worse verdict, or with less room.
@@ -369,9 +367,9 @@ def sentence(limits: Sequence[Limit], probability: float, tries: int) -> str:
     return f"{'. '.join(parts)} ({points})."
 
 
-def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
+def odds_sentence(study: Problem, odds: Mapping[str, Share] | None) -> str:
     """Probability that the pick keeps its limits over the unknown inputs, or the command for it; empty without limits."""
-    if not goals_of(study).limited:
+    if not study.goals.limited:
         return ""
     if odds is None:
         return (

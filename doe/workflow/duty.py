@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from doe import clearance
 from doe.duty import scenes_of
-from doe.study_file import Study
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed, Gain, gains
 from doe.workflow.front import find_front, out_of_reach
-from doe.workflow.runs import Runs, rounded_within
+from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
@@ -42,7 +41,7 @@ class OwnPick:
     values: Mapping[str, float]
     gains: list[PredictedGain]
 
-    def as_dict(self, study: Study) -> dict[str, Any]:
+    def as_dict(self, study: Problem) -> dict[str, Any]:
         """JSON: factors, responses, reason, and by response the gain over the study's pick."""
         gains = {gain.response: gain.as_dict() for gain in self.gains}
         return {
@@ -78,7 +77,7 @@ class DutyAnswer:
     probability that it is. ``life``: life over the duty at "baseline" and "pick", by static loads.
     """
 
-    study: Study
+    study: Problem
     points: list[AtPoint]
     aggregate: Mapping[str, str]
     worst: Mapping[str, Mapping[str, tuple[str, float]]]
@@ -128,7 +127,7 @@ def quantities_record(figures: Figures) -> dict[str, Any]:
     }
 
 
-def duty_answer(study: Study, runs: Runs, confirmed: Mapping[str, Confirmed]) -> DutyAnswer | None:
+def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) -> DutyAnswer | None:
     """The answer at every point of the duty; None for a study without one."""
     if not study.shares:
         return None
@@ -153,7 +152,7 @@ def duty_answer(study: Study, runs: Runs, confirmed: Mapping[str, Confirmed]) ->
 
 
 def lives(
-    study: Study, ends: Mapping[str, Array], hot: Mapping[str, Mapping[str, Scene]] = MappingProxyType({})
+    study: Problem, ends: Mapping[str, Array], hot: Mapping[str, Mapping[str, Scene]] = MappingProxyType({})
 ) -> dict[str, DutyLife]:
     """Life over the duty of the original design, "baseline", and of others, points (k,) by name.
 
@@ -163,13 +162,13 @@ def lives(
 
     names, life = [point.name for point in study.file.duty], {}
     for name, place in ends.items():
-        run = clearance.confirmation_run(study.with_levels(()) if name == "baseline" else study, place)
+        run = (study.with_levels(()) if name == "baseline" else study).confirmation_run(place)
         by_name = {**dict(zip(study.shares, scenes_of(run), strict=True)), **hot.get(name, {})}
         life[name] = roller_duty_life([by_name[point] for point in names], [study.shares[point] for point in names])
     return life
 
 
-def study_at(study: Study, name: str) -> Study:
+def study_at(study: Problem, name: str) -> Problem:
     """The study of one point of the duty alone: with its figures as responses, and the limits that hold there.
 
     Wishes in ratios to the baseline are none for the figure itself.
@@ -194,7 +193,7 @@ def study_at(study: Study, name: str) -> Study:
 
 
 @one_thread
-def own_pick(study: Study, runs: Runs, pick: Array) -> OwnPick:
+def own_pick(study: Problem, runs: Runs, pick: Array) -> OwnPick:
     """The pick by the study's rule on the surfaces of a point's ``runs``, next to the ``pick`` (k,) of the whole duty.
 
     ``study`` is that of the point alone. Raises InputError where it has no front.
@@ -203,14 +202,14 @@ def own_pick(study: Study, runs: Runs, pick: Array) -> OwnPick:
     front = find_front(study, surfaces)
     if front.violations is not None:
         raise out_of_reach(study, front.points[0], front.violations)
-    point = rounded_within(study, front.points[front.pick])
+    point = study.rounded_within(front.points[front.pick])
     values = predict_all(surfaces, study.coded(point)[None])[0]
     from_pick = study.file.model_copy(update={"baseline": study.by_factor(pick)})
     over_pick = predicted_gains(replace(study, file=from_pick), surfaces, point)
     return OwnPick(point, front.pick_reason, dict(zip(study.responses, values.tolist(), strict=True)), over_pick)
 
 
-def _at_point(study: Study, confirmed: Confirmed, name: str) -> Confirmed:
+def _at_point(study: Problem, confirmed: Confirmed, name: str) -> Confirmed:
     """A simulated point at one point of the duty, whose study it is."""
     figures = [confirmed.at_points[name][response] for response in study.responses]
     values = np.array([figure.value for figure in figures])

@@ -15,9 +15,9 @@ from doe.clearance import Simulations
 from doe.duty import DutyResult, Run
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Limit, every_limit
-from doe.workflow.runs import STORE, ordered_runs, region_of
+from doe.workflow.problem import Problem
+from doe.workflow.runs import STORE
 from doe.workflow.surfaces import standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.pace import Notice
@@ -27,7 +27,7 @@ from rbdyn.result import SimulationResult
 Outcome = SimulationResult | DutyResult | Failure
 
 
-def original_sentences(study: Study, baseline: Confirmed) -> list[str]:
+def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
     """Figures of the original at each point of the duty, and the limits that it misses."""
     whole = zip(study.responses, baseline.values.tolist(), baseline.error.tolist(), strict=True)
     figures: Mapping[str, Mapping[str, tuple[float, float | None]]] = {
@@ -53,7 +53,7 @@ def _figure(name: str, value: float, error: float | None) -> str:
     return f"{words} {with_error(value, error)} {unit}".rstrip()
 
 
-def first_look(study: Study, folder: Path, original: Confirmed, progress: Progress, notice: Notice) -> Progress:
+def first_look(study: Problem, folder: Path, original: Confirmed, progress: Progress, notice: Notice) -> Progress:
     """Show the original at once. Returns the same progress of the design runs, which shows what its corners say of the limits."""
     if notice is None:
         return progress
@@ -62,7 +62,7 @@ def first_look(study: Study, folder: Path, original: Confirmed, progress: Progre
     missed = [limit for limit in every_limit(study, original) if limit.verdict == "broken"]
     if not missed:
         return progress
-    ordered = ordered_runs(study)
+    ordered = study.plan
     rows = [row for row, kind in enumerate(ordered.design.kind) if kind == "cube"]
     runs, labels = [ordered.scenes[row] for row in rows], [ordered.labels[row] for row in rows]
     waiting = bool(rows)
@@ -92,7 +92,7 @@ def _silent(done: int, total: int) -> None:
     """Progress that nobody watches."""
 
 
-def unlikely(study: Study, missed: Sequence[Limit], coded: Array, results: Sequence[Outcome]) -> list[str]:
+def unlikely(study: Problem, missed: Sequence[Limit], coded: Array, results: Sequence[Outcome]) -> list[str]:
     """Sentences on the limits that the original and all corners miss, and a plane through these too.
 
     ``results`` (n) at ``coded`` corners (n, k); failed ones are left out. The plane is followed to the bounds of the search; it
@@ -109,7 +109,7 @@ def unlikely(study: Study, missed: Sequence[Limit], coded: Array, results: Seque
         column, sign = study.responses.index(limit.response), 1.0 if limit.sense == "<=" else -1.0
         excess = sign * (values[:, column] - limit.bound)
         plane = np.linalg.lstsq(terms, excess, rcond=None)[0]
-        least = float(plane[0] - np.abs(plane[1:]) @ region_of(study))
+        least = float(plane[0] - np.abs(plane[1:]) @ study.reach)
         if min(excess.min(), least) > 2.0 * errors[:, column].max():
             nearest, end = (shown(limit.bound + sign * value, 3) for value in (float(excess.min()), least))
             sentences.append(

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress
 from typing import Self, TypeVar
 
 import numpy as np
@@ -29,13 +28,12 @@ from doe.pareto.search import Archive, Doubt, dominates
 from doe.pareto.tolerance import PartCount
 from doe.response_surface import Surface
 from doe.response_surface.adequacy import correlation
-from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed
-from doe.workflow.runs import region_of
-from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, goals_of, predict_all, predict_draws, quadratics
-from rbdyn.base.arrays import Array, Mask, Rows
-from rbdyn.base.faults import InputError, MethodError, refuse
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
+from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.faults import InputError, MethodError
 
 # Shares of the back-off from limits: the search takes the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
@@ -48,7 +46,7 @@ AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
 
 @one_thread
 def find_front(
-    study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
+    study: Problem, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> ParetoFront:
     """The Pareto front on the surfaces with its uncertainty, and the tolerance-aware front if the study asks for it.
 
@@ -59,7 +57,7 @@ def find_front(
     Where no point keeps all limits, the front is the point that is expected to miss them least (see `ParetoFront.violations`).
     Raises InputError when fewer than two responses have a goal, or a tolerance is missing.
     """
-    goals, settings, reach = goals_of(study), study.file.front, region_of(study)
+    goals, settings, reach = study.goals, study.file.front, study.reach
     check_goals(study)
     box = tolerance_box(study)
     doubt, remaining = SurfaceDoubt(study, surfaces, simulated), study.remaining
@@ -100,7 +98,7 @@ def find_front(
 
 @one_thread
 def with_survival(
-    study: Study, surfaces: Sequence[Surface], pareto: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
+    study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
 ) -> ParetoFront:
     """The front with the intervals of the shares of parts that dominate the baseline.
 
@@ -117,15 +115,15 @@ def with_survival(
     return replace(pareto, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
 
 
-def _with_inactive_at(study: Study, centre: Array, pareto: AnyFront) -> AnyFront:
+def _with_inactive_at(study: Problem, centre: Array, pareto: AnyFront) -> AnyFront:
     """The same points with the inactive factors, whose values mean nothing, at a centre (k,)."""
     inactive = np.isin(np.arange(centre.size), study.inactive)
     return replace(pareto, points=np.where(inactive, centre, pareto.points)) if inactive.any() else pareto
 
 
-def _backed_off(study: Study, search: Callable[[float], AnyFront], failed: int) -> AnyFront:
+def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int) -> AnyFront:
     """The front with the largest share of the back-off that any point keeps. Raises InfeasibleError."""
-    if not goals_of(study).limited:
+    if not study.goals.limited:
         return search(0.0)
     for share in (1.0 + failed, *SHARES)[failed == 0 :]:
         try:
@@ -141,7 +139,7 @@ def _backed_off(study: Study, search: Callable[[float], AnyFront], failed: int) 
     raise AssertionError("the last share either returns or raises")
 
 
-def _uncertainty(study: Study, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
+def _uncertainty(study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
     assert pareto.baseline_values is not None
     coefficients = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([pareto.points, study.baseline])
@@ -152,9 +150,9 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], pareto: ParetoFront)
 
 
 def _tolerance_aware(
-    study: Study, surfaces: Sequence[Surface], pareto: ParetoFront, box: ToleranceBox, doubt: Doubt
+    study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
-    reach = region_of(study)
+    reach = study.reach
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
         box,
@@ -171,7 +169,7 @@ def _tolerance_aware(
 
 
 @contextmanager
-def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
+def named_faults(study: Problem, goals: Goals, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
     """Raises OutOfReachError for a search without a feasible point; ``actual`` gives points in factor units."""
     try:
         yield
@@ -185,7 +183,7 @@ class OutOfReachError(InputError):
     """No point of a search keeps all limits."""
 
 
-def out_of_reach(study: Study, point: Array, violations: Array, suffix: str = "") -> OutOfReachError:
+def out_of_reach(study: Problem, point: Array, violations: Array, suffix: str = "") -> OutOfReachError:
     """The fault of a study whose limits no point keeps: the closest ``point`` (k,) in factor units exceeds them by (c,)."""
     excess = excess_words(study, violations)
     position = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(point).items())
@@ -197,7 +195,7 @@ def out_of_reach(study: Study, point: Array, violations: Array, suffix: str = ""
     )
 
 
-def tolerances_out_of_reach(study: Study, violations: Array) -> str:
+def tolerances_out_of_reach(study: Problem, violations: Array) -> str:
     """That no point keeps all limits within the factors' own tolerances; the closest exceeds them by ``violations`` (c,)."""
     return (
         "No point keeps all limits at the ends of the factors' own tolerances: the closest misses "
@@ -205,10 +203,10 @@ def tolerances_out_of_reach(study: Study, violations: Array) -> str:
     )
 
 
-def excess_words(study: Study, violations: Array) -> str:
+def excess_words(study: Problem, violations: Array) -> str:
     """'impact_force_N <= 40 by 3.2' of the limits that are exceeded, by their excess (c,)."""
     # Where runs failed, the last of the violations is that of no limit.
-    by_limit = zip(goals_of(study).limited, violations.tolist(), strict=False)
+    by_limit = zip(study.goals.limited, violations.tolist(), strict=False)
     return " and ".join(
         f"{study.responses[index]} {sense} {limit:g} by {violation:.4g}"
         for (index, sense, limit), violation in by_limit
@@ -216,60 +214,21 @@ def excess_words(study: Study, violations: Array) -> str:
     )
 
 
-def check_goals(study: Study) -> None:
+def check_goals(study: Problem) -> None:
     """Raises InputError for a study without a front: too few goals, or no tolerances for the tolerance-aware one."""
-    if len(goals_of(study).objectives) < 2:
-        limited = [study.responses[index] for index in dict.fromkeys(index for index, _, _ in goals_of(study).limited)]
+    if len(study.goals.objectives) < 2:
+        limited = [study.responses[index] for index in dict.fromkeys(index for index, _, _ in study.goals.limited)]
         hint = f'; {", ".join(limited)} may be one: write goal = "min" with its limit' if limited else ""
         raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one{hint}"])
-    if study.file.front.tolerance_aware != "none":
-        tolerances_of(study)
+    tolerance_box(study)
 
 
-def rigid_factors(study: Study) -> Mask:
-    """Factors (k,) without a tolerance: whole numbers, and those that mean nothing at the study's categories."""
-    return np.array([factor.whole or place in study.inactive for place, factor in enumerate(study.file.factor)])
-
-
-def known_tolerances(study: Study) -> dict[str, float]:
-    """Half widths of the factors that have any, in their units: their own, or that of the narrowest chain."""
-    half_widths = {}
-    for factor in compress(study.file.factor, ~rigid_factors(study)):
-        closing = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
-        widths = [width for width in closing if width is not None]
-        if factor.tolerance is not None or widths:
-            half_widths[factor.name] = min(widths) if factor.tolerance is None else factor.tolerance
-    return half_widths
-
-
-def tolerance_box(study: Study) -> ToleranceBox | None:
-    """Parts of the tolerance-aware front; None where the study asks for none. Raises as `tolerances_of`."""
+def tolerance_box(study: Problem) -> ToleranceBox | None:
+    """Parts of the tolerance-aware front; None where the study asks for none. Raises as ``study.coded_tolerances``."""
     front = study.file.front
     if front.tolerance_aware == "none":
         return None
-    return ToleranceBox(tolerances_of(study), front.tolerance_aware, front.quantile, front.distribution)
-
-
-def tolerances_of(study: Study) -> Array:
-    """Half widths (k,) of all factors in coded units, 0 for factors without a tolerance.
-
-    Raises InputError for each half width that is missing or too wide.
-    """
-    half_widths = dict.fromkeys(compress(study.factors, rigid_factors(study)), 0.0) | known_tolerances(study)
-    faults = [
-        f"{study.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that manufacture "
-        "keeps, here or as half_width_mm of a chain that closes on this factor"
-        for name in study.factors
-        if name not in half_widths
-    ]
-    faults += [
-        f"{study.path}: factor.tolerance of {name} = {half_widths[name]:g}: leaves no room in the region, which reaches "
-        f"{limit:g} to either side of the centre; narrow it or widen the design"
-        for name, limit in zip(study.factors, region_of(study) * study.step, strict=True)
-        if half_widths.get(name, 0.0) >= limit
-    ]
-    refuse(faults)
-    return np.array([half_widths[name] for name in study.factors]) / study.step
+    return ToleranceBox(study.coded_tolerances, front.tolerance_aware, front.quantile, front.distribution)
 
 
 SCALES = np.geomspace(1.0, 100.0, 81)  # factors on the standard errors, compared by the likelihood of the misses
@@ -322,12 +281,12 @@ class ErrorField:
 class SurfaceDoubt:
     """Errors of the surfaces of limited responses, from the misses at the design runs and at points ``simulated``."""
 
-    def __init__(self, study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
+    def __init__(self, study: Problem, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
         self._surfaces, self._probability = surfaces, study.file.confirmation.limit_probability
         self._fields: dict[int, ErrorField] = {}
         # The error of one more simulation counts too.
         self._more: dict[int, float] = {}
-        for index in sorted({index for index, _, _ in goals_of(study).limited}):
+        for index in sorted({index for index, _, _ in study.goals.limited}):
             surface = surfaces[index]
             all_misses = _at_design(surface)
             if simulated:
@@ -411,7 +370,7 @@ Draws = Callable[[Array], Iterator[Array]]
 
 
 def draws_of(
-    study: Study, surfaces: Sequence[Surface], confirmed: Mapping[str, Confirmed] | None = None, draws: int = DRAWS
+    study: Problem, surfaces: Sequence[Surface], confirmed: Mapping[str, Confirmed] | None = None, draws: int = DRAWS
 ) -> Draws:
     """Draws of the surfaces, conditioned on the ``confirmed`` points."""
     points = list((confirmed or {}).values())
@@ -424,12 +383,12 @@ def draws_of(
     return partial(drawn_responses, surfaces, draws=draws, seed=study.file.front.seed, simulated=simulated)
 
 
-def keeping(study: Study, draws: Draws, point: Array, free: Rows, least_gains: Array) -> PartCount:
+def keeping(study: Problem, draws: Draws, point: Array, free: Rows, least_gains: Array) -> PartCount:
     """A count of the parts that gain at least ``least_gains`` (q,) over the baseline in every cost and keep all limits.
 
     Parts (n, f) are values of the ``free`` factors (f,) about a ``point`` (k,).
     """
-    goals = goals_of(study)
+    goals = study.goals
 
     def counts_of(parts: Array) -> Array:
         points = np.tile(point, (len(parts) + 1, 1))
@@ -445,9 +404,9 @@ def keeping(study: Study, draws: Draws, point: Array, free: Rows, least_gains: A
     return counts_of
 
 
-def survival(study: Study, draws: Draws, coded: Array, box: ToleranceBox) -> Interval:
+def survival(study: Problem, draws: Draws, coded: Array, box: ToleranceBox) -> Interval:
     """Interval of the share of the parts made at a ``coded`` point (k,) that dominate the nominal baseline."""
-    goals = goals_of(study)
+    goals = study.goals
     parts = coded + box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
     counts = []
     for values in draws(np.vstack([parts, study.coded(study.baseline)])):

@@ -8,14 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from doe import clearance
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
-from doe.study_file import Study
 from doe.study_file.study import PointResponse
 from doe.workflow.confirmation import Confirmed, Limit, Verdict, every_limit
 from doe.workflow.front import tolerances_out_of_reach
-from doe.workflow.pick import ends_of, place_of, sides_of
+from doe.workflow.pick import place_of, sides_of
+from doe.workflow.problem import Problem
 from doe.workflow.surfaces import predict_all
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array
@@ -47,7 +46,7 @@ class MissedLimit(Record):
     probability: float
 
     @classmethod
-    def of(cls, study: Study, limit: Limit) -> "MissedLimit":
+    def of(cls, study: Problem, limit: Limit) -> "MissedLimit":
         """The record of a limit that is not kept."""
         asked = study.file.response[study.responses.index(limit.response)]
         name, point = (asked.figure, asked.point) if isinstance(asked, PointResponse) else (asked.name, None)
@@ -151,7 +150,7 @@ class Obstacles(Record):
 
 
 def obstacles_of(
-    study: Study,
+    study: Problem,
     surfaces: Sequence[Surface],
     front: ParetoFront,
     pick: Confirmed,
@@ -180,7 +179,7 @@ def obstacles_of(
     )
 
 
-def without_broken(study: Study, pick: Confirmed) -> Study:
+def without_broken(study: Problem, pick: Confirmed) -> Problem:
     """The study without the limits that the pick breaks: no tolerance would keep them."""
     broken = {(limit.response, limit.sense) for limit in every_limit(study, pick) if limit.verdict == "broken"}
     ends = {"lower": ">=", "upper": "<="}
@@ -191,9 +190,9 @@ def without_broken(study: Study, pick: Confirmed) -> Study:
     return study.with_file(response=responses)
 
 
-def _beyond(study: Study, surfaces: Sequence[Surface], pick: Confirmed) -> Iterator[Beyond]:
+def _beyond(study: Problem, surfaces: Sequence[Surface], pick: Confirmed) -> Iterator[Beyond]:
     """The least moves of each factor at a bound, else of all of them together, that meet all limits."""
-    ends = ends_of(study)
+    ends = study.ends
     sides = sides_of(pick.point[None], ends)[0]
     places = [place for place in np.flatnonzero(sides).tolist() if place not in study.inactive]
     ways = [moved for place in places if (moved := _least_move(study, surfaces, pick, sides, [place])) is not None]
@@ -208,10 +207,10 @@ def _beyond(study: Study, surfaces: Sequence[Surface], pick: Confirmed) -> Itera
 
 
 def _least_move(
-    study: Study, surfaces: Sequence[Surface], pick: Confirmed, sides: Array, places: list[int]
+    study: Problem, surfaces: Sequence[Surface], pick: Confirmed, sides: Array, places: list[int]
 ) -> Array | None:
     """The nearest point (k,) to the pick, along these factors outward, at which the surfaces meet the limits; None without one."""
-    ends, outward = ends_of(study), np.zeros(pick.point.size)
+    ends, outward = study.ends, np.zeros(pick.point.size)
     outward[places] = (0.5 * (ends[:, 1] - ends[:, 0]) * sides)[places]
     shares = np.linspace(0.0, 1.0, STEPS + 1)[1:]
     points = np.array([study.rounded(pick.point + share * outward) for share in shares])
@@ -225,7 +224,7 @@ def _least_move(
         broken |= beyond > -(limit.one_sided * np.nan_to_num(limit.error))
     for point in points[~broken]:
         try:
-            clearance.confirmation_run(study, point)
+            study.confirmation_run(point)
         except InputError:
             # No scene has these values.
             return None

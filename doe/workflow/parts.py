@@ -17,8 +17,8 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError
 from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import Part as ChainPart
-from doe.study_file import Study
 from doe.study_file.sections import StudyChain
+from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.tolerances import STANDARD_TOLERANCES
@@ -182,7 +182,7 @@ class SharedTolerance:
         return Grade(GRADES[best], best, {part.name: (part.nominal, tables[part.name][best]) for part in self.parts})
 
 
-def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> dict[str, Grade]:
+def grades_of(study: Problem, scene: Scene, point: Array, half_widths: Array) -> dict[str, Grade]:
     """Grades by factor of half widths (k,) about a point (k,), whose scene it is; none for a factor that is no length in ISO 286."""
     groups, grades = clearance_parts(scene), {}
     closing = {chain.factor: chain for chain in reversed(study.file.chain)}
@@ -203,7 +203,7 @@ def grades_of(study: Study, scene: Scene, point: Array, half_widths: Array) -> d
     return grades
 
 
-def _chain_at(study: Study, chain: StudyChain | None, value: float, half_width: float) -> Chain | None:
+def _chain_at(study: Problem, chain: StudyChain | None, value: float, half_width: float) -> Chain | None:
     """A chain at a value and a half width [mm], whatever it states itself; None without a chain."""
     if chain is None:
         return None

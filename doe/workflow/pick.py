@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from doe import clearance
 from doe.clearance import Simulations
 from doe.designs.remaining import Remaining
 from doe.pareto import ParetoFront
@@ -21,7 +20,6 @@ from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simu
 from doe.response_surface import Surface
 from doe.response_surface.adequacy import REACH
 from doe.running.store import Failure
-from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive, emulator_draws
 from doe.workflow.confirmation import (
     ORDER,
@@ -37,8 +35,8 @@ from doe.workflow.confirmation import (
     verdict_of,
 )
 from doe.workflow.front import DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
-from doe.workflow.runs import beyond_runs, region_of, rounded_within
-from doe.workflow.surfaces import CHUNK, goals_of, jacobian, quadratics
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json
@@ -63,7 +61,11 @@ class SearchedPick:
 
 
 def searched_pick(
-    study: Study, surfaces: Sequence[Surface], searched: Adaptive, simulated: Sequence[Confirmed] = (), failed: int = 0
+    study: Problem,
+    surfaces: Sequence[Surface],
+    searched: Adaptive,
+    simulated: Sequence[Confirmed] = (),
+    failed: int = 0,
 ) -> SearchedPick:
     """The point of the searched front by the study's rule, at the ends of its tolerances where the study asks for that.
 
@@ -71,7 +73,7 @@ def searched_pick(
     the front's fresh runs and from their misses at points ``simulated``, which are not picked again. Each of the
     ``failed`` picks lets the back-off grow by its own size.
     """
-    front, goals = searched.front, goals_of(study)
+    front, goals = searched.front, study.goals
     coded = study.coded(front.points)
     shift, margin = _doubt(study, searched, coded, simulated)
     margin *= front.quantile(study.file.confirmation.limit_probability) * (1.0 + failed)
@@ -92,7 +94,7 @@ def searched_pick(
             violations = goals.violations(front.values - below, front.values + above)
         baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
         suffix = " also at the ends of their tolerances"
-    rounded = [rounded_within(study, point) for point in front.points]
+    rounded = [study.rounded_within(point) for point in front.points]
     is_new = np.array([not any(np.array_equal(point, confirmed.point) for confirmed in simulated) for point in rounded])
     rows = np.flatnonzero(is_new) if is_new.any() else np.arange(len(front.points))
     rule = study.file.front.pick
@@ -117,14 +119,14 @@ def _share_words(shares: Array, row: int) -> str:
 
 
 def neighbourhood(
-    study: Study, surfaces: Sequence[Surface], searched: Adaptive, coded: Array, values: Array
+    study: Problem, surfaces: Sequence[Surface], searched: Adaptive, coded: Array, values: Array
 ) -> Neighbourhood:
     """Responses near coded points (n, k) with responses (n, m): the surfaces, corrected by the runs of the search."""
     forms, runs = quadratics(surfaces, len(study.factors)), searched.front.searched
     return Neighbourhood.of(forms, coded, values, study.coded(runs.points), runs.values)
 
 
-def _doubt(study: Study, searched: Adaptive, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
+def _doubt(study: Problem, searched: Adaptive, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
     """Mean and standard deviation (f, m) of the errors of the front's fresh runs.
 
     They follow from the misses at the points simulated, each compared with its nearest row.
@@ -146,7 +148,7 @@ def _doubt(study: Study, searched: Adaptive, coded: Array, simulated: Sequence[C
 
 
 def draws_about(
-    study: Study, searched: Adaptive, neighbours: Neighbourhood, pick: Confirmed, baseline: Confirmed
+    study: Problem, searched: Adaptive, neighbours: Neighbourhood, pick: Confirmed, baseline: Confirmed
 ) -> Draws:
     """Draws of the responses of parts about a pick, coded points (n, k), and of the baseline, the last of them.
 
@@ -193,7 +195,7 @@ class Selection:
 
 
 def choose(
-    study: Study,
+    study: Problem,
     surfaces: Sequence[Surface],
     surface_front: ParetoFront,
     searched: Adaptive | None,
@@ -242,10 +244,10 @@ def choose(
     return Selection(front, candidate, confirmed, failures, len(trials))
 
 
-def _promises_less(study: Study, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:
+def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:
     """Whether the closest point is expected to miss its worst limit by less, beyond the errors, than every ``simulated`` one."""
     assert front.violations is not None
-    bounds = np.array([abs(bound) or 1.0 for _, _, bound in goals_of(study).limited])
+    bounds = np.array([abs(bound) or 1.0 for _, _, bound in study.goals.limited])
     missed = min(
         max(
             (-limit.room - np.nan_to_num(limit.error)) / (abs(limit.bound) or 1.0)
@@ -256,7 +258,7 @@ def _promises_less(study: Study, front: ParetoFront, simulated: Sequence[Confirm
     return bool((front.violations / bounds).max() < missed)
 
 
-def _without(study: Study, surfaces: Sequence[Surface], point: Array) -> Study:
+def _without(study: Problem, surfaces: Sequence[Surface], point: Array) -> Problem:
     """The study without the part of its region where a point (k,) failed."""
     remaining = study.remaining or Remaining(surfaces[0].data.points, np.empty((0, point.size)))
     failed = np.vstack([remaining.failed, study.coded(point)])
@@ -269,7 +271,7 @@ def _badness(limits: Sequence[Limit]) -> tuple[int, float]:
 
 
 def choices(
-    study: Study, front: ParetoFront, searched: Adaptive | None, search_pick: SearchedPick | None = None
+    study: Problem, front: ParetoFront, searched: Adaptive | None, search_pick: SearchedPick | None = None
 ) -> dict[str, Choice]:
     """The pick, then the picks by the other rules and of the searched front, by name.
 
@@ -279,7 +281,7 @@ def choices(
     """
     points: dict[str, Choice] = {}
     for name, point, reason in _candidates(study, front, searched, search_pick):
-        rounded = rounded_within(study, point)
+        rounded = study.rounded_within(point)
         twin = next(
             (other_name for other_name, choice in points.items() if np.array_equal(choice.point, rounded)), None
         )
@@ -291,7 +293,7 @@ def choices(
 
 
 def _candidates(
-    study: Study, front: ParetoFront, searched: Adaptive | None, search_pick: SearchedPick | None
+    study: Problem, front: ParetoFront, searched: Adaptive | None, search_pick: SearchedPick | None
 ) -> Iterator[tuple[str, Array, str]]:
     aware, name = front.tolerance_aware, "pick"
     if searched is not None and search_pick is not None:
@@ -402,27 +404,21 @@ class Edge(Record):
         return f"The pick lies inside the region; {shares}."
 
 
-def share_at_edge(study: Study, points: Array) -> float:
+def share_at_edge(study: Problem, points: Array) -> float:
     """Share of points (n, k) in factor units within `NEAR` of a bound of the region."""
-    return float(sides_of(points, ends_of(study)).any(axis=1).mean())
+    return float(sides_of(points, study.ends).any(axis=1).mean())
 
 
-def ends_of(study: Study) -> Array:
-    """Bounds (k, 2) of the region, in factor units."""
-    reach = region_of(study) * study.step
-    return np.column_stack([study.centre - reach, study.centre + reach])
-
-
-def place_of(study: Study, point: Array) -> Place:
+def place_of(study: Problem, point: Array) -> Place:
     """Where a point (k,) in factor units lies in the region of the design."""
-    ends = ends_of(study)
+    ends = study.ends
     sides = zip(study.factors, sides_of(point[None], ends)[0].tolist(), ends.tolist(), strict=True)
     bounds = {name: ("upper", high) if side > 0 else ("lower", low) for name, side, (low, high) in sides if side}
-    return Place(bounds, beyond_runs(study, study.coded(point)))
+    return Place(bounds, study.beyond_runs(study.coded(point)))
 
 
 def edge_of(
-    study: Study,
+    study: Problem,
     surfaces: Sequence[Surface],
     pick: Confirmed,
     front: Array,
@@ -434,7 +430,7 @@ def edge_of(
 
     ``ends`` (k, 2): ends of the searched region in factor units, where that has grown.
     """
-    ends = ends_of(study) if ends is None else ends
+    ends = study.ends if ends is None else ends
     sides = sides_of(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
     gains_beyond = {} if simulations is None else _gains_by_simulation(study, pick, names, simulations)
@@ -450,7 +446,7 @@ def edge_of(
         which = "upper" if side > 0 else "lower"
         outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
     far = None if searched is None else float(sides_of(searched, ends).any(axis=1).mean())
-    return Edge(tuple(outward), beyond_runs(study, study.coded(pick.point)), share_at_edge(study, front), far)
+    return Edge(tuple(outward), study.beyond_runs(study.coded(pick.point)), share_at_edge(study, front), far)
 
 
 def sides_of(points: Array, ends: Array) -> Whole:
@@ -461,10 +457,10 @@ def sides_of(points: Array, ends: Array) -> Whole:
 
 
 def _gains_on_surfaces(
-    study: Study, surfaces: Sequence[Surface], point: Array, index: int, side: int
+    study: Problem, surfaces: Sequence[Surface], point: Array, index: int, side: int
 ) -> dict[str, tuple[float, float]]:
     """Gains per unit of the factor outward, with the error of the slope: that of the coefficients and the model's own."""
-    goals = goals_of(study)
+    goals = study.goals
     coded = study.coded(point)
     outward_point = coded + side * STEP * np.eye(coded.size)[index]
     gains = {}
@@ -487,7 +483,7 @@ def _gains_on_surfaces(
 
 
 def _gains_by_simulation(
-    study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
+    study: Problem, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains per unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
     runs, reachable = [], []
@@ -495,14 +491,14 @@ def _gains_by_simulation(
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
         try:
-            runs.append(clearance.confirmation_run(study, point))
+            runs.append(study.confirmation_run(point))
         except InputError:
             # No scene has this value of the factor.
             continue
         reachable.append((index, point))
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
     results = simulations.run(runs, labels, simulations.progress("beyond the region")) if reachable else []
-    goals = goals_of(study)
+    goals = study.goals
     responses = [study.responses[index] for index in goals.objectives]
     gains_beyond = {}
     for (index, point), result in zip(reachable, results, strict=True):

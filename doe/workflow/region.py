@@ -18,12 +18,12 @@ import numpy as np
 
 from doe import clearance
 from doe.clearance import Simulations, points_of
-from doe.duty import over_duty
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.study_file.sections import Factor
-from doe.workflow.runs import STORE, actual_of, design_of
+from doe.workflow.design import actual_of
+from doe.workflow.problem import Problem
+from doe.workflow.runs import STORE
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
@@ -66,7 +66,7 @@ Heat = Mapping[str, Sequence[Temperatures]]
 class Region(NamedTuple):
     """The study with the region in which its bearings run, and what was changed for it."""
 
-    study: Study
+    study: Problem
     notes: tuple[Note, ...] = ()
 
 
@@ -113,7 +113,7 @@ class Taken(NamedTuple):
 
 
 def region_that_runs(
-    study: Study,
+    study: Problem,
     folder: Path,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -147,7 +147,7 @@ class _UnknownError(Exception):
     """A run is not in the store."""
 
 
-def region_in_store(study: Study, folder: Path) -> Study:
+def region_in_store(study: Problem, folder: Path) -> Problem:
     """The study with the region that runs, if the runs in the store of ``folder`` tell; nothing is simulated."""
 
     def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
@@ -171,9 +171,9 @@ def _silent(title: str) -> Progress:
     return lambda done, total: None
 
 
-def moved_region(study: Study, balance: Balances, kept: float = KEPT) -> Region:
+def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Region:
     """The study with its region moved to where every clearance stays above its floor at every point of the duty."""
-    if not _has_mounting(study):
+    if not study.has_mounting:
         return Region(study)
     original, (heat, notes) = study, _heat(study, balance)
     stays = study.file.reference is not None or study.file.design.augment is not None
@@ -197,7 +197,7 @@ def moved_region(study: Study, balance: Balances, kept: float = KEPT) -> Region:
     return Region(study, (*notes, *baseline_notes))
 
 
-def _corner(study: Study, heat: Heat) -> Array:
+def _corner(study: Problem, heat: Heat) -> Array:
     """The drawing (k,) with the least clearances of the region, other factors at their centre."""
     corner = study.centre.copy()
     for _, clearances in _running(study, corner, heat):
@@ -208,7 +208,7 @@ def _corner(study: Study, heat: Heat) -> Array:
 
 
 def _hear_of_corner(
-    study: Study, balance: Balances, corner: Array, heat: dict[str, list[Temperatures]], hotter: dict[str, float]
+    study: Problem, balance: Balances, corner: Array, heat: dict[str, list[Temperatures]], hotter: dict[str, float]
 ) -> None:
     """Add to ``heat`` the temperatures of the corner (k,) where few kelvin are left, or to ``hotter`` where it has none."""
     ends = _endangered(study, corner, heat)
@@ -220,7 +220,7 @@ def _hear_of_corner(
             hotter[lost.key] = max(hotter.get(lost.key, 0.0), lost.kelvins_left - NEARLY_K + HOTTER_K)
 
 
-def _endangered(study: Study, point: Array, heat: Heat) -> dict[str, RunningClearance]:
+def _endangered(study: Problem, point: Array, heat: Heat) -> dict[str, RunningClearance]:
     """By point of the duty with a heat balance, the clearance of a drawing (k,) that the fewest kelvin close; of few enough alone."""
     least: dict[str, RunningClearance] = {}
     for name, clearances in _running(study, point, heat):
@@ -231,7 +231,7 @@ def _endangered(study: Study, point: Array, heat: Heat) -> dict[str, RunningClea
 
 
 def _balanced(
-    study: Study, balance: Balances, point: Array, names: Sequence[str], words: str
+    study: Problem, balance: Balances, point: Array, names: Sequence[str], words: str
 ) -> dict[str, Temperatures | str]:
     """Temperatures of a drawing (k,) at these points of the duty by short runs, or why it has none; those undecided are left out."""
     if not names:
@@ -251,40 +251,33 @@ def _balanced(
     return found
 
 
-def _has_mounting(study: Study) -> bool:
-    """Whether anything changes the clearances of the drawing."""
-    return "mounting" in clearance.read_scene(study) or any(text.startswith("mounting.") for text in study.scene.set)
-
-
-def _place(study: Study, key: str) -> int | None:
+def _place(study: Problem, key: str) -> int | None:
     """Place of the factor with this key of the scene; None where it is no factor."""
     return next((place for place, factor in enumerate(study.file.factor) if factor.key == key), None)
 
 
-def _ends(study: Study, place: int) -> tuple[float, float]:
+def _ends(study: Problem, place: int) -> tuple[float, float]:
     """Ends of the region of a factor, in its units."""
-    half = design_of(study).reach * study.step[place]
+    half = study.design.reach * study.step[place]
     return float(study.centre[place] - half), float(study.centre[place] + half)
 
 
-def _low_mm(study: Study, taken: Taken) -> float:
+def _low_mm(study: Problem, taken: Taken) -> float:
     """Lowest value of a clearance on the drawings of the region [mm]."""
     place = _place(study, taken.running.key)
     return 1e3 * taken.running.play.drawn if place is None else _ends(study, place)[0]
 
 
 def _scenes(
-    study: Study, point: Array, overrides: Sequence[str] = (), kind: type[Scene] = Scene
+    study: Problem, point: Array, overrides: Sequence[str] = (), kind: type[Scene] = Scene
 ) -> Mapping[str, Scene]:
     """Scenes of a drawing (k,) by point of the duty. Raises InputError for an impossible one."""
-    data, seed = clearance.read_scene(study), study.file.design.seed
-    run = over_duty(
-        study, lambda sets: clearance.scene_at(study, data, point, seed, [*study.scene.set, *sets, *overrides], kind)
-    )
+    seed = study.file.design.seed
+    run = study.over_duty(lambda sets: study.scene_at(point, seed, [*sets, *overrides], kind))
     return {"": run} if isinstance(run, Scene) else run.scenes
 
 
-def _running(study: Study, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
+def _running(study: Problem, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
     """Clearances in operation of a drawing (k,) by point of the duty, at each of the temperatures found there."""
     for name, scene in _scenes(study, point, kind=DrawnScene).items():
         if (mounting := scene.mounting) is None:
@@ -297,12 +290,12 @@ def _running(study: Study, point: Array, heat: Heat) -> Iterator[tuple[str, dict
             yield name, scene.running_clearances(hot)
 
 
-def _worst(study: Study, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
+def _worst(study: Problem, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
     """The place that takes most of each clearance, by its key, over all points of the designs at all categories."""
     worst: dict[str, Taken] = {}
     for levels in study.every_level:
         variant = study.with_levels(levels)
-        points = np.unique(actual_of(variant, design_of(variant)), axis=0)
+        points = np.unique(actual_of(variant, variant.design), axis=0)
         for point in points[:: -(-len(points) // MOST_POINTS)]:
             for name, clearances in _running(variant, point, heat):
                 for running in clearances.values():
@@ -312,7 +305,7 @@ def _worst(study: Study, heat: Heat, hotter: Mapping[str, float]) -> dict[str, T
     return worst
 
 
-def _floor(study: Study, running: RunningClearance) -> float:
+def _floor(study: Problem, running: RunningClearance) -> float:
     """Floor of a clearance [m]; of a bearing that is meant to be preloaded, what the study states or none."""
     if running.touching > -math.inf:
         return running.floor
@@ -323,7 +316,7 @@ def _floor(study: Study, running: RunningClearance) -> float:
     return running.floor if drawn_mm > 0.0 else -math.inf
 
 
-def _heat(study: Study, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note]]:
+def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note]]:
     """Temperatures at the centre of the region by point of the duty, and where they are too high.
 
     Raises RunError where the bearing has no steady temperatures even with wider clearances.
@@ -356,7 +349,7 @@ def _heat(study: Study, balance: Balances) -> tuple[dict[str, list[Temperatures]
     )
 
 
-def _wider(study: Study, scenes: Mapping[str, Scene], kelvins: float) -> Array:
+def _wider(study: Problem, scenes: Mapping[str, Scene], kelvins: float) -> Array:
     """The centre (k,) with clearances as much wider as that many kelvin between the parts would take."""
     point = study.centre.copy()
     for scene in scenes.values():
@@ -380,9 +373,9 @@ def _too_hot(scene: Scene, place: str, nodes: Temperatures) -> Iterator[Note]:
             )
 
 
-def _moved(study: Study, short: Mapping[str, Taken], kept: float) -> Study:
+def _moved(study: Problem, short: Mapping[str, Taken], kept: float) -> Problem:
     """The study with the regions of these clearances moved. Raises InputError where one cannot move as far."""
-    factors, reach, faults = list(study.file.factor), design_of(study).reach, list[str]()
+    factors, reach, faults = list(study.file.factor), study.design.reach, list[str]()
     for key, taken in short.items():
         place = _place(study, key)
         assert place is not None
@@ -423,7 +416,7 @@ def _rounded(factor: Factor, low: float, high: float, reach: float) -> tuple[flo
     return round(math.ceil((low + reach * step) / coarse - 1e-9) * coarse, 12), step
 
 
-def _moved_note(before: Study, after: Study, key: str, taken: Taken) -> Note:
+def _moved_note(before: Problem, after: Problem, key: str, taken: Taken) -> Note:
     """How the region of a factor moved, and why."""
     place = _place(before, key)
     assert place is not None
@@ -436,7 +429,7 @@ def _moved_note(before: Study, after: Study, key: str, taken: Taken) -> Note:
     )
 
 
-def _lost_note(study: Study, taken: Taken, heat: Heat) -> Note:
+def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     """A clearance below its floor that nothing moves. Raises InputError where it is lost in the middle of the region too."""
     running, key = taken.running, taken.running.key
     words, _ = quantity(key.rpartition(".")[2])
@@ -460,8 +453,8 @@ def clearances_seize(clearances: Mapping[str, RunningClearance], key: str) -> bo
 
 
 def _with_baseline(
-    original: Study, moved: Study, balance: Balances, heat: dict[str, list[Temperatures]]
-) -> tuple[Study, list[Note]]:
+    original: Problem, moved: Problem, balance: Balances, heat: dict[str, list[Temperatures]]
+) -> tuple[Problem, list[Note]]:
     """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
     first, point = original.with_levels(()), original.baseline
     seized = [

@@ -12,12 +12,11 @@ import numpy as np
 
 from doe.pareto import Goals, ParetoFront
 from doe.response_surface import Surface
-from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import ORDER, Confirmed, error_of_difference, limits_of, point_words, verdict_of
 from doe.workflow.pick import SearchedPick
-from doe.workflow.runs import rounded_within
-from doe.workflow.surfaces import goals_of, predict_all, quadratics
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import predict_all, quadratics
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.words import improvement, quantity
 
@@ -36,7 +35,7 @@ class Forecast:
     ``searched`` and ``searched_pick`` are None where the pick is one of the front on the surfaces.
     """
 
-    study: Study
+    study: Problem
     surfaces: Sequence[Surface]
     front: ParetoFront
     searched: Adaptive | None
@@ -56,11 +55,11 @@ class Forecast:
 
     def at(self, point: Array) -> Prediction | None:
         """The prediction at a point (k,) in factor units; None for a point that was no candidate."""
-        goals = goals_of(self.study)
+        goals = self.study.goals
         if self.searched is None or self.searched_pick is None:
             return self._on_surfaces(goals, self.study.coded(point)[None])
         front, aware = self.searched.front, self.searched_pick.aware
-        same = [np.array_equal(rounded_within(self.study, row), point) for row in front.points]
+        same = [np.array_equal(self.study.rounded_within(row), point) for row in front.points]
         if not any(same):
             return None
         costs, violations = (front.costs, goals.violations(front.values, front.values))
@@ -77,9 +76,9 @@ class Forecast:
         return Prediction(goals.costs(values)[0], not (goals.violations(values, values)[0] > 0.0).any())
 
 
-def better_points(study: Study, confirmed: Mapping[str, Confirmed]) -> list[str]:
+def better_points(study: Problem, confirmed: Mapping[str, Confirmed]) -> list[str]:
     """Names of the simulated points that are better than the pick in every response with a goal."""
-    goals = goals_of(study)
+    goals = study.goals
     costs = {name: goals.costs(point.values) for name, point in confirmed.items()}
     return [name for name in confirmed if name not in ("baseline", "pick") and (costs[name] < costs["pick"]).all()]
 
@@ -93,9 +92,9 @@ def rivals_sentences(forecast: Forecast, confirmed: Mapping[str, Confirmed]) -> 
     ]
 
 
-def _uncertain(study: Study, rival: Confirmed, pick: Confirmed) -> str:
+def _uncertain(study: Problem, rival: Confirmed, pick: Confirmed) -> str:
     """The responses whose difference is within its error."""
-    goals = goals_of(study)
+    goals = study.goals
     apart = np.abs(rival.values - pick.values) <= np.nan_to_num(error_of_difference(rival, pick)[0], nan=np.inf)
     names = [quantity(study.responses[index])[0] for index in goals.objectives if apart[index]]
     return f" ({' and '.join(names)} only within the error)" if names else ""
@@ -125,9 +124,9 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
     return "and nothing that the study knows speaks against it: consider it"
 
 
-def _losses(study: Study, costs: Array, pick_costs: Array, worse: Mask, pick: Confirmed) -> str:
+def _losses(study: Problem, costs: Array, pick_costs: Array, worse: Mask, pick: Confirmed) -> str:
     """'power loss 1.2 % more' of the responses in which a point is predicted worse than the pick."""
-    goals = goals_of(study)
+    goals = study.goals
     percent = 100.0 * (pick_costs - costs) / np.abs(pick.values[goals.objectives])
     return " and ".join(
         f"{quantity(study.responses[index])[0]} {improvement(float(change), None, study.file.response[index].goal)}"

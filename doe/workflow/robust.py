@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from doe import clearance
 from doe.clearance import Simulations
 from doe.duty import Duty, points_in
 from doe.emulator import pooled_variances
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.runner import Stage
 from doe.running.store import Failure
-from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import Better, Decides, InputWorth, Interval, Verdict, better, decides, in_doubt, odds, shrunk
@@ -37,8 +35,7 @@ from doe.workflow.input_sets import (
     strongest_inputs,
     work_of_set,
 )
-from doe.workflow.runs import region_of, rounded_within
-from doe.workflow.surfaces import goals_of
+from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import refuse, set_key
 from rbdyn.base.notes import Notes
@@ -181,13 +178,13 @@ class RobustFront:
 
 
 def find_robust_front(
-    study: Study, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
+    study: Problem, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
 ) -> tuple[RobustFront, int, tuple[Failure, ...]]:
     """The front, its number of runs, and its failures; ``pairs``: the baseline and the pick at the study's input sets.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
-    settings, goals, reach = study.file.robust, goals_of(study), region_of(study)
+    settings, goals, reach = study.file.robust, study.goals, study.reach
     low, high = study.actual(-reach), study.actual(reach)
     sets, places, rows = _runs(study, case, pairs, (low, high), simulations)
     emulators = _emulators(case, goals, sets, places, pairs.rows(rows), (low, high))
@@ -208,8 +205,8 @@ def find_robust_front(
         note = "no point keeps the limits over the unknown inputs"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
     candidates = {"pick": (pick, "the pick"), **_choices(study, robust_front, emulators)}
-    designs = {"baseline": clearance.assignments(study.with_levels(()), study.baseline)}
-    designs |= {name: clearance.assignments(study, point) for name, (point, _) in candidates.items()}
+    designs = {"baseline": study.with_levels(()).assignments(study.baseline)}
+    designs |= {name: study.assignments(point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
     fresh_pairs, new_failures = simulate_designs(case, case.every, quantiles, designs, simulations)
@@ -237,7 +234,7 @@ def fresh_rows(points: int) -> Whole:
 
 
 def _runs(
-    study: Study, case: Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
+    study: Problem, case: Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
 ) -> tuple[Sets, Array, Whole]:
     """Runs of designs spread over the ``box`` at the second half of the study's input sets, as many as there are sets.
 
@@ -247,7 +244,7 @@ def _runs(
     half = np.flatnonzero(pairs.places >= points // 2)
     even = nested(len(study.factors), points, case.uncertain.seed + 2)
     rows = np.resize(half, points)
-    overrides = [clearance.assignments(study, point) for point in low + (high - low) * even]
+    overrides = [study.assignments(point) for point in low + (high - low) * even]
     title = "runs of the robust front"
     sets = run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, overrides)
     return sets, even[sets.places], rows[sets.places]
@@ -329,7 +326,7 @@ def _over_inputs(values: Array, share: float | None, axis: int = 0) -> Array:
     return values.mean(axis=axis) if share is None else np.quantile(values, share, axis=axis)
 
 
-def _choices(study: Study, pareto: ParetoFront, emulators: _GainEmulators) -> dict[str, tuple[Array, str]]:
+def _choices(study: Problem, pareto: ParetoFront, emulators: _GainEmulators) -> dict[str, tuple[Array, str]]:
     """Points of the front that are worth a simulation, by name, with the reason for each."""
     gains = emulators.gains(pareto.points)
     all_gain = (gains > 0.0).all(axis=2).mean(axis=1)
@@ -340,7 +337,7 @@ def _choices(study: Study, pareto: ParetoFront, emulators: _GainEmulators) -> di
     reasons = {"surest": "the point of the robust front that is likeliest to gain in all responses"}
     candidates: dict[str, tuple[Array, str]] = {}
     for name, row in rows.items():
-        point = rounded_within(study, pareto.points[row])
+        point = study.rounded_within(pareto.points[row])
         if len(candidates) < POINTS and not any(np.array_equal(point, other) for other, _ in candidates.values()):
             candidates[f"robust {name}"] = point, reasons.get(name, f"the pick of the robust front by {name}")
     return candidates
@@ -414,21 +411,18 @@ class Robust:
     odds: Mapping[str, Share] = field(default_factory=dict)
 
 
-def check_robust(study: Study) -> None:
+def check_robust(study: Problem) -> None:
     """Raises InputError if the unknown inputs of the study's scene are declared wrongly."""
     case_of_study(study)
 
 
 @one_thread
-def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
+def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) against the baseline. Raises InputError, RunError, KeyboardInterrupt."""
-    case, goals = case_of_study(study), goals_of(study)
+    case, goals = case_of_study(study), study.goals
     joint, seed = case.joint(case.every), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
-    designs = {
-        "baseline": clearance.assignments(study.with_levels(()), study.baseline),
-        "pick": clearance.assignments(study, pick),
-    }
+    designs = {"baseline": study.with_levels(()).assignments(study.baseline), "pick": study.assignments(pick)}
     pairs, spent, failures = _pairs_in_rounds(study, case, quantiles, designs, simulations)
     gains, variances = pairs.gains(goals)
     # For the emulators, the effects of the other inputs are scatter.
@@ -471,10 +465,10 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
 
 
 def _pairs_in_rounds(
-    study: Study, case: Case, quantiles: Array, designs: Mapping[str, Sequence[str]], simulations: Simulations
+    study: Problem, case: Case, quantiles: Array, designs: Mapping[str, Sequence[str]], simulations: Simulations
 ) -> tuple[Pairs, int, tuple[Failure, ...]]:
     """Both designs at the input sets, with further replicates where a gain is in doubt; runs spent; and failures."""
-    goals, replicates = goals_of(study), case.replicates
+    goals, replicates = study.goals, case.replicates
     pairs, failures = simulate_designs(case, case.every, quantiles, designs, simulations)
     spent, budget = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     rows = in_doubt(*pairs.gains(goals))
@@ -496,23 +490,23 @@ def _pairs_in_rounds(
     return pairs, spent, failures
 
 
-def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
+def limit_odds(study: Problem, pairs: Pairs, seed: int) -> dict[str, Share]:
     """By limited response, the probability that the pick, the second design, keeps its limits over the unknown inputs."""
-    goals = goals_of(study)
+    goals = study.goals
     return {
         study.responses[index]: odds(*pairs.values(index), float(goals.lower[index]), float(goals.upper[index]), seed)
         for index in sorted({index for index, _, _ in goals.limited})
     }
 
 
-def case_of_study(study: Study) -> Case:
+def case_of_study(study: Problem) -> Case:
     """The study's scene with its unknown inputs; factors are none of them."""
     path = study.path_of(study.scene.file)
-    data = deepcopy(clearance.read_scene(study))
+    data = deepcopy(study.scene_tables)
     for override in study.scene.set:
         set_key(data, override, f"{study.path}: scene.set")
     keys = *(factor.key for factor in study.file.factor), *(category.key for category in study.file.category)
-    duty = clearance.duty_with_groups(study)
+    duty = study.duty_with_groups
     fixed = dict.fromkeys([] if duty is None else duty.keys, "a key of the duty")
     fixed |= dict.fromkeys(keys, "a factor of the study")
     case = case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
@@ -569,7 +563,7 @@ def _value(case: Case, unknown_input: Input, quantile: float | None) -> Any:
     return value if unknown_input.law.times is None else value * case.unit(unknown_input)
 
 
-def robust_stage(study: Study) -> Stage:
+def robust_stage(study: Problem) -> Stage:
     """The stage of a robust judgement: input sets of both designs, further replicates, the front and its simulations."""
     settings, case = study.file.robust, case_of_study(study)
     fewest, runs = 2 * settings.points, round(2 * settings.points * (1.0 + settings.settle))

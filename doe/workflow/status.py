@@ -18,10 +18,10 @@ from doe.clearance import every_scene, points_of, work_of
 from doe.duty import Run, main_scene, scenes_of
 from doe.running.runner import ANSWER, Agenda, Stage, agendas_of
 from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
-from doe.study_file import Study
 from doe.study_file.sections import Front
+from doe.workflow.problem import Problem
 from doe.workflow.region import region_in_store
-from doe.workflow.runs import STORE, design_of, ordered_runs
+from doe.workflow.runs import STORE
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.storage import code_version, digest_of, intact
@@ -33,7 +33,7 @@ STEPS_S = 12.0
 BASELINE, DESIGN, FRONT, TOLERANCES = "baseline", "design runs", "front", "tolerances"
 
 
-def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
+def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -> list[Stage]:
     """Stages of ``doe study`` with these options, to the end. Raises InputError for an impossible study.
 
     The most runs of a stage include the further points that a broken limit may need.
@@ -43,7 +43,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
         for levels in (study.every_level if adaptive else [study.levels])
         for key, work in design_works(study.with_levels(levels))
     }
-    confirmation = clearance.confirmation_run(study, study.baseline)
+    confirmation = study.confirmation_run(study.baseline)
     stages = [
         _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),
         Stage(DESIGN, (DESIGN,), len(works), sum(works.values())),
@@ -52,9 +52,9 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
     if adaptive:
         from doe.adaptive.search import FRESH
 
-        usual = main_scene(clearance.design_scenes(study, study.baseline[None])[0]).numerics.replicates
-        (search,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
-        settings, design = study.file.adaptive, [design_of(study.with_levels(levels)) for levels in study.every_level]
+        usual = main_scene(study.design_scenes(study.baseline[None])[0]).numerics.replicates
+        (search,) = study.adaptive_scenes(study.baseline[None], [usual], 0)
+        settings, design = study.file.adaptive, [study.with_levels(levels).design for levels in study.every_level]
         runs = max(settings.budget - sum(len(levels.coded) for levels in design), 0)
         # The shortest search stops after one batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
@@ -77,7 +77,7 @@ def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> 
     return [*stages, Stage(ANSWER)]
 
 
-def shorter_by(study: Study, adaptive: bool, robust: bool) -> list[str]:
+def shorter_by(study: Problem, adaptive: bool, robust: bool) -> list[str]:
     """What makes a study smaller."""
     return [
         *([] if study.file.duty is None or not study.shares else ["the [[duty]] points"]),
@@ -97,9 +97,9 @@ def _stage_of(name: str, runs: int, run: Run, *titles: str, fewest: int, most: i
     return Stage.of(name, count * runs, mean_work, *titles, fewest=count * fewest, most=most)
 
 
-def design_works(study: Study) -> list[tuple[str, float]]:
+def design_works(study: Problem) -> list[tuple[str, float]]:
     """Key and work of every design run. Raises InputError."""
-    ordered = ordered_runs(study)
+    ordered = study.plan
     points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
     return [(point.key, work_of(scene)) for point, scene in zip(points, every_scene(ordered.scenes), strict=True)]
 
@@ -108,14 +108,14 @@ def design_works(study: Study) -> list[tuple[str, float]]:
 CODE = ("rbdyn.dynamics.simulate", "doe.workflow.whole", "doe.report.files")
 
 
-def inputs_digest(study: Study, adaptive: bool = False, robust: bool = False) -> str:
+def inputs_digest(study: Problem, adaptive: bool = False, robust: bool = False) -> str:
     """Digest of all that the files of a study depend on: the study, the files it names, the options and the code."""
     options = json.dumps([adaptive, robust, versions()], sort_keys=True)
     texts = study.path.name, study.file.model_dump_json(), options, source_digest(*CODE)
     return digest_of(b"".join([*(text.encode() for text in texts), *map(_content, named_files(study))]))
 
 
-def named_files(study: Study) -> list[Path]:
+def named_files(study: Problem) -> list[Path]:
     """Files that the study names: scene, chains, published table, runs to augment, samples of unknown inputs."""
     names = [study.scene.file, *(chain.file for chain in study.file.chain)]
     names += [] if study.file.reference is None else [study.file.reference.file]
@@ -137,7 +137,7 @@ def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:
     return record if complete else None
 
 
-def _samples(study: Study) -> list[str]:
+def _samples(study: Problem) -> list[str]:
     """The posterior sample of unknown inputs that the study names, or else its scene."""
     if study.file.uncertain is not None and study.file.uncertain.sample is not None:
         return [study.file.uncertain.sample]
@@ -193,10 +193,10 @@ class Content:
         return next(iter([*self.alive[::-1], *(agenda for agenda, _ in self.agendas[::-1])]), None)
 
 
-def study_status(study: Study, folder: Path) -> dict[str, Any]:
+def study_status(study: Problem, folder: Path) -> dict[str, Any]:
     """Record of ``doe status`` for a study. It only reads, even while the study runs. Raises InputError."""
     region = region_in_store(study, folder)
-    ordered = ordered_runs(region)
+    ordered = region.plan
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     content = Content.of(folder, points)
     agenda = content.agenda
@@ -254,7 +254,7 @@ def status_of(path: Path, folder: Path | None) -> dict[str, Any]:
     """Record of ``doe status`` for a study or a scene, in its own folder by default. Raises InputError."""
     if "bearing" in read_toml(path):
         return scene_status(path, folder or folder_of(path, *SCENE_FOLDERS))
-    study = Study.load(path)
+    study = Problem.load(path)
     return study_status(study, folder or folder_of(path, "{}_results"))
 
 
@@ -283,7 +283,7 @@ def runs_digest(path: Path, overrides: Sequence[str]) -> str:
     return digest_of("\n".join([content_digest(path), *overrides, code_version(clearance.SIMULATION)]))
 
 
-def _has_answer(study: Study, folder: Path) -> bool:
+def _has_answer(study: Problem, folder: Path) -> bool:
     """Whether the folder holds the answer to the study with some options."""
     combinations = product((False, True), repeat=2)
     return any(finished_record(folder, inputs_digest(study, adaptive, robust)) for adaptive, robust in combinations)

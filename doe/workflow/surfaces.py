@@ -17,36 +17,27 @@ from scipy.stats import spearmanr
 
 from doe.designs.model import second_order
 from doe.pareto.front import contrast_error, draw_coefficients
-from doe.pareto.goals import BLANK, Goals
 from doe.pareto.manufacture import Quadratic, identity
 from doe.response_surface import Surface, fit, model_matrix
 from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
-from doe.study_file import Study
 from doe.study_file.study import Fitted
 from doe.study_file.table import read_sheet
 from doe.threads import one_thread
-from doe.workflow.runs import Runs, design_of, read_runs
+from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs, read_runs
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import are, error_alone, improvement
 
-
-def goals_of(study: Study) -> Goals:
-    """Goals and limits of the study's responses."""
-    responses = study.file.response
-    settings = {key: [getattr(response, key) for response in responses] for key in BLANK}
-    return Goals.of([response.goal for response in responses], **settings)
-
-
 # Runs with which a Gaussian process takes some 10 s; with 1000 it took 3 s, with 3000 45 s and 0.9 GB.
 MOST_RIVALLED = 1500
 
 
 @one_thread
-def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
+def fit_surfaces(study: Problem, runs: Runs) -> list[Surface]:
     """A surface for each response, on the runs that have a value of it. Raises InputError if they are too few."""
     surfaces, faults = [], []
     number = independent_values(runs)
@@ -169,7 +160,7 @@ class PublishedComparison(Record):
         return f"{level}; {signs}; {ranks}."
 
 
-def reference_runs(study: Study) -> Runs | None:
+def reference_runs(study: Problem) -> Runs | None:
     """The published table in the order of our design; responses that it does not have are NaN, and a note names them.
 
     Raises InputError for a table of another design, or one without any of the responses.
@@ -185,7 +176,7 @@ def reference_runs(study: Study) -> Runs | None:
     notes = [Note("table", sentence)] if missing else []
     rows = list(range(len(table.coded)))
     order = []
-    for point in design_of(study).coded:
+    for point in study.design.coded:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in rows]
         if not distance or min(distance) > 0.02:
             raise InputError(
@@ -198,7 +189,7 @@ def reference_runs(study: Study) -> Runs | None:
     return Runs(table.coded[order], table.actual[order], values, errors, (*table.notes, *notes))
 
 
-def compare_with_published(study: Study, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
+def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
     """Each response of both tables, with the linear effects on the surfaces through each table."""
     columns = np.flatnonzero(np.isfinite(theirs.values).any(axis=0))
     study = study.with_responses([study.responses[column] for column in columns])
@@ -491,9 +482,9 @@ class PredictedGain(Record):
         return f"{change}, {verdict} and outside the scatter of single runs ({scatter})."
 
 
-def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
+def predicted_gains(study: Problem, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
     """Gains at a point (k,) in factor units over the study's baseline, for every response that has a goal."""
-    goals = goals_of(study)
+    goals = study.goals
     coded = study.coded(np.stack([study.baseline, point]))
     values = predict_all(surfaces, coded)
     costs, slopes = goals.costs(values), goals.slopes(values)

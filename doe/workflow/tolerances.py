@@ -19,13 +19,12 @@ from doe.pareto.goals import Goals
 from doe.pareto.manufacture import random_offsets
 from doe.pareto.tolerance import RIM, Neighbourhood, WidestTolerances, widest_tolerances
 from doe.response_surface import Surface
-from doe.study_file import Study
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains
-from doe.workflow.front import Draws, draws_of, keeping, known_tolerances, open_errors, rigid_factors
+from doe.workflow.front import Draws, draws_of, keeping, open_errors
 from doe.workflow.parts import Grade, grades_of
-from doe.workflow.runs import region_of
-from doe.workflow.surfaces import goals_of, predict_all
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import predict_all
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.words import improvement, quantity, rounded_down, shown
 from rbdyn.scene import Scene
@@ -58,13 +57,13 @@ class Demand:
 
 
 def demands_of(
-    study: Study, settings: Tolerances, percent: Array, simulated: tuple[Confirmed, Confirmed] | None = None
+    study: Problem, settings: Tolerances, percent: Array, simulated: tuple[Confirmed, Confirmed] | None = None
 ) -> tuple[Demand, ...]:
     """Demands on the responses with a goal, whose predicted gains are ``percent`` (q,) of the baseline.
 
     ``simulated``: baseline and pick, which say whether a gain is real; without them every gain above zero is.
     """
-    responses = [study.file.response[index] for index in goals_of(study).objectives]
+    responses = [study.file.response[index] for index in study.goals.objectives]
     names = [response.name for response in responses]
     by_name = dict(zip(names, percent.tolist(), strict=True))
     counted = _counted(
@@ -232,7 +231,7 @@ def _begun(words: str) -> str:
 
 
 def widest_tolerances_of(
-    study: Study,
+    study: Problem,
     surfaces: Sequence[Surface],
     point: Array,
     settings: Tolerances,
@@ -250,7 +249,7 @@ def widest_tolerances_of(
     With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
     lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
     """
-    if rigid_factors(study).all():
+    if study.rigid.all():
         return None
     parts = _PickParts(study, surfaces, point, settings, confirmed or {}, neighbours, scene)
     simulated = (confirmed["baseline"], confirmed["pick"]) if confirmed and "pick" in confirmed else None
@@ -291,7 +290,7 @@ def _impossible(demands: Sequence[Demand]) -> str:
 class _PickParts:
     """Parts about a pick: their responses, the predicted gains there, and the widest tolerances for demands on these."""
 
-    study: Study
+    study: Problem
     surfaces: Sequence[Surface]
     point: Array
     settings: Tolerances
@@ -302,12 +301,12 @@ class _PickParts:
     @cached_property
     def goals(self) -> Goals:
         """The goals of the study."""
-        return goals_of(self.study)
+        return self.study.goals
 
     @cached_property
     def free_factors(self) -> Rows:
         """Places of the factors that have a tolerance."""
-        return np.flatnonzero(~rigid_factors(self.study))
+        return np.flatnonzero(~self.study.rigid)
 
     @cached_property
     def simulated_baseline(self) -> Array | None:
@@ -375,7 +374,7 @@ class _PickParts:
         least[share] = settings.keep * self.gain[share]
         slack = 1e-9 * np.abs(self.gain).max()
         no_violations = np.zeros((1, len(self.goals.limited)))
-        half_widths = known_tolerances(study)
+        half_widths = study.known_tolerances
         ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
         low, high = _box(study, self.point, None if self.neighbours is None else np.nan_to_num(ratios))
         count = None if draws is None else keeping(study, draws, self.point, free, least - slack)
@@ -421,9 +420,9 @@ class _PickParts:
         }
 
 
-def _box(study: Study, point: Array, extent: Array | None) -> tuple[Array, Array]:
+def _box(study: Problem, point: Array, extent: Array | None) -> tuple[Array, Array]:
     """Ends (k,) of the region in which parts may lie, at least ``extent`` (k,) from the point, if stated."""
-    reach = region_of(study) * study.step
+    reach = study.reach * study.step
     region = study.centre - reach, study.centre + reach
     if extent is None:
         return region

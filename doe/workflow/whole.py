@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from doe import clearance
 from doe.clearance import Simulations
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
@@ -24,7 +23,6 @@ from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper, Progress
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.threads import one_thread
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
@@ -42,26 +40,18 @@ from doe.workflow.confirmation import (
     whirl_sentence,
 )
 from doe.workflow.dangers import worse_notes
+from doe.workflow.design import augment_notes, check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.first_look import first_look
-from doe.workflow.front import OutOfReachError, check_goals, find_front, known_tolerances, with_survival
+from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
 from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
 from doe.workflow.parts import grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
+from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge
-from doe.workflow.runs import (
-    STORE,
-    Runs,
-    augment_notes,
-    check_runs,
-    design_of,
-    ordered_runs,
-    region_of,
-    run_design,
-    with_remaining,
-)
+from doe.workflow.runs import STORE, Runs, run_design, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
@@ -92,7 +82,7 @@ class OperatingClearances(Record):
     class_sentence: str
 
 
-def operating_clearances(study: Study, points: Mapping[str, Scene]) -> OperatingClearances:
+def operating_clearances(study: Problem, points: Mapping[str, Scene]) -> OperatingClearances:
     """Clearances in operation of scenes by name of their point, "pick" among them."""
     operating = {
         factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
@@ -106,12 +96,9 @@ def operating_clearances(study: Study, points: Mapping[str, Scene]) -> Operating
     return OperatingClearances(operating, class_words)
 
 
-def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
+def scenes_of(study: Problem, baseline: Array, pick: Array) -> dict[str, Scene]:
     """Scenes of the baseline and of the pick (k,), by name."""
-    return {
-        "baseline": clearance.confirmation_scene(study.with_levels(()), baseline),
-        "pick": clearance.confirmation_scene(study, pick),
-    }
+    return {"baseline": study.with_levels(()).confirmation_scene(baseline), "pick": study.confirmation_scene(pick)}
 
 
 def bore_of(scene: Scene) -> float | None:
@@ -145,7 +132,7 @@ def _operating_mm(scene: Scene, key: str) -> float:
     return 1e3 * play.operating
 
 
-def check_chains(study: Study) -> None:
+def check_chains(study: Problem) -> None:
     """Raises InputError for a chain without a solution at the centre, or without a half width.
 
     If the study computes the half width later, the widest in the region stands for it.
@@ -154,7 +141,7 @@ def check_chains(study: Study) -> None:
     check_all(partial(_chain, study, number, study.centre, half_widths) for number in numbers)
 
 
-def unmet_chains(study: Study) -> list[str]:
+def unmet_chains(study: Problem) -> list[str]:
     """Sentences on chains that no tolerances of their free parts can meet, wherever the pick is."""
     half_widths, sentences = _widest_half_widths(study), []
     for number, chain in enumerate(study.file.chain):
@@ -167,15 +154,15 @@ def unmet_chains(study: Study) -> list[str]:
     return sentences
 
 
-def _widest_half_widths(study: Study) -> Array:
+def _widest_half_widths(study: Problem) -> Array:
     """Half widths (k,) of the region where the study computes tolerances later, else unknown."""
     if study.file.tolerances is None:
         return np.full(study.step.size, np.nan)
-    return np.asarray(region_of(study) * study.step)
+    return np.asarray(study.reach * study.step)
 
 
 def solve_chains(
-    study: Study, pick: Array, tolerances: PickTolerances | None
+    study: Problem, pick: Array, tolerances: PickTolerances | None
 ) -> tuple[dict[str, ChainResult], list[Note]]:
     """Every chain by name at the picked point (k,), and notes on chains without a solution."""
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
@@ -200,11 +187,11 @@ def solve_chains(
     return solved, notes
 
 
-def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain:
+def _chain(study: Problem, number: int, point: Array, half_widths: Array) -> Chain:
     chain = study.file.chain[number]
     factor = study.factors.index(chain.factor)
     # Where no tolerance follows, parts are made to the one that the study states.
-    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else known_tolerances(study).get(chain.factor)
+    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else study.known_tolerances.get(chain.factor)
     source = f"{study.path}: chain {chain.name}"
     try:
         table = study.chain_table(chain, float(point[factor]), half_width)
@@ -213,15 +200,15 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
     return chain_from(table, source)
 
 
-def check_study(study: Study, adaptive: bool = False, robust: bool = False) -> Runs | None:
+def check_study(study: Problem, adaptive: bool = False, robust: bool = False) -> Runs | None:
     """The published runs, if any; ``adaptive``, ``robust``: whether the study also searches adaptively, and judges unknown inputs.
 
     Raises InputError with all faults of keys, responses, scenes, design and chains.
     """
     check_all(
         (
-            lambda: check_runs(study, ordered_runs(study).design),
-            lambda: clearance.confirmation_scene(study, study.baseline),
+            lambda: check_runs(study, study.plan.design),
+            lambda: study.confirmation_scene(study.baseline),
             lambda: check_chains(study),
             lambda: check_adaptive(study, adaptive),
             lambda: check_robust(study) if robust else None,
@@ -241,7 +228,7 @@ class StudyResult:
     without the adaptive search, ``robust`` without the robust judgement, ``duty`` without a duty.
     """
 
-    study: Study
+    study: Problem
     inputs: str
     design: Design
     runs: Runs
@@ -291,7 +278,7 @@ class StudyResult:
     def clearances_at_points(self) -> dict[str, OperatingClearances]:
         """The same at each point of the duty, whose temperatures and speeds differ; empty without a duty."""
         ends = {"baseline": (self.study.with_levels(()), self.baseline), "pick": (self.study, self.pick)}
-        runs = {name: clearance.confirmation_run(study, end.point) for name, (study, end) in ends.items()}
+        runs = {name: study.confirmation_run(end.point) for name, (study, end) in ends.items()}
         return {
             point: operating_clearances(
                 self.study, {name: ends[name][1].hot.get(point, scene_at(run, point)) for name, run in runs.items()}
@@ -388,7 +375,7 @@ class StudyResult:
 
 @one_thread
 def run_study(
-    study: Study,
+    study: Problem,
     folder: Path,
     workers: int | None,
     progress: Callable[[str], Progress],
@@ -436,7 +423,7 @@ def run_study(
     return StudyResult(
         study=study,
         inputs=inputs,
-        design=runs.design or design_of(study),
+        design=runs.design or study.design,
         runs=runs,
         surfaces=surfaces,
         front=with_survival(study, surfaces, selection.front, confirmed),
@@ -464,7 +451,7 @@ def _failures(*steps: Runs | Adaptive | Robust | Selection | None) -> tuple[Fail
     return tuple(failure for step in steps if step for failure in step.failures)
 
 
-def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
+def _surfaces_and_front(study: Problem, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
     surfaces = with_rivals(fit_surfaces(study, runs))
     clock.lap("fit_s")
     front = find_front(study, surfaces)
@@ -473,7 +460,7 @@ def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list
 
 
 def _searched(
-    study: Study, runs: Runs, simulations: Simulations, clock: "_Clock"
+    study: Problem, runs: Runs, simulations: Simulations, clock: "_Clock"
 ) -> tuple[Adaptive | None, list[Note]]:
     """The adaptive search; None, with the reason in a note, where no point that it knows comes near to keeping the limits."""
     try:
@@ -490,7 +477,7 @@ def _searched(
 
 def _with_its_categories(
     searched: Adaptive, runs: Runs, surfaces: list[Surface], surface_front: ParetoFront
-) -> tuple[Study, Runs, list[Surface], ParetoFront]:
+) -> tuple[Problem, Runs, list[Surface], ParetoFront]:
     """Study, runs, surfaces and front with the categories of the search's pick."""
     if searched.runs is not runs:
         surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
@@ -499,7 +486,7 @@ def _with_its_categories(
 
 
 def _edge(
-    study: Study, surfaces: list[Surface], selection: Selection, searched: Adaptive | None, simulations: Simulations
+    study: Problem, surfaces: list[Surface], selection: Selection, searched: Adaptive | None, simulations: Simulations
 ) -> Edge:
     """The edge of the region at the pick; after an adaptive search, the change beyond it is simulated."""
     pick, front = selection.confirmed["pick"], selection.front.points
@@ -509,12 +496,12 @@ def _edge(
 
 
 def _tolerances(
-    study: Study, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
+    study: Problem, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
 ) -> PickTolerances | None:
     pick, settings = confirmed["pick"], study.file.tolerances
     if settings is None:
         return None
-    scene = clearance.confirmation_scene(study, pick.point)
+    scene = study.confirmation_scene(pick.point)
     if searched is None:
         return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, scene=scene)
     neighbours = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
@@ -522,12 +509,12 @@ def _tolerances(
     return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
 
 
-def _compared(study: Study, runs: Runs, reference: Runs) -> list[PublishedComparison]:
+def _compared(study: Problem, runs: Runs, reference: Runs) -> list[PublishedComparison]:
     """The runs compared with those of the published table, which has no run added in place of a failed one."""
     return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
 
 
-def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
+def _gains(study: Problem, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
     return {name: gains(study, confirmed["baseline"], point) for name, point in confirmed.items() if name != "baseline"}
 
 

@@ -19,18 +19,18 @@ from typing import Any
 import numpy as np
 from direct_search import SurrogateLoss, compare_with_surrogate, direct_front, relative_hypervolumes, repeated
 
-from doe.clearance import Simulations, read_scene, scene_at
+from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.front import SimulatedFront
 from doe.pareto.search import spread
 from doe.report.sections.answer import point_record
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store, grouped
-from doe.study_file import Study
 from doe.workflow.adaptive import Evaluator
 from doe.workflow.front import find_front
-from doe.workflow.runs import STORE, region_of, run_design
-from doe.workflow.surfaces import fit_surfaces, goals_of, standard_errors
+from doe.workflow.problem import Problem
+from doe.workflow.runs import STORE, run_design
+from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError
@@ -78,21 +78,20 @@ class Direct:
     seconds: Mapping[str, float]
 
 
-def scenes(study: Study, settings: Settings, points: Array, first: int) -> list[Scene]:
+def scenes(study: Problem, settings: Settings, points: Array, first: int) -> list[Scene]:
     """A scene an evaluation (n, k), numbered from ``first``: few replicates, a seed of its own."""
-    data = read_scene(study)
-    overrides = [*study.scene.set, f"numerics.replicates={settings.replicates}", "numerics.companion=false"]
+    overrides = [f"numerics.replicates={settings.replicates}", "numerics.companion=false"]
     if settings.discard_turns is not None:
         overrides.append(f"numerics.discard_turns={settings.discard_turns!r}")
     if settings.turns is not None:
-        usual = scene_at(study, data, study.baseline, settings.seed, overrides).numerics.warm_up_turns
+        usual = study.scene_at(study.baseline, settings.seed, overrides).numerics.warm_up_turns
         # What is left after the transient; ``check`` names a run that leaves nothing.
         overrides.append(f"numerics.turns={max(settings.turns - usual, 1e-3)!r}")
     seeded = enumerate(points, settings.seed + SEEDS + first)
-    return [scene_at(study, data, point, seed, [*overrides, *settings.set]) for seed, point in seeded]
+    return [study.scene_at(point, seed, [*overrides, *settings.set]) for seed, point in seeded]
 
 
-def check(study: Study, settings: Settings) -> None:
+def check(study: Problem, settings: Settings) -> None:
     """Raises InputError where the runs are impossible or count no whole window of the impact."""
     if settings.turns is not None and (settings.discard_turns or 0.0) >= settings.turns:
         raise InputError([f"--discard-turns {settings.discard_turns:g}: must be below --turns {settings.turns:g}"])
@@ -105,7 +104,7 @@ def check(study: Study, settings: Settings) -> None:
         )
 
 
-def run_in_words(study: Study, settings: Settings) -> str:
+def run_in_words(study: Problem, settings: Settings) -> str:
     """What one run of the search is."""
     (scene,) = scenes(study, settings, study.baseline[None], 0)
     numerics = scene.numerics
@@ -119,7 +118,7 @@ def run_in_words(study: Study, settings: Settings) -> str:
 class Generations(Evaluator):
     """Runs generations of points, every row with a seed of its own."""
 
-    def __init__(self, study: Study, settings: Settings, simulations: Simulations, progress: Progress) -> None:
+    def __init__(self, study: Problem, settings: Settings, simulations: Simulations, progress: Progress) -> None:
         super().__init__(study, simulations, progress, settings.evaluations)
         self._settings = settings
 
@@ -129,13 +128,13 @@ class Generations(Evaluator):
         return values, standard_errors(errors, samples)
 
 
-def find_direct(study: Study, settings: Settings, on_surfaces: ParetoFront, simulations: Simulations) -> Direct:
+def find_direct(study: Problem, settings: Settings, on_surfaces: ParetoFront, simulations: Simulations) -> Direct:
     """Search the front on the simulator, then run as many points of the surfaces' front on it, and compare.
 
     Raises RunError where every run of a stage fails, InputError for impossible settings, KeyboardInterrupt.
     """
     check(study, settings)
-    reach = region_of(study)
+    reach = study.reach
     evaluate = Generations(study, settings, simulations, simulations.progress("direct front"))
     started = time.perf_counter()
     try:
@@ -143,7 +142,7 @@ def find_direct(study: Study, settings: Settings, on_surfaces: ParetoFront, simu
             evaluate,
             study.actual(-reach),
             study.actual(reach),
-            goals=goals_of(study),
+            goals=study.goals,
             baseline=study.baseline,
             pick=study.file.front.pick,
             **{name: getattr(settings, name) for name in SEARCH},
@@ -162,7 +161,7 @@ def find_direct(study: Study, settings: Settings, on_surfaces: ParetoFront, simu
     return Direct(front, *surrogate, loss, tuple(evaluate.failures), seconds)
 
 
-def record_of(study: Study, settings: Settings, direct: Direct) -> dict[str, Any]:
+def record_of(study: Problem, settings: Settings, direct: Direct) -> dict[str, Any]:
     """The direct front, that of the surfaces run on the simulator, and what these lose, as plain numbers."""
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, front.half_widths, strict=True)
@@ -186,7 +185,7 @@ def record_of(study: Study, settings: Settings, direct: Direct) -> dict[str, Any
     }
 
 
-def share_of_adaptive(study: Study, front: SimulatedFront, summary: Mapping[str, Any]) -> dict[str, float] | None:
+def share_of_adaptive(study: Problem, front: SimulatedFront, summary: Mapping[str, Any]) -> dict[str, float] | None:
     """Hypervolume of the front of ``doe study --adaptive`` over that of the direct one, by the fresh runs of both, with its
     95 % half-width and the runs of the search; None where the ``summary`` is of a study without that search."""
     if not (adaptive := summary.get("adaptive")):
@@ -206,7 +205,7 @@ def share_of_adaptive(study: Study, front: SimulatedFront, summary: Mapping[str,
     }
 
 
-def compare(study: Study, settings: Settings, folder: Path, workers: int | None) -> dict[str, Any]:
+def compare(study: Problem, settings: Settings, folder: Path, workers: int | None) -> dict[str, Any]:
     """All of it: runs, searches, comparisons, the file; returns its record. Raises as ``find_direct``."""
     folder.mkdir(parents=True, exist_ok=True)
     with progress_bar("design runs", False) as progress:
@@ -237,7 +236,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path, folder, workers = asked.pop("study"), asked.pop("out"), asked.pop("workers")
     settings = Settings(**asked | {"set": asked["set"] or usual.set})
     try:
-        record = compare(Study.load(path), settings, folder, workers)
+        record = compare(Problem.load(path), settings, folder, workers)
     except (InputError, RunError) as error:
         print(error, file=sys.stderr)
         return 2 if isinstance(error, InputError) else 1

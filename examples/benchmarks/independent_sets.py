@@ -26,7 +26,7 @@ from scipy import stats
 import rbdyn
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.robust import Robust, judge
 from doe.workflow.uncertainty import OUTPUTS, Uncertainty, find_uncertainty
 from rbdyn.scene.uncertain import Law, Uncertain
@@ -92,7 +92,7 @@ def wilson(share: float, count: int) -> tuple[float, float]:
 
 
 def independent(
-    study: Study, pick: Sequence[float], sets: int, seed: int, workers: int
+    study: Problem, pick: Sequence[float], sets: int, seed: int, workers: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Outputs (n, m) of the baseline and of the pick at sets of all unknown inputs."""
     path = study.path_of(study.scene.file)
@@ -112,7 +112,7 @@ def independent(
     return found[0], found[1]
 
 
-def answers(study: Study, pick: Sequence[float], seed: int, out: Path, workers: int) -> tuple[Robust, Uncertainty]:
+def answers(study: Problem, pick: Sequence[float], seed: int, out: Path, workers: int) -> tuple[Robust, Uncertainty]:
     """What the tool states, with the seed of its input sets."""
     path = study.path_of(study.scene.file)
     declared = study.file.uncertain or rbdyn.Scene.load(path).uncertain or Uncertain()
@@ -124,7 +124,7 @@ def answers(study: Study, pick: Sequence[float], seed: int, out: Path, workers: 
         return judged, find_uncertainty(path, [f"uncertain.seed={seed}"], simulations)
 
 
-def chances(study: Study, base: np.ndarray, pick: np.ndarray, tool: Mapping[int, Robust]) -> Iterator[str]:
+def chances(study: Problem, base: np.ndarray, pick: np.ndarray, tool: Mapping[int, Robust]) -> Iterator[str]:
     """A line a response: in which share of the sets the pick is better, and what the tool states."""
     names = next(iter(tool.values())).responses
     goals = {each.name: each.goal for each in study.file.response}
@@ -157,7 +157,7 @@ def _chance(share: float, low: float, high: float) -> str:
 
 def compare(args: argparse.Namespace, out: Path) -> None:
     """The independent sets, the tool's answers, and both next to each other."""
-    study, pick, workers = Study.load(args.study), [float(each) for each in args.pick.split(",")], args.workers
+    study, pick, workers = Problem.load(args.study), [float(each) for each in args.pick.split(",")], args.workers
     path = out / f"sets_{args.sets}_{args.seed}.npz"
     if not path.exists():
         base, other = independent(study, pick, args.sets, args.seed, workers)

@@ -16,9 +16,8 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.pareto.manufacture import Interval, percent, random_offsets
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.unknown.decision import wilson
-from doe.workflow.surfaces import goals_of
+from doe.workflow.problem import Problem
 
 # Seeds that no run of a study has.
 SEEDS = 7_000_000
@@ -26,8 +25,8 @@ SEEDS = 7_000_000
 
 def main(path: Path, folder: Path, parts: int, replicates: int, workers: int | None) -> None:
     """Simulate parts, and print what was stated beside what was found."""
-    study, record = Study.load(path), json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    settings, goals, tolerances = study.file.tolerances, goals_of(study), record["tolerances"]
+    study, record = Problem.load(path), json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    settings, goals, tolerances = study.file.tolerances, study.goals, record["tolerances"]
     if settings is None:
         raise SystemExit(f"{path}: has no [tolerances]; add that table")
     half = np.array([tolerances[name]["half_width"] if name in tolerances else 0.0 for name in study.factors])
@@ -39,9 +38,8 @@ def main(path: Path, folder: Path, parts: int, replicates: int, workers: int | N
     keep = np.where(gain > 0.0, settings.keep * gain, gain)
     simulated = record["confirmation"]["baseline"]["responses"]
     baseline = goals.costs(np.array([simulated[name]["value"] for name in study.responses]))
-    effort = [*study.scene.set, f"numerics.replicates={replicates}", "numerics.companion=false"]
-    data = clearance.read_scene(study)
-    scenes = [clearance.scene_at(study, data, each, SEEDS + number, effort) for number, each in enumerate(made)]
+    effort = [f"numerics.replicates={replicates}", "numerics.companion=false"]
+    scenes = [study.scene_at(each, SEEDS + number, effort) for number, each in enumerate(made)]
     with Store(folder / "parts.sqlite", path.stem) as store:
         simulations = Simulations(store, workers, None, False, lambda title: lambda done, total: None)
         results = simulations.run(scenes, [f"part {number + 1}" for number in range(parts)], lambda done, total: None)

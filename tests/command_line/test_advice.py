@@ -16,7 +16,7 @@ from doe.dimension_chain.reading import chain_from
 from doe.library.answer import Answer
 from doe.library.effort import texts_given
 from doe.library.unknown import _points_faults
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from rbdyn.base.command import plain_number
 from rbdyn.base.faults import InputError, MethodError, read_toml
 from rbdyn.cli.new_options import clearance_of, roller_size
@@ -62,10 +62,10 @@ def test_fuzz_every_advice_on_a_number_is_accepted():
 @pytest.mark.parametrize(
     ("load", "name", "kind"),
     [
-        (Study.load, "cylindrical_roller.toml", "this is a scene, not a study; give it to rbdyn simulate, rbdyn ball or doe new"),
+        (Problem.load, "cylindrical_roller.toml", "this is a scene, not a study; give it to rbdyn simulate, rbdyn ball or doe new"),
         (Scene.load, "clearance_study.toml", "this is a study, not a scene; give it to doe study"),
         (Scene.load, "pocket_chain.toml", "this is a dimension chain, not a scene; give it to doe chain"),
-        (Study.load, "pocket_chain.toml", "this is a dimension chain, not a study; give it to doe chain"),
+        (Problem.load, "pocket_chain.toml", "this is a dimension chain, not a study; give it to doe chain"),
     ],
 )  # fmt: skip
 def test_a_file_of_another_kind_is_one_fault(load, name, kind):

@@ -16,9 +16,9 @@ from doe.cli import app
 from doe.dimension_chain import read_chains
 from doe.report.files import study_design_record as summary_design
 from doe.report.sections.design import design_record
-from doe.study_file import Study
 from doe.study_file.table import read_table
-from doe.workflow.runs import design_of, evaluation
+from doe.workflow.design import evaluation
+from doe.workflow.problem import Problem
 from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.sweep import keys_of_texts
@@ -183,10 +183,10 @@ def test_a_bad_assignment_is_one_sentence(assignment, words):
     assert words in fault
 
 
-@pytest.mark.parametrize("read", [Scene.load, Study.load, read_chains])
+@pytest.mark.parametrize("read", [Scene.load, Problem.load, read_chains])
 def test_unknown_keys_are_told_in_linear_time_and_a_byte_order_mark_is_read(tmp_path, read):
     """Rate: 30 000 unknown keys take a second of the processor (many minutes where each is compared with all)."""
-    name = {Scene.load: "cylindrical_roller", Study.load: "clearance_study"}.get(read, "pocket_chain")
+    name = {Scene.load: "cylindrical_roller", Problem.load: "clearance_study"}.get(read, "pocket_chain")
     whole, path = (EXAMPLES / f"{name}.toml").read_bytes(), tmp_path / "s.toml"
     path.write_bytes(b"\xef\xbb\xbf" + whole)
     assert read(path)
@@ -264,8 +264,8 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
 
     path = study(tmp_path, ('alpha = "rotatable"', 'alpha = "orthogonal_blocks"\nblocks = true'))
     path.write_text(path.read_text(encoding="utf-8").partition("[reference]")[0], encoding="utf-8")
-    loaded = Study.load(path)
-    design = design_of(loaded)
+    loaded = Problem.load(path)
+    design = loaded.design
     expected = [1] * 12 + [2] * 8
     record = design_record(loaded, design, evaluation(loaded, design))
     assert [run["block"] for run in record["runs"]] == expected

@@ -12,8 +12,8 @@ from short_studies import short_study
 
 from doe.dimension_chain import chain_from, fit_limits, read_chains, solve
 from doe.report.sections.chain import chain_blocks
-from doe.study_file import Study
 from doe.study_file.sections import StudyChain
+from doe.workflow.problem import Problem
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError, read_toml
@@ -23,7 +23,7 @@ from rbdyn.properties.materials import Material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BEARING = EXAMPLES / "bearing_chains.toml"
-STUDY = Study.load(EXAMPLES / "clearance_study.toml")
+STUDY = Problem.load(EXAMPLES / "clearance_study.toml")
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from doe.commands.study import status_blocks
 from doe.running import runner
 from doe.running.runner import Ledger, RunOutcome, Stage, agenda_in
 from doe.running.store import Point
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.blocks import Detail
@@ -131,7 +131,7 @@ def test_doe_states_what_is_left_on_standard_error(
             assert left(shown.stderr) == [(fewest, most)] and len(REST.findall(shown.stderr)) == 1
 
 
-def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def stated(study: Problem, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What a process states that makes so many design runs and is gone then."""
     sentences: list[str] = []
     out.mkdir(exist_ok=True)
@@ -146,7 +146,7 @@ def stated(study: Study, out: Path, runs: int, monkeypatch: pytest.MonkeyPatch) 
 def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
     """The next process knows the runs of the first. A confirmation, which needs one run beside the baseline at least and four at
     most, found three to run and was stopped after one: two or three are left, or none for a new process."""
-    study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
+    study, out = Problem.load(short_study(tmp_path)), tmp_path / "out"
     assert stated(study, out, 8, monkeypatch)[0].startswith(
         "22 to 25 runs (baseline 1, design runs 20, confirmation 1 to 4), 1 at once"
     )
@@ -160,7 +160,7 @@ def test_a_resumed_study_counts_only_what_is_left(tmp_path, monkeypatch):
 
 def test_status_counts_every_step_to_the_end(tmp_path, monkeypatch, capsys):
     """Before anything runs and half-way: each step with its runs, and those to come."""
-    study, out = Study.load(short_study(tmp_path)), tmp_path / "out"
+    study, out = Problem.load(short_study(tmp_path)), tmp_path / "out"
     names = ["baseline", "design runs", "front", "confirmation", "tolerances", "answer"]
     fresh = study_status(study, out)
     assert [each["name"] for each in fresh["stages"]] == names and fresh["runs_left"] == [22, 25]

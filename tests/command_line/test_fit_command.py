@@ -15,8 +15,8 @@ from typer.testing import CliRunner, Result
 from doe.cli import app
 from doe.report.sections.fit import fit_blocks, fit_record
 from doe.running.store import StoppedError
-from doe.study_file import Study
 from doe.study_file.table import read_table
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.blocks import Detail
@@ -51,7 +51,7 @@ def with_errors() -> pd.DataFrame:
 
 def test_errors_replicates_and_blocks_of_a_table_reach_the_fit(tmp_path):
     with_errors().to_csv(tmp_path / "table.csv", index=False)
-    loaded = Study.load(study(tmp_path))
+    loaded = Problem.load(study(tmp_path))
     runs = read_runs(loaded, tmp_path / "table.csv")
     assert runs.errors == pytest.approx(0.02 * runs.values)
     assert runs.replicates.tolist() == [8] * 20 and runs.block.tolist() == [0, 1] * 10
@@ -105,7 +105,7 @@ def test_a_statistician_recognises_the_tables(finished):
 
 def test_equations_are_in_coded_and_in_actual_units(tmp_path):
     TABLE.to_csv(tmp_path / "table.csv", index=False)
-    loaded = Study.load(study(tmp_path))
+    loaded = Problem.load(study(tmp_path))
     surfaces = fit_surfaces(loaded, read_runs(loaded, tmp_path / "table.csv"))
     name, fitted = next(iter(fit_record(surfaces)["responses"].items()))
     printed = text(fit_blocks(name, fitted, loaded.factors))
@@ -171,7 +171,7 @@ def test_rows_of_one_run_are_its_replicates(tmp_path):
     spread = [TABLE.assign(impact_force_N=TABLE["impact_force_N"] + shift) for shift in (-2.0, 0.0, 2.0)]
     rows = pd.concat(spread)
     rows.to_csv(tmp_path / "rows.csv", index=False)
-    runs = read_runs(Study.load(study(tmp_path)), tmp_path / "rows.csv")
+    runs = read_runs(Problem.load(study(tmp_path)), tmp_path / "rows.csv")
     assert runs.values == pytest.approx(TABLE[RESPONSES].to_numpy())
     assert runs.errors[:, 0] == pytest.approx([4.302653 * 2.0 / np.sqrt(3.0)] * 20)
     assert runs.replicates.tolist() == [3] * 20

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.report.sections.front import front_record
 from doe.study_file.sections import Tolerances
-from doe.workflow.front import find_front, known_tolerances
+from doe.workflow.front import find_front
 from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
@@ -192,7 +192,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     surfaces = table_surfaces(study)
     point = np.array([0.0136, 0.184, 0.301])
     found = widest_tolerances_of(study, surfaces, point, Tolerances(gains=study.responses))
-    ratios = list(known_tolerances(study).values())
+    ratios = list(study.known_tolerances.values())
     assert found.half_widths / ratios == pytest.approx([found.half_widths[0] / ratios[0]] * 3)
     # Counted afresh: parts that keep half of every gain.
     random = np.random.default_rng(7)

@@ -9,7 +9,7 @@ import pytest
 from doe_command import doe
 
 from doe.commands.new_duty import duty_text
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, in_hours, read_duty, shares_of_time
@@ -56,7 +56,7 @@ def test_command_line_writes_the_duty(tmp_path):
     plain = doe("new", str(EXAMPLE)).stdout
     assert study == tomllib.loads(plain) and "[[duty]]" not in plain
     (tmp_path / "study.toml").write_text(ran.stdout, encoding="utf-8")
-    assert [point.name for point in Study.load(tmp_path / "study.toml").file.duty] == [*SETS]
+    assert [point.name for point in Problem.load(tmp_path / "study.toml").file.duty] == [*SETS]
 
 
 def test_unit_a_european_table_means_the_same(scene, tmp_path):

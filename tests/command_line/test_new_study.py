@@ -12,9 +12,9 @@ from short_studies import EXAMPLES
 from doe.clearance import responses_of
 from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
-from doe.study_file import Study
 from doe.study_file.sections import StudyChain
 from doe.workflow.parts import clearance_parts
+from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.properties.tolerances import grade_tolerances
 from rbdyn.scene import Scene
@@ -103,7 +103,7 @@ def test_command_line_chains_resolve_to_the_clearances(scene, names, tmp_path):
     text, study = written(scene, "--chains")
     assert [chain["name"] for chain in study["chain"]] == names and "tolerances" not in study
     drawn = Scene.load(scene)
-    loaded = Study.load(EXAMPLES / "clearance_study.toml")
+    loaded = Problem.load(EXAMPLES / "clearance_study.toml")
     clearances = {
         "radial_clearance_mm": drawn.bearing.radial_clearance_mm,
         "guide_clearance_mm": drawn.cage.guide_clearance_mm,

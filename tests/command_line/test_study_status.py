@@ -23,7 +23,7 @@ from doe.cli import app
 from doe.commands.study import status_blocks
 from doe.running.runner import Stage, agenda_in
 from doe.running.store import STALE_S, Point, Store, at_work
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import content_digest, inputs_digest, scene_status, status_of, study_stages, study_status
 from rbdyn.base.blocks import Detail
@@ -43,7 +43,7 @@ def files(folder: Path) -> dict[str, tuple[int, float]]:
 
 
 def test_study_that_never_ran_is_all_missing(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     record = study_status(study, tmp_path / "nowhere")
     assert record["points"] == {"total": 20, "done": 0, "failed": 0, "running": 0, "missing": 20}
     assert record["status"] == "unfinished" and record["runs_left"] == [22, 25]
@@ -51,7 +51,7 @@ def test_study_that_never_ran_is_all_missing(tmp_path):
 
 
 def test_running_study_tells_who_runs_what_and_what_is_to_come(tmp_path, monkeypatch, capsys):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, seconds=0.02, faulty=(2, 4))
     records, passed, begun = {}, {}, time.perf_counter()
 
@@ -97,7 +97,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
     out = tmp_path / "study_results"
     out.mkdir()
     instantly(monkeypatch.setattr)
-    run_design(Study.load(path), out, 2, silent)
+    run_design(Problem.load(path), out, 2, silent)
     with Store(out / STORE) as store:
         store.put("a confirmation", {})
         store.begin(Point("another", "pick"))
@@ -202,7 +202,7 @@ def test_study_killed_in_any_stage_is_unfinished_there_and_nothing_runs(
     killed_in(monkeypatch, seeds, after)
     with pytest.raises(Killed):
         study_command(path, tmp_path / "out", **options)
-    record = study_status(Study.load(path), tmp_path / "out")
+    record = study_status(Problem.load(path), tmp_path / "out")
     assert record["status"] == "unfinished" and record["stage"] == stage
     assert record["points"]["running"] == 0 and record["running"] == []
     assert record["command"] == " ".join(["doe study", *(f"--{each}" for each in options)])
@@ -236,18 +236,18 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
     study_command(path, out)
     (before,) = seen
     assert before["status"] == "running" and before["stage"] == "answer"
-    record = study_status(Study.load(path), out)
+    record = study_status(Problem.load(path), out)
     assert record["status"] == "finished" and record["runs_left"] == [0, 0] and record["stage"] is None
     capsys.readouterr()
     show(status_blocks(record), Detail.LEAST)
     assert "finished; of 20 design points 20 done" in capsys.readouterr().out
     (out / "answer.txt").unlink()
-    assert study_status(Study.load(path), out)["status"] == "unfinished"
+    assert study_status(Problem.load(path), out)["status"] == "unfinished"
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_as_many_runs_are_under_way_as_are_running(tmp_path, monkeypatch, workers):
-    study, counts, active = Study.load(short_study(tmp_path)), [], [0]
+    study, counts, active = Problem.load(short_study(tmp_path)), [], [0]
     instantly(monkeypatch.setattr)
     instant, lock = module.simulate, threading.Lock()
 
@@ -269,7 +269,7 @@ def test_as_many_runs_are_under_way_as_are_running(tmp_path, monkeypatch, worker
 
 def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
     path = short_study(tmp_path)
-    study = Study.load(path)
+    study = Problem.load(path)
     plain = {each.name: each for each in study_stages(study)}
     assert list(plain) == ["baseline", "design runs", "front", "confirmation", "tolerances", "answer"]
     # 20 runs of 2 replicates and 4 turns; 5 points of 2 replicates with a companion, the baseline first.
@@ -321,7 +321,7 @@ def test_fault_that_ended_a_command_is_told(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr, faulty=range(1, 21))
     with pytest.raises(typer.Exit):
         study_command(path, out)
-    record = study_status(Study.load(path), out)
+    record = study_status(Problem.load(path), out)
     assert record["status"] == "unfinished" and "only 0 of 20 design runs succeeded" in record["stopped_by"]
 
 

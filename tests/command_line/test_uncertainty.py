@@ -13,13 +13,12 @@ from instant_runs import instant_result
 from scipy import stats
 from typer.testing import CliRunner
 
-from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.sections.unknown import MOST_PAIRS, robust_record, robust_sentences
-from doe.study_file import Study
 from doe.study_file.sections import Robust
 from doe.workflow.confirmation import odds_sentence
 from doe.workflow.input_sets import ROUND_SEEDS, override_notes, read_case, replicated_sets, run
+from doe.workflow.problem import Problem
 from doe.workflow.robust import Decision, check_robust, fresh_rows, judge
 from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
@@ -274,7 +273,7 @@ class _Simulations:
         return _Result((level * (1.0 - gain) * (1.0 + error * random.standard_normal(3))).tolist(), error)
 
 
-def _study(folder: Path, uncertain: str, settle: float = 0.5, front: str = "none") -> Study:
+def _study(folder: Path, uncertain: str, settle: float = 0.5, front: str = "none") -> Problem:
     text = (EXAMPLES / "clearance_study.toml").read_text("utf-8")
     (folder / "cylindrical_roller.toml").write_text((EXAMPLES / "cylindrical_roller.toml").read_text("utf-8"), "utf-8")
     for each in EXAMPLES.glob("*.csv"):
@@ -282,7 +281,7 @@ def _study(folder: Path, uncertain: str, settle: float = 0.5, front: str = "none
     (folder / "study.toml").write_text(
         f'{text}\n[robust]\npoints = 128\nsettle = {settle}\nfront = "{front}"\n{uncertain}', "utf-8"
     )
-    return Study.load(folder / "study.toml")
+    return Problem.load(folder / "study.toml")
 
 
 MASS = """
@@ -299,7 +298,7 @@ defaults = "none"
 
 
 @pytest.fixture(scope="module")
-def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Any]:
+def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Any]:
     """A study whose impact and loss have limits, and the judgement of its pick over imbalance and mass."""
     study = _study(tmp_path_factory.mktemp("judgement"), IMBALANCE)
     text = study.path.read_text("utf-8")
@@ -307,11 +306,11 @@ def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Any]:
     text = text.replace('name = "impact_force_N"\nmodel = "linear"\ngoal = "min"', limits)
     text = text.replace('goal = "min"\n\n[front]', 'goal = "min"\nupper = 200.0\n\n[front]')
     study.path.write_text(text, "utf-8")
-    study = Study.load(study.path)
+    study = Problem.load(study.path)
     return study, judge(study, study.baseline * [1.0, 1.0, 0.8], _Simulations(0.002))  # type: ignore[arg-type]
 
 
-def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Study, Any]) -> None:
+def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Problem, Any]) -> None:
     study, found = judgement
     shares = dict(zip(found.responses, found.better.gains, strict=True))
     assert shares["impact_force_N"].value > 0.98 and shares["power_loss_W"].value > 0.98
@@ -334,7 +333,7 @@ def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Study,
     assert json.loads(json.dumps(record)) == record
 
 
-def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Study, Any]) -> None:
+def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Problem, Any]) -> None:
     """The words of each verdict; only a decided one lists inputs."""
     study, found = judgement
     rivals = ["cage.imbalance_um", "cage.mass_g"]
@@ -363,7 +362,7 @@ def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Study, A
     assert Robust.model_fields["points"].metadata[-1].le == MOST_PAIRS
 
 
-def test_closed_form_of_the_odds_of_limits(judgement: tuple[Study, Any]) -> None:
+def test_closed_form_of_the_odds_of_limits(judgement: tuple[Problem, Any]) -> None:
     """Closed form: the impact of the pick is 78.4 N times the mass over 45 g, uniform from 40 to 50 g; both its limits count."""
     study, found = judgement
     low, high = (45.0 * each / 78.4 for each in (72.0, 80.0))
@@ -508,7 +507,7 @@ def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: py
     assert found.notes[1].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
 
 
-def test_a_study_says_where_input_sets_differ_from_its_runs(judgement: tuple[Study, Any]) -> None:
+def test_a_study_says_where_input_sets_differ_from_its_runs(judgement: tuple[Problem, Any]) -> None:
     _, found = judgement
     runs = "other runs of the study, not the input sets: uncertain.set gives these numerics.turns=20, numerics.replicates=2"
     assert found.notes[0].startswith("2 of 26 inputs vary, the others count as exact (")
@@ -577,7 +576,7 @@ def test_a_factor_need_not_stand_in_the_scene(tmp_path: Path) -> None:
     study = _study(tmp_path, IMBALANCE)
     text = study.path.read_text("utf-8")
     study.path.write_text(text.replace('"cage.guide_clearance_mm"', '"lubricant.oil_fraction"'), "utf-8")
-    assert "oil_fraction" not in read_scene(Study.load(study.path))["lubricant"]
+    assert "oil_fraction" not in Problem.load(study.path).scene_tables["lubricant"]
 
 
 def test_a_study_is_not_finished_once_its_steps_change() -> None:
@@ -596,5 +595,5 @@ def test_a_study_is_not_finished_once_its_sample_changes(tmp_path: Path, where: 
         file.write('\n[uncertain]\nsample = "posterior.csv"\n')
     for rows in ("1\n2\n", "1\n3\n"):
         (tmp_path / "posterior.csv").write_text(f"cage.mass_g\n{rows}", "utf-8")
-        digests.append(inputs_digest(Study.load(study.path)))
+        digests.append(inputs_digest(Problem.load(study.path)))
     assert digests[0] != digests[1]

@@ -97,11 +97,11 @@ def test_invariant_the_notebook_runs_on_the_simulation_itself(tmp_path):
 def test_literature_the_flight_has_its_points_and_its_life():
     """Literature: idle, cruise and take-off, whose life by ISO/TS 16281, Palmgren and Miner is 92 000 h, 7 tenths of the damage
     at cruise; a map reads the same points."""
-    from doe.study_file import Study
     from doe.workflow.duty import lives
+    from doe.workflow.problem import Problem
     from rbdyn.scene.duty import read_duty
 
-    study = Study.load(EXAMPLES / "duty_study.toml")
+    study = Problem.load(EXAMPLES / "duty_study.toml")
     assert study.shares == {"cruise": 0.8, "idle": 0.15, "take-off": 0.05}
     assert read_duty(study.path) == study.file.duty
     assert study.responses[-1] == "idle: cage_slip"

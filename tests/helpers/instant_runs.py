@@ -96,7 +96,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     from doe.commands.options import keeping_runs
     from doe.commands.study import study as doe_study
     from doe.library.effort import registered
-    from doe.study_file import Study
+    from doe.workflow.problem import Problem
     from doe.workflow.runs import run_design
     from rbdyn.base.command import guarded, print_json
     from rbdyn.base.folder import output_folder
@@ -109,7 +109,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
         return
     with guarded(as_json=True), keeping_runs(out), output_folder(out, "doe", ()) as folder, registered(study, out):
         folder.claim(study)
-        runs = run_design(Study.load(study), out, workers, lambda done, total: None)
+        runs = run_design(Problem.load(study), out, workers, lambda done, total: None)
         print_json({"values": runs.values.tolist(), "ran": ran})
 
 

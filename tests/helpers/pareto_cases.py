@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 
@@ -48,7 +48,7 @@ def edited_study(folder, *replacements):
         text = text.replace(old, new)
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")
-    return Study.load(path)
+    return Problem.load(path)
 
 
 def table_surfaces(study):

@@ -17,8 +17,8 @@ from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.page import html_report
 from doe.report.sections.search import emulators_record
-from doe.study_file import Study
 from doe.study_file.sections import Category
+from doe.workflow.problem import Problem
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dic
     shares = (0.42, 0.0, 0.28)
     emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, (len(levels),) if levels else (), idle, shares)
     assert shares in emulators.shares and () in emulators.shares
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     study = replace(study, file=study.file.model_copy(update={"category": category}))
     found = SimpleNamespace(
         search=SimpleNamespace(emulators=emulators), study=SimpleNamespace(levels=(1,) * len(category))

@@ -24,7 +24,7 @@ from doe.workflow.front import find_front
 from doe.workflow.pick import choices
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.runs import _distinct_notes
-from doe.workflow.surfaces import goals_of, predict_all
+from doe.workflow.surfaces import predict_all
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph
 from rbdyn.base.notes import Note
@@ -176,8 +176,8 @@ def test_a_better_point_was_predicted_worse_at_the_ends_of_its_tolerances(predic
     here, pick = (forecast.at(points[which].point) for which in (name, "pick"))
     worse = here.costs > pick.costs
     assert worse.any() and "at the ends of its tolerances the surfaces predict" in sentence
-    responses = [study.responses[index] for index in goals_of(study).objectives]
-    percent = 100.0 * np.abs((pick.costs - here.costs) / confirmed["pick"].values[goals_of(study).objectives])
+    responses = [study.responses[index] for index in study.goals.objectives]
+    percent = 100.0 * np.abs((pick.costs - here.costs) / confirmed["pick"].values[study.goals.objectives])
     for response, change, loss in zip(responses, percent, worse, strict=True):
         assert (
             f"{response.rpartition('_')[0].replace('_', ' ')} {change:.2f} % more" in sentence

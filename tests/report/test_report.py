@@ -23,8 +23,8 @@ from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.sections.record import change, scalars
 from doe.report.still import Still
-from doe.study_file import Study
 from doe.workflow.pick import Outward
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.words import label, quantity, rounded_down, shown, with_error
@@ -335,7 +335,7 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     for axis in [*figure.axes, *kept["one"].axes]:
         boxes = [each.get_window_extent() for each in axis.get_xticklabels() if each.get_text()]
         assert not any(one.overlaps(two.padded(18.0)) for one, two in pairwise(boxes))
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     response_surface(study, fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))[0], "surface")
     for axis, held in zip(kept["surface"].axes, ("pocket clearance 0.3 mm", "guide clearance 0.15 mm"), strict=True):
         assert axis.get_zlabel() == "impact force [N]" and held in axis.get_title()

@@ -12,9 +12,9 @@ import pytest
 from mutations import mutated, outcome
 
 from doe.dimension_chain import read_chains
-from doe.study_file import Study
 from doe.study_file.table import read_table as read_runs_table
-from doe.workflow.runs import design_of
+from doe.workflow.design import design_of
+from doe.workflow.problem import Problem
 from doe.workflow.whole import check_study
 from rbdyn.quasistatic.sweep import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep import SweepResult
@@ -67,7 +67,7 @@ def read_result(path: Path) -> object:
 
 def read_study(path: Path) -> object:
     """A study and its design, as ``doe design`` reads them."""
-    study = Study.load(path)
+    study = Problem.load(path)
     if (study.file.design.runs, study.file.design.levels) <= (200, 3):
         design_of(study)
     return study
@@ -75,7 +75,7 @@ def read_study(path: Path) -> object:
 
 def read_table(path: Path) -> object:
     """A table, as ``doe fit --data`` reads it."""
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     return read_runs_table(path, study.factors, study.responses, study.path)
 
 
@@ -85,7 +85,7 @@ def read_table(path: Path) -> object:
     [
         (Scene.load, [f"{Path(name).name}.toml" for name in SCENES], 6000),
         (read_study, ["clearance_study.toml"], 4000),
-        (lambda path: check_study(Study.load(path)) or "checked", ["clearance_study.toml"], 300),
+        (lambda path: check_study(Problem.load(path)) or "checked", ["clearance_study.toml"], 300),
         (read_chains, [f"{name}.toml" for name in CHAINS], 4000),
         (read_table, ["ccd_table4.csv"], 3000),
         (read_result, ["result.json"], 2000),

@@ -16,8 +16,8 @@ from doe.clearance import points_of
 from doe.commands.study import status_blocks
 from doe.running.runner import NOTE, agenda_in
 from doe.running.store import Store
-from doe.study_file import Study
-from doe.workflow.runs import STORE, ordered_runs
+from doe.workflow.problem import Problem
+from doe.workflow.runs import STORE
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.faults import InputError
 from rbdyn.base.storage import digest_of, sign
@@ -27,12 +27,12 @@ OPTIONS = ({}, {"adaptive": True}, {"robust": True})
 SPOILT = ("", "{}", "[]", "null", "{", '{"stages": 5}', "\x00", '{"command": 1, "stages": []}')
 
 
-def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dict[str, int]:
+def history(draw: random.Random, study: Problem, folder: Path, plans: dict) -> dict[str, int]:
     """A store as a command leaves it somewhere on its way; returns what is true of it."""
     given = draw.choice(OPTIONS)
     options = {"adaptive": False, "robust": False} | given
     digest = inputs_digest(study, **options) if draw.random() < 0.8 else "of another"
-    ordered = ordered_runs(study)
+    ordered = study.plan
     points = points_of(ordered.scenes, ordered.labels, ordered.factors)
     result = instant_result(ordered.scenes[0]).as_dict()
     ended, taken = draw.randint(0, len(points)), draw.randint(0, 3)
@@ -77,7 +77,7 @@ def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dic
 def test_invariant_status_of_any_history_is_true(tmp_path, fuzz_cases, capsys):
     """Invariant: nothing runs where no process lives, counts add up, finished needs an answer and leaves no run."""
     draw, seen = random.Random(11), {"finished": 0, "unfinished": 0}
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     plans = {tuple(given): (lambda given=given: study_stages(study, **given)) for given in OPTIONS}
     for case in range(fuzz_cases):
         folder = tmp_path / str(case)

@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from doe import clearance
-from doe.study_file import Study
 from doe.study_file.study import StudyFile
 from doe.unknown import inputs
 from doe.workflow.input_sets import Case, case_of
+from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
@@ -153,9 +152,11 @@ def study_with(draw: random.Random, folder: Path, table: dict[str, Any]) -> tupl
         data["factor"] = [*data["factor"], CATEGORY]
     if draw.random() < 0.3:
         data["scene"] = {**data["scene"], "set": draw.sample(SETS, 2)}
-    study = Study(folder / "study.toml", validated(StudyFile, {**data, "uncertain": table}, str(folder / "study.toml")))
+    study = Problem(
+        folder / "study.toml", validated(StudyFile, {**data, "uncertain": table}, str(folder / "study.toml"))
+    )
     point = study.centre + study.step * np.array([draw.uniform(-1.0, 1.0) for _ in study.factors])
-    return case_of_study(study), clearance.assignments(study, point)
+    return case_of_study(study), study.assignments(point)
 
 
 def check(case: Case, table: dict[str, Any], design: list[str], seed: int) -> int:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from short_studies import short_study
 
-from doe.study_file import Study
 from doe.workflow.confirmation import Choice, confirmed_from, whirl_sentence
+from doe.workflow.problem import Problem
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
 from rbdyn.dynamics.integrators.advance import WHIRL, book_whirl
 from rbdyn.dynamics.motion import history
@@ -135,8 +135,8 @@ def test_unit_circling_cage_has_no_note(make_scene):
 
 def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     """Unit: only a study with a goal for the whirl speaks of it, and names the points."""
-    study = Study.load(short_study(tmp_path))
-    idle = Study.load(short_study(tmp_path, replace=('"quadratic"\ngoal = "min"', '"quadratic"\ngoal = "none"')))
+    study = Problem.load(short_study(tmp_path))
+    idle = Problem.load(short_study(tmp_path, replace=('"quadratic"\ngoal = "min"', '"quadratic"\ngoal = "none"')))
 
     def point(share):
         orbit = None if share is None else Quantity(share, 0.1 * share, None, 10.0, 9)

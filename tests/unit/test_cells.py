@@ -12,7 +12,7 @@ import pytest
 from instant_runs import instantly
 from short_studies import short_study, silent
 
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs, run_design
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell, save_table
 from rbdyn.base.tables.sheet import read_sheet
@@ -84,7 +84,7 @@ def named_study(folder):
 def test_unit_study_with_names_like_formulas_goes_round_through_fit_and_front(tmp_path, monkeypatch):
     """Unit: its tables are quoted, and fit and front read them under the study's own names."""
     path = named_study(tmp_path)
-    study = Study.load(path)
+    study = Problem.load(path)
     assert study.factors[:2] == ["=cmd_mm", "@guide_mm"]
     instantly(monkeypatch.setattr)
     runs = run_design(study, tmp_path, 2, silent)

@@ -23,7 +23,7 @@ from short_studies import SHORT, short_study, silent
 from doe.running import cluster
 from doe.running.runner import RunOutcome
 from doe.running.store import Store
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, run_design
 from rbdyn.base.faults import InputError, RunError
 
@@ -105,7 +105,7 @@ def collected(
 def test_study_on_a_cluster_that_loses_a_worker_has_the_bits_of_a_local_one(tmp_path):
     path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=40,") + ",step_budget_per_turn=4000")
     path.write_text(path.read_text(encoding="utf-8").replace("centre = 0.15", "centre = 0.12"), encoding="utf-8")
-    study = Study.load(path)
+    study = Problem.load(path)
     for name in ("here", "there"):
         (tmp_path / name).mkdir()
     local = run_design(study, tmp_path / "here", None, silent)
@@ -182,7 +182,7 @@ def test_point_that_kills_its_workers_is_told_as_lost_and_the_others_are_kept(tm
 
 @pytest.mark.slow
 def test_worker_with_other_sources_is_refused(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
     with started(tmp_path, 1) as there, pytest.raises(InputError, match="runs another version of rbdyn"):
         run_design(study, tmp_path, None, silent, there.address)

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from doe import clearance
 from doe.cli import app
 from doe.designs import central_composite
-from doe.study_file import Study
-from doe.workflow.runs import check_runs, design_of, evaluation
+from doe.workflow.design import check_runs, design_of, evaluation
+from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -53,10 +52,10 @@ def test_random_order_gives_every_point_its_own_seed(tmp_path):
     text = EXAMPLE.read_text(encoding="utf-8").replace("[design]", '[design]\norder = "random"')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     (tmp_path / "cylindrical_roller.toml").write_bytes((EXAMPLES / "cylindrical_roller.toml").read_bytes())
-    study, plain = Study.load(tmp_path / "study.toml"), Study.load(EXAMPLE)
-    design = design_of(study)
-    mixed = clearance.design_scenes(study, study.centre + design.coded * study.step, design.order.tolist())
-    given = clearance.design_scenes(plain, plain.centre + design_of(plain).coded * plain.step)
+    study, plain = Problem.load(tmp_path / "study.toml"), Problem.load(EXAMPLE)
+    design = study.design
+    mixed = study.design_scenes(study.centre + design.coded * study.step, design.order.tolist())
+    given = plain.design_scenes(plain.centre + plain.design.coded * plain.step)
     assert [scene.numerics.seed for scene in mixed] != [scene.numerics.seed for scene in given]
     assert {scene.model_dump_json() for scene in mixed} == {scene.model_dump_json() for scene in given}
 
@@ -76,8 +75,8 @@ def test_random_order_gives_every_point_its_own_seed(tmp_path):
     ],
 )
 def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach):
-    study = Study.load(study_file(tmp_path, lines, factors))
-    design = design_of(study)
+    study = Problem.load(study_file(tmp_path, lines, factors))
+    design = study.design
     assert design.coded.shape == (runs, factors)
     assert design.reach == pytest.approx(reach)
     found = evaluation(study, design)
@@ -105,7 +104,7 @@ def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach
 def test_impossible_settings_are_named(tmp_path, lines, factors, words):
     path = study_file(tmp_path, lines, factors)
     with pytest.raises(InputError) as refused:
-        design_of(Study.load(path))
+        design_of(Problem.load(path))
     assert all(word in str(refused.value) for word in words), str(refused.value)
     assert all(fault.startswith(f"{path}: design.") for fault in refused.value.faults)
 
@@ -132,7 +131,7 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
 def test_runs_that_do_not_suffice_are_named_for_every_response(tmp_path, lines, model, words):
     path = study_file(tmp_path, lines, 3, model)
     with pytest.raises(InputError) as refused:
-        check_runs(Study.load(path), design_of(Study.load(path)))
+        check_runs(Problem.load(path), Problem.load(path).design)
     for number, fault in enumerate(refused.value.faults, 1):
         assert fault.startswith(f"{path}: response[{number}].model = '{model}': ")
         assert words in fault

@@ -20,8 +20,8 @@ from short_studies import SHORT, rows, short_study, silent, stored
 from doe.clearance import Simulations
 from doe.pareto import Goals
 from doe.running.store import Store
-from doe.study_file import Study
 from doe.workflow.front import find_front
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError
@@ -36,7 +36,7 @@ def simulations(store: Store) -> Simulations:
 
 @pytest.mark.slow
 def test_direct_front_asks_for_the_same_runs_again_and_survives_failures(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     front = find_front(study, fit_surfaces(study, read_runs(study, tmp_path / "ccd_table4.csv")))
     with Store(tmp_path / STORE) as store:
         first = direct_front.find_direct(study, BRIEF, front, simulations(store))
@@ -77,14 +77,14 @@ def test_direct_front_asks_for_the_same_runs_again_and_survives_failures(tmp_pat
 
 
 def test_runs_are_as_long_as_design_runs_and_stated_in_words(tmp_path):
-    study, usual = Study.load(short_study(tmp_path)), direct_front.Settings()
+    study, usual = Problem.load(short_study(tmp_path)), direct_front.Settings()
     (scene,) = direct_front.scenes(study, usual, study.baseline[None], 0)
     assert (scene.numerics.turns, scene.numerics.discard_turns, scene.numerics.replicates) == (3, 1, 3)
     assert "3 replicates of 3 counted shaft turns (3 whole windows" in direct_front.run_in_words(study, usual)
 
 
 def test_runs_without_a_whole_window_of_the_impact_are_refused(tmp_path):
-    study = Study.load(short_study(tmp_path, SHORT.replace(",impact_window_turns=1", "")))
+    study = Problem.load(short_study(tmp_path, SHORT.replace(",impact_window_turns=1", "")))
     direct_front.check(study, direct_front.Settings(turns=100.0))
     with pytest.raises(InputError, match=r"--turns: 9 counted turns hold no impact window of .*; give .* at least"):
         direct_front.check(study, direct_front.Settings(turns=10.0, discard_turns=1.0))

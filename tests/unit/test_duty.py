@@ -12,15 +12,14 @@ from instant_runs import instant_result, instantly, unillustrated
 from scipy import stats
 from short_studies import EXAMPLES, rows, short_study, silent
 
-from doe import clearance
 from doe.aggregation import Estimates, largest, quantile, weighted_mean
 from doe.clearance import Simulations
 from doe.duty import Duty, DutyResult, Rule, quotient
 from doe.report.files import summary
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.workflow.confirmation import Choice, confirm, every_limit, simulate_original
 from doe.workflow.duty import study_at
+from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from doe.workflow.runs import run_design
 from doe.workflow.whole import run_study
@@ -53,7 +52,7 @@ def duty_study(folder, duty, *more):
         assert old in text
         text = text.replace(old, new, 1)
     path.write_text(text, encoding="utf-8")
-    return Study.load(path)
+    return Problem.load(path)
 
 
 def designed(study, folder):
@@ -159,11 +158,11 @@ def test_points_cost_a_run_each_unless_their_scenes_are_one(tmp_path, monkeypatc
 
 def test_every_point_of_a_run_has_its_seed(tmp_path):
     study = duty_study(tmp_path, IDLE_AND_CRUISE)
-    runs = clearance.design_scenes(study, study.baseline[None].repeat(2, axis=0))
+    runs = study.design_scenes(study.baseline[None].repeat(2, axis=0))
     seeds = [[scene.numerics.seed for scene in run.scenes.values()] for run in runs]
     assert seeds == [[1, 1], [2, 2]]
     assert [scene.operation.inner_speed_rpm for scene in runs[0].scenes.values()] == [24000.0, 6000.0]
-    (search,) = clearance.adaptive_scenes(study, study.baseline[None], [3], 7)
+    (search,) = study.adaptive_scenes(study.baseline[None], [3], 7)
     assert {scene.numerics.replicates for scene in search.scenes.values()} == {3}
 
 
@@ -291,7 +290,7 @@ def test_a_faulty_key_of_a_response_is_one_sentence(tmp_path, duty, keys, senten
 def test_an_impossible_scene_names_its_point(tmp_path):
     study = duty_study(tmp_path, IDLE_AND_CRUISE.replace("rpm=6000", "rpm=1e9"))
     with pytest.raises(InputError) as caught:
-        clearance.design_scenes(study, study.baseline[None])
+        study.design_scenes(study.baseline[None])
     (fault,) = caught.value.faults
     assert "duty.set of idle: " in fault
     assert "operation.inner_speed_rpm" in fault
@@ -301,7 +300,7 @@ def test_temperatures_have_no_ratio(tmp_path):
     heat = '[[response]]\nname = "oil_temperature_C"\naggregate = "worst_relative"\n[front]'
     study = duty_study(tmp_path, IDLE_AND_CRUISE, ("[front]", heat), ("set = [", 'set = ["thermal.ambient_C=40.0", '))
     with pytest.raises(InputError, match="temperatures in °C have no ratio"):
-        clearance.check_responses(study)
+        study.check_responses()
 
 
 def test_shares_are_normalised_on_request(tmp_path):

@@ -10,8 +10,9 @@ from instant_runs import instantly, unillustrated
 from short_studies import SHORT, short_study, silent
 
 from doe.report.files import write
-from doe.study_file import Study
-from doe.workflow.runs import actual_of, design_of, evaluation, ordered_runs, run_design
+from doe.workflow.design import actual_of, design_of, evaluation
+from doe.workflow.problem import Problem
+from doe.workflow.runs import run_design
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
@@ -33,7 +34,7 @@ def augmented(folder, table=None, lines=PLACED):
     path.write_text(text, encoding="utf-8")
     if table is not None:
         (folder / "made.csv").write_text(table, encoding="utf-8")
-    return Study.load(path)
+    return Problem.load(path)
 
 
 def table_of(points, *more):
@@ -44,15 +45,15 @@ def table_of(points, *more):
 def test_runs_of_a_study_are_kept_and_not_simulated_again(tmp_path, monkeypatch):
     ran = instantly(monkeypatch.setattr)
     unillustrated(monkeypatch.setattr)
-    first = Study.load(short_study(tmp_path))
+    first = Problem.load(short_study(tmp_path))
     text = (tmp_path / "study.toml").read_text(encoding="utf-8")
     (tmp_path / "study.toml").write_text(text[: text.index("[reference]")], encoding="utf-8")
-    first, out = Study.load(tmp_path / "study.toml"), tmp_path / "out"
+    first, out = Problem.load(tmp_path / "study.toml"), tmp_path / "out"
     out.mkdir()
     write(run_study(first, out, 1, lambda title: silent), out)
     (tmp_path / "made.csv").write_bytes((out / "design_runs.csv").read_bytes())
     study, before = augmented(tmp_path), len(ran)
-    ordered = ordered_runs(study)
+    ordered = study.plan
     with (tmp_path / "made.csv").open(encoding="utf-8") as file:
         given = [[float(row[name]) for name in NAMES] for row in csv.DictReader(file)]
     assert np.array_equal(ordered.actual[:20], given), "to the last bit"
@@ -69,7 +70,7 @@ def test_given_runs_are_kept_to_the_last_bit_where_coding_changes_it(tmp_path):
     points = np.random.default_rng(2).uniform(0.0, 0.1, (40, 3)).round(3)
     study = augmented(tmp_path, table_of(points.tolist()))
     study.file.factor[:] = [each.model_copy(update={"centre": 0.0, "step": 0.07}) for each in study.file.factor]
-    design = design_of(study)
+    design = study.design
     assert (study.actual(design.coded)[:40] != points).any()
     assert np.array_equal(actual_of(study, design)[:40], points)
     assert design.order[:40].tolist() == list(range(40)), "a random order is one of the new runs"
@@ -77,7 +78,7 @@ def test_given_runs_are_kept_to_the_last_bit_where_coding_changes_it(tmp_path):
 
 def test_blocks_of_the_table_stay_and_the_new_runs_make_another(tmp_path):
     points = np.random.default_rng(1).uniform([0.015, 0.1, 0.25], [0.025, 0.2, 0.35], (12, 3)).tolist()
-    design = design_of(augmented(tmp_path, table_of(points, ("block", [1] * 6 + [2] * 6))))
+    design = augmented(tmp_path, table_of(points, ("block", [1] * 6 + [2] * 6))).design
     assert design.block_numbers == [1] * 6 + [2] * 6 + [3] * 4
     assert design.kind[:12] == ("given",) * 12
 

@@ -12,14 +12,13 @@ from instant_runs import instantly, unillustrated
 from short_studies import silent
 from test_study_adaptive import ROLLERS, with_kinds, written
 
-from doe import clearance
 from doe.adaptive.emulators import coordinates, without_inactive
 from doe.report.files import write
-from doe.study_file import Study
 from doe.study_file.sections import Tolerances
 from doe.workflow.adaptive import check_adaptive, region_in_units
-from doe.workflow.front import tolerances_of
-from doe.workflow.runs import Runs, check_runs, design_of
+from doe.workflow.design import check_runs
+from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.tolerances import widest_tolerances_of
 from doe.workflow.whole import run_study
@@ -42,7 +41,7 @@ def guided_study(folder, *more, budget=60):
 
 def test_an_inactive_factor_is_one_point_for_all_its_values(tmp_path):
     """Points at the rollers' level differ by nothing in the guide clearance; at the other level they do."""
-    study = Study.load(guided_study(tmp_path))
+    study = Problem.load(guided_study(tmp_path))
     region = region_in_units(study)
     assert region.inactive == ((0, 1, (1,)),)
     points = np.array([[0.3, side, -0.2, level] for level in (-1.0, 1.0) for side in (-1.0, 0.5)])
@@ -57,17 +56,17 @@ def test_an_inactive_factor_is_one_point_for_all_its_values(tmp_path):
 
 def test_the_design_leaves_out_what_only_an_inactive_factor_told_apart(tmp_path):
     """Of 8 corners, 6 star and 6 centre points 4, 4 and 6 are left; their scenes keep the key as the scene has it."""
-    study = Study.load(guided_study(tmp_path))
-    assert [len(design_of(study.with_levels(at)).coded) for at in study.every_level] == [20, 14]
+    study = Problem.load(guided_study(tmp_path))
+    assert [len(study.with_levels(at).design.coded) for at in study.every_level] == [20, 14]
     there = study.with_levels((1,))
-    design = design_of(there)
+    design = there.design
     assert design.kind == ("cube",) * 4 + ("axial",) * 4 + ("centre",) * 6
     assert not design.coded[:, 1].any()
     check_runs(there, design)
-    assert clearance.assignments(there, np.array([0.02, 0.2, 0.3])) == [
+    assert there.assignments(np.array([0.02, 0.2, 0.3])) == [
         "bearing.radial_clearance_mm=0.02", "cage.pocket_clearance_mm=0.3", "cage.guidance=roller",
     ]  # fmt: skip
-    scenes = clearance.design_scenes(there, there.actual(design.coded), design.order.tolist())
+    scenes = there.design_scenes(there.actual(design.coded), design.order.tolist())
     assert {scene.cage.guide_clearance_mm for scene in scenes} == {0.15}
 
 
@@ -76,8 +75,8 @@ def test_an_optimal_design_spends_no_run_on_an_inactive_factor(tmp_path):
         'kind = "central_composite"      # 8 cube, 6 axial and 6 centre runs; centre runs differ by their seed only\n'
     )
     rest = 'alpha = "rotatable"\ncentre_replicates = 6\n'
-    study = Study.load(guided_study(tmp_path, (kind + rest, 'kind = "d_optimal"\nruns = 11\n')))
-    design = design_of(study.with_levels((1,)))
+    study = Problem.load(guided_study(tmp_path, (kind + rest, 'kind = "d_optimal"\nruns = 11\n')))
+    design = study.with_levels((1,)).design
     assert len(design.coded) == 11 and not design.coded[:, 1].any()
     assert len(np.unique(design.coded, axis=0)) == 9, "the best for a quadratic in two factors are their 3^2"
 
@@ -95,7 +94,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
 
     monkeypatch.setattr(instant_runs, "instant_result", result)
     unillustrated(monkeypatch.setattr)
-    study = Study.load(guided_study(tmp_path, ('tolerance_aware = "quantile" ', 'tolerance_aware = "none" ')))
+    study = Problem.load(guided_study(tmp_path, ('tolerance_aware = "quantile" ', 'tolerance_aware = "none" ')))
     check_adaptive(study, True)
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
     assert outcome.study.categories == {"guidance": "roller"}
@@ -123,7 +122,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
 )  # fmt: skip
 def test_unknown_names_of_inactive_factors(tmp_path, old, new, words):
     with pytest.raises(InputError, match=words) as refused:
-        Study.load(guided_study(tmp_path, (old, new)))
+        Problem.load(guided_study(tmp_path, (old, new)))
     assert len(refused.value.faults) == 1
 
 
@@ -139,8 +138,8 @@ def test_unknown_names_of_inactive_factors(tmp_path, old, new, words):
 )
 def test_whole_numbers_are_the_nearest_within_the_region(tmp_path, centre, step, numbers):
     given = (ROLLERS, ROLLERS.replace("centre = 10", f"centre = {centre}").replace("step = 1\n", f"step = {step}\n"))
-    study = Study.load(with_kinds(tmp_path, given))
-    design = design_of(study)
+    study = Problem.load(with_kinds(tmp_path, given))
+    design = study.design
     assert np.unique(np.round(study.actual(design.coded)[:, 0], 9)).tolist() == numbers
     assert np.abs(design.coded).max() <= design.reach * (1.0 + 1e-12)
 
@@ -148,8 +147,8 @@ def test_whole_numbers_are_the_nearest_within_the_region(tmp_path, centre, step,
 def test_closed_form_tolerance_beside_a_whole_number(tmp_path):
     """Closed form: responses that are planes g of the guide clearance, at g = -0.5, keep half their gain up to g = -0.25; of parts
     spread evenly over 2h that are 95 % where 0.25 + h = 0.95 (2h)."""
-    study = Study.load(with_kinds(tmp_path))
-    coded = design_of(study).coded
+    study = Problem.load(with_kinds(tmp_path))
+    coded = study.design.coded
     noise = 1e-9 * np.random.default_rng(1).standard_normal((len(coded), 3))
     values = np.outer(coded[:, 1], [3.0, -0.2, 10.0]) + np.array([10.0, 1.0, 50.0]) + noise
     surfaces = fit_surfaces(study, Runs(coded, study.actual(coded), values, np.full_like(values, np.nan)))
@@ -165,11 +164,11 @@ def test_a_whole_number_has_no_tolerance(tmp_path, monkeypatch):
     coarsely(monkeypatch.setattr)
     unillustrated(monkeypatch.setattr)
     outer = ('["outer", "inner"]', '["outer", "roller"]\ninactive = {roller = ["guide_clearance_mm"]}')
-    study = Study.load(with_kinds(tmp_path, outer))
-    assert tolerances_of(study)[0] == 0.0
-    assert tolerances_of(study.with_levels((1,)))[:2].tolist() == [0.0, 0.0]
+    study = Problem.load(with_kinds(tmp_path, outer))
+    assert study.coded_tolerances[0] == 0.0
+    assert study.with_levels((1,)).coded_tolerances[:2].tolist() == [0.0, 0.0]
     record = write(run_study(study, tmp_path, 1, lambda title: silent, adaptive=True), tmp_path)
     assert set(record["tolerances"]) <= {"guide_clearance_mm", "pocket_clearance_mm"}
     assert record["tolerances"]["pocket_clearance_mm"]["half_width"] >= 0.0
     with pytest.raises(InputError, match=r"tolerance = 0.5: whole = true has none; leave it out"):
-        Study.load(with_kinds(tmp_path, (ROLLERS, ROLLERS.replace("whole = true", "whole = true\ntolerance = 0.5"))))
+        Problem.load(with_kinds(tmp_path, (ROLLERS, ROLLERS.replace("whole = true", "whole = true\ntolerance = 0.5"))))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doe.study_file import Study
 from doe.unknown.inputs import values_of
 from doe.workflow.input_sets import Case, case_of, check_overrides, read_case
+from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from rbdyn.base.faults import InputError, read_toml, validated
 from rbdyn.scene import Scene
@@ -245,13 +245,13 @@ def test_unit_values_of_extreme_laws_lie_inside(law: Law) -> None:
     assert values[-1] <= (np.inf if law.high is None else law.high)
 
 
-def _study(folder: Path, change: tuple[str, str] = ("", ""), more: str = "") -> Study:
+def _study(folder: Path, change: tuple[str, str] = ("", ""), more: str = "") -> Problem:
     text = (EXAMPLES / "clearance_study.toml").read_text("utf-8")
     assert change[0] in text
     for each in (SCENE, EXAMPLES / "ccd_table4.csv"):
         (folder / each.name).write_bytes(each.read_bytes())
     (folder / "study.toml").write_text(text.replace(*change, 1) + more, "utf-8")
-    return Study.load(folder / "study.toml")
+    return Problem.load(folder / "study.toml")
 
 
 CATEGORY = '[[factor]]\nname = "guidance"\nkey = "cage.guidance"\ncategories = ["outer", "inner"]\n'

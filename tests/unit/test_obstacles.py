@@ -16,11 +16,10 @@ from typer.testing import CliRunner
 import doe
 from doe import clearance
 from doe.cli import app
-from doe.study_file import Study
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import OutOfReachError
 from doe.workflow.obstacles import MissedLimit, Obstacles
-from doe.workflow.runs import region_of
+from doe.workflow.problem import Problem
 from doe.workflow.status import study_stages
 from doe.workflow.surfaces import reference_runs
 from doe.workflow.whole import run_study
@@ -37,9 +36,9 @@ def instant(patch) -> list[int]:
     return ran
 
 
-def least_impact(study: Study) -> float:
+def least_impact(study: Problem) -> float:
     """The smallest impact of the instant results in the region, but for their scatter."""
-    low = study.by_factor(study.centre - region_of(study) * study.step)
+    low = study.by_factor(study.centre - study.reach * study.step)
     return 100.0 * low["pocket_clearance_mm"] + 30.0 * low["guide_clearance_mm"]
 
 
@@ -64,7 +63,7 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     simulated = record["confirmation"]["pick"]["responses"]["impact_force_N"]["value"]
     assert missed["response"] == "impact_force_N" and missed["point"] is None and missed["bound"] == 5.0
     assert missed["excess"] == pytest.approx(simulated - 5.0) and missed["relaxed"] > simulated
-    assert simulated == pytest.approx(least_impact(Study.load(path)), abs=1.5)
+    assert simulated == pytest.approx(least_impact(Problem.load(path)), abs=1.5)
     sentences = record["obstacles"]["sentences"]
     assert sentences[0].startswith("No point of the region keeps all limits") and "relax the limits" in sentences[2]
     # The lower impact costs whirl, which this study wants large.
@@ -81,8 +80,8 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
 def test_the_relaxed_limit_is_kept_and_a_farther_bound_is_named(tmp_path, monkeypatch):
     """Two newtons below the region's least: a wider pocket or guide meets it, by the surfaces, which are planes here."""
     instant(monkeypatch.setattr)
-    bound = least_impact(Study.load(limited_study(tmp_path))) - 2.0
-    study = Study.load(limited_study(tmp_path, f"upper = {bound!r}", [QUICK]))
+    bound = least_impact(Problem.load(limited_study(tmp_path))) - 2.0
+    study = Problem.load(limited_study(tmp_path, f"upper = {bound!r}", [QUICK]))
     outcome = run_study(study, tmp_path, 1, lambda title: silent)
     (missed,), ways = outcome.obstacles.limits, outcome.obstacles.beyond
     assert {name for way in ways for name in way.values} <= {"pocket_clearance_mm", "guide_clearance_mm"} and ways
@@ -93,13 +92,13 @@ def test_the_relaxed_limit_is_kept_and_a_farther_bound_is_named(tmp_path, monkey
         assert all(way.values[name] < way.bounds[name] for name in way.values)
     assert any("may be met beyond the region" in one and "(bound 0." in one for one in outcome.obstacles.sentences)
     (tmp_path / "relaxed").mkdir()
-    relaxed = Study.load(limited_study(tmp_path / "relaxed", f"upper = {missed.relaxed + 0.5!r}", [QUICK]))
+    relaxed = Problem.load(limited_study(tmp_path / "relaxed", f"upper = {missed.relaxed + 0.5!r}", [QUICK]))
     assert run_study(relaxed, tmp_path / "relaxed", 1, lambda title: silent).verdict == "kept"
 
 
 def test_a_limit_that_only_the_surfaces_miss_is_kept_by_simulation(tmp_path, monkeypatch):
     biased(monkeypatch.setattr, -5.0)
-    bound = least_impact(Study.load(limited_study(tmp_path))) - 2.0
+    bound = least_impact(Problem.load(limited_study(tmp_path))) - 2.0
     path = limited_study(tmp_path, f"upper = {bound!r}", [QUICK])
     shown = commanded(path, "--json", "-q")
     record = json.loads(shown.stdout)
@@ -146,7 +145,7 @@ def test_an_adaptive_search_that_comes_nowhere_near_leaves_the_pick_to_the_surfa
         raise OutOfReachError(["no point of the region keeps all limits"])
 
     monkeypatch.setattr("doe.workflow.whole.find_adaptive", nothing)
-    study = Study.load(limited_study(tmp_path, "upper = 5.0", [QUICK]))
+    study = Problem.load(limited_study(tmp_path, "upper = 5.0", [QUICK]))
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
     assert outcome.adaptive is None and outcome.status == "broken" and not outcome.obstacles.reachable
     assert any("the adaptive search ended without a front" in note for note in outcome.notes)
@@ -221,7 +220,7 @@ def test_unit_a_response_with_a_limit_alone_has_no_goal(tmp_path, keys, goal):
     text = path.read_text("utf-8")
     assert IMPACT in text
     path.write_text(text.replace(IMPACT, f'name = "impact_force_N"\nmodel = "linear"\n{keys}'), "utf-8")
-    assert Study.load(path).file.response[0].goal == goal
+    assert Problem.load(path).file.response[0].goal == goal
 
 
 def test_a_published_table_is_compared_by_the_columns_that_it_has(tmp_path, monkeypatch):
@@ -229,7 +228,7 @@ def test_a_published_table_is_compared_by_the_columns_that_it_has(tmp_path, monk
     path = limited_study(tmp_path, more=[QUICK])
     slip = '[[response]]\nname = "cage_slip"\nupper = 1.0\n\n[front]'
     path.write_text(path.read_text("utf-8").replace("[front]", slip, 1), "utf-8")
-    study = Study.load(path)
+    study = Problem.load(path)
     table = reference_runs(study)
     assert table is not None and any(
         "has no column of cage_slip, which is not compared" in note for note in table.notes
@@ -247,7 +246,7 @@ def test_unknown_inputs_are_judged_only_where_the_study_asks_for_it(table, robus
     law = '\n[uncertain]\n"cage.mass_g" = { law = "uniform", low = 40.0, high = 50.0 }\n'
     for file, more in ((tmp_path / "cylindrical_roller.toml", law), (path, law + table)):
         file.write_text(file.read_text("utf-8") + more, "utf-8")
-    study = Study.load(path)
+    study = Problem.load(path)
     assert ("robust" in [stage.name for stage in study_stages(study)]) is robust
     assert "robust" in [stage.name for stage in study_stages(study, robust=True)]
 

@@ -17,7 +17,7 @@ from doe import clearance
 from doe.aggregation import Estimates
 from doe.commands.new import limits_of
 from doe.duty import Rule
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, NAMES, POWERS
@@ -84,7 +84,7 @@ def test_a_study_may_name_each_kind(tmp_path, name):
     text = short_study(tmp_path).read_text(encoding="utf-8").replace("power_loss_W", name)
     path = tmp_path / "part.toml"
     path.write_text(text, encoding="utf-8")
-    clearance.check_responses(Study.load(path))
+    Problem.load(path).check_responses()
     run = result("cylindrical_roller.toml")
     values, errors, _ = clearance.figures([name], [run])
     assert (values[0, 0], errors[0, 0]) == (run.part_figures[name].value, run.part_figures[name].statistical_error)

@@ -14,16 +14,16 @@ from instant_runs import instant_result, instantly, unillustrated
 from short_studies import EXAMPLES, silent
 from typer.testing import CliRunner
 
-from doe import clearance
 from doe.cli import app
 from doe.designs import central_composite
 from doe.designs.model import lost_terms, model_terms
 from doe.designs.remaining import Remaining, added_points
 from doe.running.store import Failure
-from doe.study_file import Study
+from doe.workflow.design import actual_of
 from doe.workflow.front import find_front
+from doe.workflow.problem import Problem
 from doe.workflow.region import moved_region, region_in_store, region_that_runs
-from doe.workflow.runs import actual_of, design_of, run_design, with_remaining
+from doe.workflow.runs import run_design, with_remaining
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError, RunError
@@ -96,13 +96,13 @@ def hot_study(
     more: str = "",
     tables: str = "",
     limit: str = "",
-) -> Study:
+) -> Problem:
     """A study of the example with a hot PEEK cage, in a folder of its own."""
     scene = (EXAMPLES / "cylindrical_roller.toml").read_text(encoding="utf-8")
     (folder / "scene.toml").write_text(scene + HOT_PARTS.format(cage=cage), encoding="utf-8")
     text = STUDY.format(centre=centre, step=step, more=more, limit=limit) + tables
     (folder / "study.toml").write_text(text, encoding="utf-8")
-    return Study.load(folder / "study.toml")
+    return Problem.load(folder / "study.toml")
 
 
 def unheated(scenes, labels):
@@ -211,7 +211,7 @@ def test_unit_impossible_regions_are_refused_in_a_sentence(tmp_path):
         InputError,
         match=r"cage.guide_clearance_mm = 0.15: heat takes .*: the cage seizes; widen it in scene.toml, or make",
     ):
-        moved_region(Study.load(study.path), unheated)
+        moved_region(Problem.load(study.path), unheated)
 
 
 def test_unit_a_table_of_earlier_runs_keeps_its_region(tmp_path):
@@ -233,7 +233,7 @@ def test_unit_every_corner_at_every_point_of_the_duty_is_looked_at(tmp_path):
     study = hot_study(tmp_path, tables=duty)
     moved, (note,) = moved_region(study, unheated)
     assert ": at take-off heat takes " in note
-    for run in clearance.design_scenes(moved, actual_of(moved, design_of(moved))):
+    for run in moved.design_scenes(actual_of(moved, moved.design)):
         for scene in run.scenes.values():
             assert all(
                 clear.play.operating > clear.floor for clear in scene.running_clearances(scene.mounting).values()
@@ -243,7 +243,7 @@ def test_unit_every_corner_at_every_point_of_the_duty_is_looked_at(tmp_path):
 HEATED = {"oil": 80.0, "outer": 90.0, "inner": 90.0, "rollers": 100.0}
 
 
-def heated_study(folder: Path, centre: float = 0.2, step: float = 0.1) -> Study:
+def heated_study(folder: Path, centre: float = 0.2, step: float = 0.1) -> Problem:
     """A study whose temperatures follow from the losses."""
     study = hot_study(folder, centre, step)
     text = (folder / "scene.toml").read_text(encoding="utf-8")
@@ -350,7 +350,7 @@ def test_doe_new_writes_the_region_that_runs(tmp_path, monkeypatch):
     guide = next(factor for factor in data["factor"] if factor["name"] == "guide_clearance_mm")
     assert guide["centre"] > 0.15 and guide["step"] == pytest.approx(0.045, abs=1e-3)
     (tmp_path / "written.toml").write_text(result.stdout, encoding="utf-8")
-    assert moved_region(Study.load(tmp_path / "written.toml"), unheated).notes == ()
+    assert moved_region(Problem.load(tmp_path / "written.toml"), unheated).notes == ()
     hot_study(tmp_path, cage=30.0)
     result = CliRunner().invoke(app, ["new", "scene.toml"])
     assert "baseline" not in tomllib.loads(result.stdout) and result.stderr == ""

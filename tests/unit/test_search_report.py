@@ -20,10 +20,9 @@ from doe.pareto.search import REFERENCE
 from doe.report.files import write
 from doe.report.sections.search import SURE, in_few_runs, limiting_sentence
 from doe.report.summary import restored
-from doe.study_file import Study
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
-from doe.workflow.surfaces import goals_of
+from doe.workflow.problem import Problem
 from doe.workflow.whole import run_study
 from rbdyn.base.blocks import Figures
 
@@ -42,7 +41,7 @@ def studied(tmp_path_factory):
     path = short_study(source, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
     text = path.read_text(encoding="utf-8").replace("population = 100", "population = 24")
     path.write_text(f"{text}\n[adaptive]\nbudget = 36\nbatch = 6\n", encoding="utf-8")
-    study, folder = Study.load(path), tmp_path_factory.mktemp("out")
+    study, folder = Problem.load(path), tmp_path_factory.mktemp("out")
     outcome = run_study(study, folder, 1, lambda title: silent, adaptive=True)
     record = write(outcome, folder)
     patch.undo()
@@ -60,7 +59,7 @@ def dominated(costs: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> float:
 def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
     """Oracle: levels counted; of the front foretold, of the surfaces' front as it is drawn, of the search's fresh runs."""
     study, outcome, record, _ = studied
-    goals, emulators = goals_of(study), outcome.adaptive.search.emulators
+    goals, emulators = study.goals, outcome.adaptive.search.emulators
     told = record["adaptive"]["compared"]
     costs = goals.costs(outcome.adaptive.search.predictions)
     front = [row for row in costs if not ((costs <= row).all(axis=1) & (costs < row).any(axis=1)).any()]
@@ -129,9 +128,9 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
 
 def foretelling(predict, faces=()):
     """The example with a search that foretells responses so over coded factors, its pick foretold at faces of the region."""
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     one = np.ones(3)
-    goals = goals_of(study)
+    goals = study.goals
     corners = np.random.default_rng(1).uniform(-1.0, 1.0, (64, 3))
     emulators = SimpleNamespace(predict=lambda at: (predict(at), None), runs=SimpleNamespace(values=predict(corners)))
     found = SimpleNamespace(

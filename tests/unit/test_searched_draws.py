@@ -11,13 +11,11 @@ from short_studies import short_study
 
 from doe.adaptive.emulators import Runs, fit_emulators
 from doe.pareto.tolerance import Neighbourhood
-from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.front import DRAWS
 from doe.workflow.pick import draws_about
-from doe.workflow.runs import region_of
-from doe.workflow.surfaces import goals_of
+from doe.workflow.problem import Problem
 
 
 def bent(coded):
@@ -30,11 +28,11 @@ def bent(coded):
 def test_limit_case_draws_about_a_pick(tmp_path, error):
     """Limit case: of a search that knows its function, parts differ from the pick as the function does, and all of them by
     the errors of the pick's own runs, the baseline by those of its own."""
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     points = 2.0 * qmc.Sobol(3, seed=1).random_base2(6) - 1.0
-    values = bent(points * region_of(study))
+    values = bent(points * study.reach)
     runs = Runs(points, values, np.full((64, 3), 1e-4), np.full((64, 3), 7), np.full(64, 8))
-    emulators = fit_emulators(goals_of(study), runs)
+    emulators = fit_emulators(study.goals, runs)
     search = Adaptive(SimpleNamespace(emulators=emulators), None, study, None, np.zeros((3, 2)), (), 0.0)
     coded = np.array([[0.3, -0.2, 0.5], [0.4, -0.2, 0.5], [0.3, 0.1, 0.6]])
     half = 2.0 * error * np.array([1.0, 0.01, 1.0])

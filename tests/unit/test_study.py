@@ -17,12 +17,11 @@ import pytest
 from matplotlib.image import imread
 from short_studies import SHORT, rows, short_study, silent, stored
 
-from doe import clearance
 from doe.report.files import write
 from doe.report.sections.front import front_record
-from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import find_front
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs, run_design
 from doe.workflow.status import finished_record as is_finished
 from doe.workflow.status import inputs_digest
@@ -38,7 +37,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 def finished(tmp_path_factory):
     """A finished study: outcome, folder, names of its files."""
     folder = tmp_path_factory.mktemp("study")
-    study = Study.load(short_study(folder))
+    study = Problem.load(short_study(folder))
     outcome = run_study(study, folder, None, lambda title: silent)
     return outcome, folder, write(outcome, folder)["files"]
 
@@ -171,7 +170,7 @@ def test_killed_study_loses_no_finished_run(finished, tmp_path):
     process.wait()
     survived = rows(store)
     assert 3 <= len(survived) < 1 + 20
-    run_design(Study.load(path), tmp_path / "out", None, silent)
+    run_design(Problem.load(path), tmp_path / "out", None, silent)
     finished_rows = rows(store)
     # The original, which ran first, and the design.
     assert len(finished_rows) == 1 + 20
@@ -179,7 +178,7 @@ def test_killed_study_loses_no_finished_run(finished, tmp_path):
 
 
 def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_path):
-    study = Study.load(short_study(tmp_path, SHORT + ",step_budget_per_turn=100"))
+    study = Problem.load(short_study(tmp_path, SHORT + ",step_budget_per_turn=100"))
     with pytest.raises(RunError) as refused:
         run_design(study, tmp_path, None, silent)
     sentence = str(refused.value)
@@ -205,13 +204,13 @@ def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_pat
 )
 def test_bad_study_is_refused_before_anything_runs(tmp_path, replace, words):
     with pytest.raises(InputError) as refused:
-        run_study(Study.load(short_study(tmp_path, SHORT, replace)), tmp_path, None, lambda title: silent)
+        run_study(Problem.load(short_study(tmp_path, SHORT, replace)), tmp_path, None, lambda title: silent)
     assert all(word in str(refused.value) for word in words), str(refused.value)
     assert stored(tmp_path / "study.sqlite") == 0
 
 
 def test_table_without_a_column_or_with_a_word_is_refused(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     table = tmp_path / "table.csv"
     text = (EXAMPLES / "ccd_table4.csv").read_text(encoding="utf-8")
     table.write_text(text.replace("power_loss_W", "loss").replace("278.2", "many"), encoding="utf-8")
@@ -222,13 +221,13 @@ def test_table_without_a_column_or_with_a_word_is_refused(tmp_path):
 
 
 def test_reference_of_another_design_is_refused(tmp_path):
-    study = Study.load(short_study(tmp_path, SHORT, ("centre_replicates = 6", "centre_replicates = 9")))
+    study = Problem.load(short_study(tmp_path, SHORT, ("centre_replicates = 6", "centre_replicates = 9")))
     with pytest.raises(InputError, match="no run left for the design point"):
         run_study(study, tmp_path, None, lambda title: silent)
 
 
 def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
     record = front_record(study, surfaces, find_front(study, surfaces))
     pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
@@ -240,7 +239,7 @@ def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
 
 
 def test_gain_counts_only_beyond_its_error(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     none = np.zeros(3)
     baseline = Confirmed(study.baseline, np.array([100.0, 1.0, 50.0]), np.array([3.0, 0.0, 0.0]), none)
     pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
@@ -251,8 +250,8 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
 
 
 def test_key_follows_scene_and_version(tmp_path):
-    study = Study.load(short_study(tmp_path))
-    one, two = clearance.design_scenes(study, np.array([study.centre, study.centre]))
+    study = Problem.load(short_study(tmp_path))
+    one, two = study.design_scenes(np.array([study.centre, study.centre]))
     keys = {run_key(scene.model_dump(mode="json"), version) for scene in (one, two) for version in "ab"}
     assert len(keys) == 4
     assert run_key(one.model_dump(mode="json"), "a") in keys

@@ -19,8 +19,8 @@ from doe.clearance import Simulations
 from doe.report.files import write
 from doe.report.sections.search import adaptive_record, spent_sentence
 from doe.running.store import Store
-from doe.study_file import Study
 from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import run_study
@@ -50,15 +50,15 @@ def written(folder, *replacements, budget=36):
 
 def search(path, folder, workers):
     folder.mkdir(exist_ok=True)
-    study = Study.load(path)
+    study = Problem.load(path)
     runs = run_design(study, folder, workers, silent)
     with Store(folder / STORE) as store:
         return find_adaptive(study, runs, Simulations(store, workers, None, False, lambda title: silent))
 
 
 def limits(path, *replicates):
-    study = Study.load(path)
-    scenes = clearance.adaptive_scenes(study, np.tile(study.baseline, (len(replicates), 1)), replicates, 0)
+    study = Problem.load(path)
+    scenes = study.adaptive_scenes(np.tile(study.baseline, (len(replicates), 1)), replicates, 0)
     assert [scene.numerics.replicates for scene in scenes] == list(replicates)
     return {scene.numerics.extend_limit for scene in scenes}
 
@@ -74,11 +74,11 @@ def test_runs_that_drift_are_lengthened_to_twice_at_most_unless_the_study_says_s
 def test_replicates_of_the_last_points_run_side_by_side(tmp_path, monkeypatch):
     """Of seven points, two threads and the last three, that threads may otherwise wait for."""
     instantly(monkeypatch.setattr)
-    study, asked, run = Study.load(written(tmp_path)), [], clearance.attempt
+    study, asked, run = Problem.load(written(tmp_path)), [], clearance.attempt
     monkeypatch.setattr(
         clearance, "attempt", lambda scene, stop, inside: asked.append((scene.numerics.seed, inside)) or run(scene)
     )
-    scenes = clearance.adaptive_scenes(study, np.tile(study.baseline, (7, 1)), [2] * 7, 0)
+    scenes = study.adaptive_scenes(np.tile(study.baseline, (7, 1)), [2] * 7, 0)
     with Store(tmp_path / STORE) as store:
         Simulations(store, 2, None, False, lambda title: silent).run(scenes, ["run"] * 7, silent)
     assert [inside for _, inside in sorted(asked)] == [1, 1, 1, 1, 2, 2, 2]
@@ -89,7 +89,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     monkeypatch.setattr(clearance, "histories", lambda *rest: {})
     monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
     told = []
-    study = Study.load(written(tmp_path))
+    study = Problem.load(written(tmp_path))
     outcome = run_study(study, tmp_path, 1, lambda title: told.append(title) or silent, adaptive=True)
     chosen, front = outcome.searched_pick, outcome.adaptive.front
     assert outcome.pick.point == pytest.approx(front.points[chosen.row], abs=6e-4)
@@ -151,7 +151,7 @@ def test_runs_that_fail_are_told_and_left_out(tmp_path, monkeypatch):
 def test_points_are_on_the_drawing_and_inside():
     from pareto_cases import EXAMPLES
 
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     region = region_in_units(study)
     points = region.snap(np.random.default_rng(1).uniform(-1.1, 1.1, (200, 3)))
     assert np.abs(points).max() <= 1.0
@@ -167,7 +167,7 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
     pocket = 'key = "cage.pocket_clearance_mm"\n'
     path = written(tmp_path, (pocket, f"{pocket}allowed = [0.15, 0.40]\n"), budget=60)
     found = search(path, tmp_path, 1)
-    study = Study.load(path)
+    study = Problem.load(path)
     record = adaptive_record(study, found)
     assert {move["factor"] for move in record["extended"]} == {"pocket_clearance_mm"}
     assert 0.15 <= found.edges[2, 0] < 0.2159 or found.edges[2, 1] > 0.3841
@@ -180,13 +180,13 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
         (pocket, f"{pocket}allowed = [0.15, 0.40]\n"),
         ("batch = 6", "batch = 6\nleast_clearance_um = 12"),
     )
-    assert not border_of(Study.load(kept)).possible(corners), "0.0116 mm at the lower end of the radial clearance"
-    assert border_of(Study.load(kept)).possible(corners[:1])
+    assert not border_of(Problem.load(kept)).possible(corners), "0.0116 mm at the lower end of the radial clearance"
+    assert border_of(Problem.load(kept)).possible(corners[:1])
     narrow = written(tmp_path / "narrow", (pocket, f"{pocket}allowed = [0.25, 0.40]\n"))
     with pytest.raises(
         InputError, match=r"factor.allowed of pocket_clearance_mm = \[0.25, 0.4\]: must reach over the region"
     ):
-        check_adaptive(Study.load(narrow), True)
+        check_adaptive(Problem.load(narrow), True)
 
 
 RADIAL = """name = "radial_clearance_mm"
@@ -241,7 +241,7 @@ def guided(monkeypatch):
 def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
     guided(monkeypatch)
     unillustrated(monkeypatch.setattr)
-    study = Study.load(with_kinds(tmp_path))
+    study = Problem.load(with_kinds(tmp_path))
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
     assert outcome.study.categories == {"guidance": "inner"}
     assert float(outcome.pick.point[0]).is_integer()
@@ -271,7 +271,7 @@ def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
 )
 def test_faults_of_categories_and_whole_numbers(tmp_path, old, new, words):
     with pytest.raises(InputError, match=words) as error:
-        check_adaptive(Study.load(with_kinds(tmp_path, (old, new))), True)
+        check_adaptive(Problem.load(with_kinds(tmp_path, (old, new))), True)
     assert len(error.value.faults) == 1
 
 
@@ -294,7 +294,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
 def test_advice_where_surfaces_miss_more_than_noise():
     from pareto_cases import EXAMPLES
 
-    study = Study.load(EXAMPLES / "clearance_study.toml")
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
     from doe.workflow.runs import read_runs
 
     runs = read_runs(study, EXAMPLES / "ccd_table4.csv")

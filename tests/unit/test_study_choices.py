@@ -10,10 +10,10 @@ from short_studies import SHORT, short_study, silent
 
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Gain, gains, statement
-from doe.workflow.front import find_front, known_tolerances
+from doe.workflow.front import find_front
 from doe.workflow.pick import choices
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.whole import check_chains, solve_chains
@@ -22,7 +22,7 @@ from rbdyn.base.faults import InputError
 
 def fitted(folder, *replace):
     """A short study on the published table, and its surfaces."""
-    study = Study.load(short_study(folder, SHORT, *replace))
+    study = Problem.load(short_study(folder, SHORT, *replace))
     return study, fit_surfaces(study, read_runs(study, folder / "ccd_table4.csv"))
 
 
@@ -74,7 +74,7 @@ def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
     # Without a tolerance that is found, parts are made to the factor's own.
     low, high = chains["guide"].limits_mm
     assert set(chains) == {"guide", "pocket"} and 0.5 * (high - low) == pytest.approx(
-        known_tolerances(study)["guide_clearance_mm"]
+        study.known_tolerances["guide_clearance_mm"]
     )
 
 
@@ -91,4 +91,4 @@ def test_bad_chains_are_refused(tmp_path, replace, words):
     text = text.replace(*replace)
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
-        check_chains(Study.load(tmp_path / "study.toml"))
+        check_chains(Problem.load(tmp_path / "study.toml"))

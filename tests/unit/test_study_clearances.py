@@ -9,9 +9,8 @@ import pytest
 from instant_runs import instantly
 from short_studies import SHORT, short_study, silent
 
-from doe import clearance
 from doe.report.files import answer_text, summary
-from doe.study_file import Study
+from doe.workflow.problem import Problem
 from doe.workflow.whole import check_study, operating_clearances, run_study, scenes_of
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.catalogue import classes_at
@@ -28,12 +27,12 @@ cage_temperature_C = {cage:g}
 """
 
 
-def mounted_study(folder: Path, cage: float = 100.0) -> Study:
+def mounted_study(folder: Path, cage: float = 100.0) -> Problem:
     """The example study on a bearing that runs at 100 C."""
     path = short_study(folder, SHORT)
     scene = folder / "cylindrical_roller.toml"
     scene.write_text(scene.read_text(encoding="utf-8") + MOUNTING.format(cage=cage), encoding="utf-8")
-    return Study.load(path)
+    return Problem.load(path)
 
 
 def test_unit_operating_clearances_of_two_designs(tmp_path):
@@ -59,7 +58,7 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
     outcome = run_study(mounted_study(tmp_path), tmp_path, 1, lambda title: silent)
     text = answer_text(record := summary(outcome))
     plays = record["operating_clearances_mm"]
-    scene = clearance.confirmation_scene(outcome.study, outcome.pick.point)
+    scene = outcome.study.confirmation_scene(outcome.pick.point)
     assert plays["guide_clearance_mm"]["pick"] == pytest.approx(1e3 * scene.clearances["guide"].operating)
     assert "baseline in operation" in text and f"{plays['pocket_clearance_mm']['pick']:.3f}" in text
     assert record["clearance_class"].startswith("ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of ")
@@ -68,7 +67,7 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
 
 def test_unit_without_a_mounting_there_is_nothing_to_show(tmp_path):
     """Unit: no operating clearances and no class without [mounting]."""
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     found = operating_clearances(study, scenes_of(study, study.baseline, study.baseline))
     assert found.operating == {} and found.class_sentence == ""
 

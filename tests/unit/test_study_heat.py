@@ -18,10 +18,10 @@ from doe.clearance import TEMPERATURES, Simulations
 from doe.cli import app
 from doe.report.files import summary
 from doe.running.store import Failure, Store
-from doe.study_file import Study
 from doe.workflow.calibration import find_calibration, read_question
 from doe.workflow.confirmation import EVERYWHERE, Choice, confirmed_from
 from doe.workflow.input_sets import read_case
+from doe.workflow.problem import Problem
 from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
 from doe.workflow.whole import check_study, operating_clearances, run_study
 from rbdyn.base.faults import InputError
@@ -60,7 +60,7 @@ def hot_result(scene: Scene, status: str = "steady", reason: str = ""):
 
 def test_unit_the_example_study_is_sound():
     """Unit: scene and study of the example read and pass all checks; every response is one of the simulation."""
-    study = Study.load(EXAMPLES / "hot_clearance.toml")
+    study = Problem.load(EXAMPLES / "hot_clearance.toml")
     check_study(study)
     assert "inner_temperature_C" in study.responses
     scene = Scene.load(HOT)
@@ -77,17 +77,17 @@ def test_unit_a_temperature_needs_a_heat_balance(tmp_path):
     plain = path.read_text(encoding="utf-8").replace('set = ["', 'set = ["lubricant.temperature_C=100.0", "')
     path.write_text(plain, encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        clearance.check_responses(Study.load(path))
+        Problem.load(path).check_responses()
     assert len(caught.value.faults) == 1
     assert str(caught.value.faults[0]).endswith(
         "response.name = 'inner_temperature_C': hot_roller.toml has no [thermal], which computes temperatures; add that table "
         f"there, or choose one of {', '.join(clearance.responses_of(heats=False))}"
     )
     path.write_text(plain.replace('set = ["', 'set = ["thermal.ambient_C=20.0", "'), encoding="utf-8")
-    clearance.check_responses(Study.load(path))
+    Problem.load(path).check_responses()
     path.write_text(path.read_text(encoding="utf-8").replace("power_loss_W", "power_los_W"), encoding="utf-8")
     with pytest.raises(InputError, match=r"power_los_W': the simulation does not give it; choose one of .*roller_temp"):
-        clearance.check_responses(Study.load(path))
+        Problem.load(path).check_responses()
 
 
 def test_unit_temperatures_are_figures(tmp_path):
@@ -121,8 +121,8 @@ def test_unit_a_failed_balance_is_a_failed_run(status, monkeypatch, tmp_path):
 
 def test_unit_a_confirmed_point_is_hot(tmp_path):
     """Unit: its clearances in operation and its motion are those at the temperatures of its run."""
-    study = Study.load(hot_study(tmp_path))
-    scene = clearance.confirmation_scene(study, study.baseline)
+    study = Problem.load(hot_study(tmp_path))
+    scene = study.confirmation_scene(study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
     assert confirmed.values[-1] == 93.0 and confirmed.temperature_ranges["inner"] == [88.0, 93.0, 108.0]
     hot = confirmed.hot[EVERYWHERE]
@@ -139,11 +139,11 @@ def test_unit_a_first_guess_cannot_vary(tmp_path):
     text = path.read_text(encoding="utf-8")
     (key,) = [line for line in text.splitlines() if line.startswith('key = "bearing.radial_clearance_mm"')]
     path.write_text(text.replace(key, 'key = "lubricant.temperature_C"'), encoding="utf-8")
-    study = Study.load(path)
+    study = Problem.load(path)
     with pytest.raises(InputError, match=f"factor.key = {fault}"):
-        clearance.confirmation_scene(study, study.baseline)
+        study.confirmation_scene(study.baseline)
     with pytest.raises(InputError) as refused:
-        clearance.design_scenes(study, study.baseline[None])
+        study.design_scenes(study.baseline[None])
     assert [str(one).count("lubricant.temperature_C") for one in refused.value.faults] == [1], (
         "one sentence, and no region"
     )
@@ -220,7 +220,7 @@ def test_unit_a_new_study_may_limit_a_temperature():
 def test_a_study_of_hot_clearances(tmp_path):
     """Each design at its own temperatures: the limit of the inner ring is kept, heat takes 30 um of the guide, and the oil
     carries the loss off with a rise of 13 K."""
-    outcome = run_study(Study.load(hot_study(tmp_path)), tmp_path, 1, lambda title: silent)
+    outcome = run_study(Problem.load(hot_study(tmp_path)), tmp_path, 1, lambda title: silent)
     record = summary(outcome)
     baseline = record["confirmation"]["baseline"]["temperatures_C"]
     assert baseline["oil_temperature_C"]["value"] == pytest.approx(92.7, abs=0.5)
@@ -235,7 +235,7 @@ def test_a_study_goes_on_without_bearings_that_are_too_hot(tmp_path):
     path = hot_study(tmp_path)
     scene = tmp_path / "hot_roller.toml"
     scene.write_text(scene.read_text(encoding="utf-8") + "oil_ceiling_C = 93.5\n", encoding="utf-8")
-    outcome = run_study(Study.load(path), tmp_path, 1, lambda title: silent)
+    outcome = run_study(Problem.load(path), tmp_path, 1, lambda title: silent)
     assert 0 < len(outcome.failures) < 6
     assert all("too hot: the oil reaches" in failure.cause for failure in outcome.failures)
     assert any("failed and" in note for note in outcome.notes)

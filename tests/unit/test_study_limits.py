@@ -15,11 +15,10 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.report.files import write
-from doe.study_file import Study
 from doe.workflow.confirmation import Confirmed, Limit, every_limit, limits_of, sentence, verdict_of
 from doe.workflow.front import ErrorField, Misses, find_front
 from doe.workflow.pick import edge_of, place_of, share_at_edge
-from doe.workflow.runs import region_of, rounded_within
+from doe.workflow.problem import Problem
 from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
@@ -66,7 +65,7 @@ def test_verdict_is_by_value_and_error(value, error, sense, verdict):
 
 
 def test_the_bad_is_said_first_and_the_worse_of_two_limits_counts(tmp_path):
-    study = Study.load(limited_study(tmp_path, "upper = 90.0\nlower = 80.0"))
+    study = Problem.load(limited_study(tmp_path, "upper = 90.0\nlower = 80.0"))
     none = np.full(3, np.nan)
     point = Confirmed(study.baseline, np.array([79.0, 1.0, 1.0]), np.array([0.6, 0.1, 0.1]), none)
     (found,) = limits_of(study, point)
@@ -104,7 +103,7 @@ def biased(patch, excess):
 def test_a_pick_that_misses_is_followed_by_the_next_best_until_one_keeps_the_limit(tmp_path, monkeypatch):
     biased(monkeypatch.setattr, 1.5)
     wanted = [("[front]", '[front]\npick = "weights"'), ('goal = "max"', 'goal = "max"\nweight = 50.0')]
-    study = Study.load(limited_study(tmp_path, more=wanted))
+    study = Problem.load(limited_study(tmp_path, more=wanted))
     outcome = run_study(study, tmp_path, 1, lambda title: silent)
     assert outcome.verdict == "kept" and 1 < outcome.tries <= 4
     assert outcome.limits[0].value < 35.0
@@ -156,14 +155,13 @@ def test_what_was_missed_is_expected_nearby_and_forgotten_far_away():
 
 
 def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     reach = 2**0.75 * study.step
     corner = study.centre + reach * [0.0, 1.0, 0.0]
     assert share_at_edge(study, np.array([corner, study.centre])) == 0.5
     from doe.response_surface import fit
-    from doe.workflow.runs import design_of
 
-    coded = design_of(study).coded
+    coded = study.design.coded
     values = [50.0 - 2.0 * coded[:, 1] + 1e-9 * np.sin(np.arange(20)) for _ in study.responses]
     surfaces = [
         fit(coded, each, name=name, model="linear", centre=study.centre, step=study.step)
@@ -186,8 +184,8 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
 
 def test_unit_one_rule_says_where_a_point_lies(tmp_path):
     """Unit: a corner between the bounds may be farther out than any run, and no sentence calls that inside."""
-    study = Study.load(limited_study(tmp_path))
-    reach = region_of(study)
+    study = Problem.load(limited_study(tmp_path))
+    reach = study.reach
     places = {share: place_of(study, study.actual(share * reach)) for share in (0.0, 0.5, 0.9, 1.0)}
     assert [(bool(each.bounds), each.beyond) for each in places.values()] == [
         (False, False), (False, False), (False, True), (True, True),
@@ -216,10 +214,10 @@ def test_unit_the_probability_reached_is_not_the_one_demanded(value, reached):
 
 
 def test_rounding_does_not_leave_the_region(tmp_path):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     reach = 2**0.75 * study.step
     for side in (-1.0, 1.0):
-        rounded = rounded_within(study, study.centre + side * reach)
+        rounded = study.rounded_within(study.centre + side * reach)
         assert (np.abs(rounded - study.centre) <= reach).all()
         assert np.allclose(rounded * 1000.0, np.round(rounded * 1000.0))
 
@@ -235,7 +233,7 @@ def test_rounding_does_not_leave_the_region(tmp_path):
 def test_bad_settings_are_refused(tmp_path, old, new, words):
     path = short_study(tmp_path, SHORT, (old, new))
     with pytest.raises(InputError, match=words):
-        Study.load(path)
+        Problem.load(path)
 
 
 @pytest.mark.slow
@@ -254,7 +252,7 @@ def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
         "replicates = 2\n", "replicates = 16\n"
     )
     (tmp_path / "study.toml").write_text(text.replace("population = 24", "population = 100"), encoding="utf-8")
-    outcome = run_study(Study.load(tmp_path / "study.toml"), tmp_path, None, lambda title: silent)
+    outcome = run_study(Problem.load(tmp_path / "study.toml"), tmp_path, None, lambda title: silent)
     (found,) = outcome.limits
     if outcome.verdict == "kept":
         assert found.value + 0.83 * found.error < 90.0
@@ -264,5 +262,5 @@ def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
             # The next best point is one that was simulated, by what the drawing distinguishes.
             named = [outcome.confirmed.get(f"try_{number}", outcome.pick) for number in range(1, outcome.tries + 1)]
             front = find_front(outcome.study, outcome.surfaces, [outcome.baseline, *named], outcome.tries)
-            following = rounded_within(outcome.study, front.points[front.pick])
+            following = outcome.study.rounded_within(front.points[front.pick])
             assert any(np.array_equal(following, tried.point) for tried in named)

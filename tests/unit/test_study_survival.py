@@ -24,8 +24,8 @@ from short_studies import SHORT, short_study, silent, stored
 from doe import clearance
 from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study_file import Study
 from doe.workflow.confirmation import Choice, Confirmed, confirm, simulate_original
+from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import study_status
 from doe.workflow.surfaces import reference_runs
@@ -60,7 +60,7 @@ def wait_for(condition, seconds: float = 60.0) -> None:
 
 
 def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     ran = instantly(monkeypatch.setattr, faulty=(3, 18, 19))
     runs = run_design(study, tmp_path, 2, silent)
     assert sorted(ran) == list(range(1, 21))
@@ -83,7 +83,7 @@ def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_pa
 
 
 def test_published_table_loses_the_rows_of_failed_runs(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(2, 5))
     runs, table = run_design(study, tmp_path, 2, silent), reference_runs(study)
     assert table is not None
@@ -92,7 +92,7 @@ def test_published_table_loses_the_rows_of_failed_runs(tmp_path, monkeypatch):
 
 
 def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(1 + clearance.CONFIRMATION_SEEDS,))
     with Store(tmp_path / STORE) as store:
         simulations = Simulations(store, 2, None, False, lambda title: silent)
@@ -106,7 +106,7 @@ def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypa
 
 
 def test_unexpected_fault_of_a_run_is_a_failure_too(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr)
     from rbdyn.dynamics import simulate as module
 
@@ -138,17 +138,17 @@ def test_unexpected_fault_of_a_run_is_a_failure_too(tmp_path, monkeypatch):
 def test_edited_study_runs_only_what_changed(tmp_path, monkeypatch, replace, again):
     path = short_study(tmp_path)
     ran = instantly(monkeypatch.setattr)
-    run_design(Study.load(path), tmp_path, 2, silent)
+    run_design(Problem.load(path), tmp_path, 2, silent)
     ran.clear()
     text = path.read_text(encoding="utf-8")
     assert replace[0] in text
     path.write_text(text.replace(*replace), encoding="utf-8")
-    run_design(Study.load(path), tmp_path, 2, silent)
+    run_design(Problem.load(path), tmp_path, 2, silent)
     assert sorted(ran) == again
 
 
 def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
     monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
@@ -181,7 +181,7 @@ def test_second_process_on_a_folder_is_refused_and_the_first_goes_on(tmp_path):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_study_killed_in_its_confirmation_is_unfinished_and_nothing_runs(tmp_path, workers):
     path, out = short_study(tmp_path), tmp_path / "out"
-    process, study = start(path, out, 0.5, workers, "--whole"), Study.load(path)
+    process, study = start(path, out, 0.5, workers, "--whole"), Problem.load(path)
 
     def status() -> dict:
         return study_status(study, out)
@@ -206,7 +206,7 @@ def spoil(store: Path, key: str, **values) -> None:
 
 
 def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypatch, capsys):
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     ran = instantly(monkeypatch.setattr)
     run_design(study, tmp_path, 1, silent)
     with Store(tmp_path / STORE, read_only=True) as store:
@@ -235,13 +235,13 @@ def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypa
 def test_what_a_killed_process_had_under_way_is_run_by_the_next(tmp_path, monkeypatch):
     study, out = short_study(tmp_path), tmp_path / "out"
     slow = start(study, out, 300.0, 20)
-    wait_for(lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20)
+    wait_for(lambda: (out / STORE).exists() and study_status(Problem.load(study), out)["points"]["running"] == 20)
     os.kill(slow.pid, signal.SIGKILL)
     slow.communicate()
-    status = study_status(Study.load(study), out)
+    status = study_status(Problem.load(study), out)
     assert status["points"]["running"] == 0 and status["points"]["missing"] == 20
     ran = instantly(monkeypatch.setattr)
-    runs = run_design(Study.load(study), out, 2, silent)
+    runs = run_design(Problem.load(study), out, 2, silent)
     assert sorted(ran) == list(range(1, 21)) and len(runs.coded) == 20
 
 
@@ -254,7 +254,7 @@ def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
     assert process.returncode == 130
     assert json.loads(shown) == {"status": "interrupted"}
     assert said.strip() == f"interrupted; finished parts are saved in {out / STORE}; start the command again to resume"
-    status = study_status(Study.load(study), out)
+    status = study_status(Problem.load(study), out)
     assert status["points"]["running"] == 0 and status["status"] == "unfinished"
     assert 3 <= status["points"]["done"] == len(seeds_run(out / STORE)) < 20
 
@@ -283,7 +283,7 @@ def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
 def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
     from rbdyn.dynamics import simulate as module
 
-    study = Study.load(short_study(tmp_path, SHORT + ",method='rk45'"))
+    study = Problem.load(short_study(tmp_path, SHORT + ",method='rk45'"))
     prepared = []
 
     def prepare(scene, bearing):
@@ -292,7 +292,7 @@ def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "prepare", prepare)
     monkeypatch.setattr(module, "_prepared", set())
-    scenes = clearance.design_scenes(study, np.array([study.centre, 1.1 * study.centre]))
+    scenes = study.design_scenes(np.array([study.centre, 1.1 * study.centre]))
     one, two = (module.simulate(scene, 1) for scene in scenes)
     assert prepared == scenes[:1]
     assert [result.cost["compile_s"] for result in (one, two)] == [1.0, 0.0]

@@ -14,9 +14,8 @@ from doe.pareto.manufacture import interval_of_share, percent, random_offsets
 from doe.pareto.tolerance import widest_tolerances
 from doe.response_surface import fit, model_matrix
 from doe.response_surface.adequacy import correlation
-from doe.study_file import Study
 from doe.study_file.sections import Tolerances
-from doe.workflow.runs import design_of
+from doe.workflow.problem import Problem
 from doe.workflow.surfaces import (
     Simulated,
     coefficient_root,
@@ -153,7 +152,7 @@ def test_closed_form_of_the_interval_of_one_linear_limit():
 
 def stated_and_true(study, random, noise, samples):
     """Stated share, its old half-width, its interval, and the true share of the parts, of one repeat of the design."""
-    coded = design_of(study).coded
+    coded = study.design.coded
     values = truth(coded) + noise * SCALE * random.standard_normal((len(coded), 3))
     units = {"centre": study.centre, "step": study.step}
     surfaces = [fit(coded, column, name=name, **units) for name, column in zip(study.responses, values.T, strict=True)]
@@ -170,7 +169,7 @@ def stated_and_true(study, random, noise, samples):
 @pytest.mark.parametrize("noise", [0.1, 0.3])
 def test_invariant_the_interval_holds_the_true_share_of_parts(tmp_path, noise):
     """Invariant: in more than 90 of 100 repeats of the design, where the count of the parts alone held it in fewer than 40."""
-    study, random = Study.load(short_study(tmp_path)), np.random.default_rng(11)
+    study, random = Problem.load(short_study(tmp_path)), np.random.default_rng(11)
     rows = [stated_and_true(study, random, noise, 2048) for _ in range(120)]
     held = np.mean([low <= true <= high for _, _, (low, high), true in rows])
     before = np.mean([abs(share - true) <= half for share, half, _, true in rows])
@@ -180,6 +179,6 @@ def test_invariant_the_interval_holds_the_true_share_of_parts(tmp_path, noise):
 
 def test_invariant_little_noise_leaves_little_open(tmp_path):
     """Invariant: the interval shrinks to that of the count of the parts, and holds the true share."""
-    study = Study.load(short_study(tmp_path))
+    study = Problem.load(short_study(tmp_path))
     share, half, (low, high), true = stated_and_true(study, np.random.default_rng(1), 1e-5, 4096)
     assert low <= true <= high and high - low < 2.5 * half and low < share < high

@@ -9,10 +9,10 @@ from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
 from doe.report.sections.fit import fit_record
-from doe.study_file import Study
 from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
 from doe.unknown.propagation import Runs, emulated, sobol, spread_of
+from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces, with_rivals
 
@@ -90,7 +90,7 @@ def test_unit_threads_are_given_back():
 
 def test_invariant_a_fit_has_the_same_bits_on_any_number_of_threads():
     """Invariant: surfaces, their analysis of variance and their rivals."""
-    study = Study.load(ROOT / "examples" / "clearance_study.toml")
+    study = Problem.load(ROOT / "examples" / "clearance_study.toml")
     runs = read_runs(study, ROOT / "examples" / "ccd_table4.csv")
     one, *others = with_threads(lambda: repr(fit_record(with_rivals(fit_surfaces(study, runs)))))
     assert all(other == one for other in others)

@@ -15,7 +15,7 @@ from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.front import draws_of
 from doe.workflow.parts import FINER, Part, SharedTolerance, clearance_parts, grade_of_parts, grades_of
-from doe.workflow.runs import Runs, design_of
+from doe.workflow.runs import Runs
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
@@ -35,7 +35,7 @@ IMPACT, WHIRL, LOSS = "impact_force_N", "whirl_deviation_ratio", "power_loss_W"
 def planes(tmp_path):
     """The example study, and surfaces of its responses that are planes."""
     study = edited_study(tmp_path, *TOLERANCES)
-    coded = design_of(study).coded
+    coded = study.design.coded
     noise = 1e-9 * np.random.default_rng(1).standard_normal((len(coded), 3))
     values = LEVELS + coded @ SLOPES.T + noise
     return study, fit_surfaces(study, Runs(coded, study.actual(coded), values, np.full_like(values, np.nan)))

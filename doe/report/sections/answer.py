@@ -31,7 +31,6 @@ from doe.report.sections.record import (
     sizes,
     value_text,
 )
-from doe.study_file import Study
 from doe.workflow.asked import Response, Settings
 from doe.workflow.confirmation import (
     LOSS,
@@ -45,6 +44,7 @@ from doe.workflow.confirmation import (
     point_words,
     statement,
 )
+from doe.workflow.problem import Problem
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array
@@ -533,7 +533,7 @@ def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
     return {gain.response: gain.as_dict() for gain in gains}
 
 
-def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
+def _quantities(study: Problem, confirmed: Confirmed) -> Mapping[str, Any]:
     columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
     return {
         response: {"value": value, "statistical_error": finite(statistical), "numerical_error": finite(numerical)}
@@ -541,7 +541,7 @@ def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
     }
 
 
-def point_record(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+def point_record(study: Problem, point: Array, values: Array, errors: Array) -> dict[str, Any]:
     """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
     return {
         "factors": study.by_factor(point),

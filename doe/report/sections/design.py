@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from doe.designs import Design
 from doe.report.sections.record import Record, factors
 from doe.report.still import GUIDE, Point, Still
-from doe.study_file import Study
-from doe.workflow.runs import actual_of
+from doe.workflow.design import actual_of
+from doe.workflow.problem import Problem
 from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.records import quoted_cell
 from rbdyn.base.words import counted, label
@@ -128,7 +128,7 @@ def _variance(across: str, curves: Mapping[str, Sequence[Point]], axis: "Axes") 
     axis.set_ylim(bottom=0.0)
 
 
-def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
+def runs_record(study: Problem, design: Design) -> list[dict[str, Any]]:
     """Runs in their order, from 1."""
     actual = actual_of(study, design)
     rows = zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True)
@@ -145,7 +145,7 @@ def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
     ]
 
 
-def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> dict[str, Any]:
+def design_record(study: Problem, design: Design, evaluation: dict[str, Any]) -> dict[str, Any]:
     """JSON of ``doe design``: runs in their order, ``standard`` being the place in the standard order from 1."""
     runs = zip(runs_record(study, design), design.order.tolist(), strict=True)
     return {

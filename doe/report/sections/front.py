@@ -14,11 +14,11 @@ from doe.report.sections.front_pictures import Front, drawn_pairs, hypervolume, 
 from doe.report.sections.record import SENSES, Record, change, factors, nearest, part, responses, share_with_interval
 from doe.report.sections.search import in_few_runs
 from doe.response_surface import Surface
-from doe.study_file import Study
 from doe.workflow.confirmation import point_words
 from doe.workflow.front import SurfaceDoubt, open_errors
 from doe.workflow.pick import place_of
-from doe.workflow.surfaces import PredictedGain, goals_of, half_widths, predict_all, predicted_gains, statement
+from doe.workflow.problem import Problem
+from doe.workflow.surfaces import PredictedGain, half_widths, predict_all, predicted_gains, statement
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Section, Table, Widget
 from rbdyn.base.records import finite
@@ -286,7 +286,7 @@ def _with_tolerances(summary: Record, aware: Record) -> list[Block]:
     return [Table(caption, ["point", *map(label, names)], rows), *map(Paragraph, sentences)]
 
 
-def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
+def front_record(study: Problem, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
     """JSON of ``doe front``: factor and response values in their own units and senses."""
     assert front.uncertainty is not None
     sure = front.uncertainty
@@ -333,17 +333,17 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
     return record
 
 
-def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
+def predicted_record(study: Problem, surfaces: list[Surface], point: Array) -> dict[str, Any]:
     """Factors, responses on the surfaces and their 95 % half widths at a point in factor units."""
     coded = study.coded(point)[None]
     return point_record(study, point, predict_all(surfaces, coded)[0], half_widths(surfaces, coded)[0])
 
 
-def given_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
+def given_point_record(study: Problem, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
     """A point that was asked for: its gains over the baseline, and what the front makes of it."""
     gains = predicted_gains(study, surfaces, point)
     coded = study.coded(point)
-    costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])
+    costs = study.goals.costs(predict_all(surfaces, coded[None])[0])
     place = place_of(study, point)
     return {
         **predicted_record(study, surfaces, point),
@@ -364,13 +364,13 @@ def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[s
     return record
 
 
-def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
+def _extreme(study: Problem, front: ParetoFront, rows: Any) -> dict[str, float]:
     """The responses with a goal where each is best or worst."""
     pairs = zip(front.goals.objectives, rows, strict=True)
     return {study.responses[index]: float(front.values[row, index]) for index, row in pairs}
 
 
-def _limits_record(study: Study, surfaces: list[Surface], point: Array) -> list[dict[str, Any]]:
+def _limits_record(study: Problem, surfaces: list[Surface], point: Array) -> list[dict[str, Any]]:
     """Every limit at a point in factor units: what the surfaces say there, and the probability of keeping it."""
     coded = study.coded(point)
     values, errors = predict_all(surfaces, coded[None])[0], half_widths(surfaces, coded[None])[0]
@@ -386,11 +386,11 @@ def _limits_record(study: Study, surfaces: list[Surface], point: Array) -> list[
             "probability": doubt.kept_with(index, sense, limit, coded),
             "demanded_probability": study.file.confirmation.limit_probability,
         }
-        for index, sense, limit in goals_of(study).limited
+        for index, sense, limit in study.goals.limited
     ]
 
 
-def tolerance_aware_record(study: Study, surfaces: list[Surface], aware: ToleranceAware) -> dict[str, Any]:
+def tolerance_aware_record(study: Problem, surfaces: list[Surface], aware: ToleranceAware) -> dict[str, Any]:
     """JSON of a tolerance-aware front. ``robust``: what manufacture leaves of a response (of its distance from the
     target, where it has one).
     """

@@ -16,9 +16,8 @@ from doe.pareto.front import DRAWS, noisy_hypervolume
 from doe.report.sections.answer import point_record
 from doe.report.sections.record import Record, factors, part
 from doe.report.still import COLOURS, SMALL, Still, name_marks
-from doe.study_file import Study
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, levels_at, near_limits, pulls
-from doe.workflow.runs import region_of
+from doe.workflow.problem import Problem
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Table
@@ -196,7 +195,7 @@ def _answer(outcome: StudyResult) -> str:
     return f"The pick has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
 
 
-def spent_sentence(study: Study, adaptive: Adaptive) -> str:
+def spent_sentence(study: Problem, adaptive: Adaptive) -> str:
     """The runs and the time of the search, why it ended, and how far its region grew."""
     search, last = adaptive.search, adaptive.search.history[-1]
     scale = 100.0 / last.hypervolume if last.hypervolume > 0.0 else math.nan
@@ -228,7 +227,7 @@ def limiting_sentence(outcome: StudyResult) -> str:
     return f"What limits the pick: {'; '.join(why)}."
 
 
-def _why(study: Study, pull: Pull) -> str:
+def _why(study: Problem, pull: Pull) -> str:
     """The cause that limits one factor."""
     if pull.face is not None:
         return _end(study, pull.factor) if pull.face.limited_by == "allowed" else CAUSES[pull.face.limited_by]
@@ -238,7 +237,7 @@ def _why(study: Study, pull: Pull) -> str:
     return " and ".join(ways) or "where no response changes much"
 
 
-def _end(study: Study, name: str) -> str:
+def _end(study: Problem, name: str) -> str:
     """Why the region cannot grow at a factor."""
     ends = study.file.factor[study.factors.index(name)].allowed
     if ends is None:
@@ -250,7 +249,7 @@ def _end(study: Study, name: str) -> str:
     )
 
 
-def trust_sentence(study: Study, adaptive: Adaptive) -> str:
+def trust_sentence(study: Problem, adaptive: Adaptive) -> str:
     """How well the emulators predicted the fresh runs at their front."""
     search, front = adaptive.search, adaptive.search.front
     objectives = [study.responses[index] for index in front.goals.objectives]
@@ -291,7 +290,7 @@ def _listed(parts: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
 
-def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
+def adaptive_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     """JSON of a search.
 
     front : its points by their fresh runs, with 95 % half widths
@@ -358,7 +357,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     }
 
 
-def compared_record(study: Study, adaptive: Adaptive, volumes: FrontComparison) -> dict[str, Any]:
+def compared_record(study: Problem, adaptive: Adaptive, volumes: FrontComparison) -> dict[str, Any]:
     """Hypervolumes between one ``ideal`` and ``nadir``, in costs.
 
     search, surfaces : by the last emulators, of the predicted fronts in the course of the search, and of the surfaces' front
@@ -373,11 +372,11 @@ def compared_record(study: Study, adaptive: Adaptive, volumes: FrontComparison) 
     }
 
 
-def _actual(study: Study, factor: int, coded: float) -> float:
-    return float(study.centre[factor] + region_of(study)[factor] * study.step[factor] * coded)
+def _actual(study: Problem, factor: int, coded: float) -> float:
+    return float(study.centre[factor] + study.reach[factor] * study.step[factor] * coded)
 
 
-def _factors(study: Study, point: Array, rounded: bool = True) -> dict[str, Any]:
+def _factors(study: Problem, point: Array, rounded: bool = True) -> dict[str, Any]:
     """Numbers of a point (k + c,) of the search, rounded as on the drawing unless stated otherwise, and its categories, by name."""
     numbers = point[: len(study.factors)]
     return (
@@ -386,7 +385,7 @@ def _factors(study: Study, point: Array, rounded: bool = True) -> dict[str, Any]
     )
 
 
-def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:
+def archive_table(study: Problem, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:
     """Rows of the front that the emulators predict, all by default, with 95 % half widths."""
     search = adaptive.search
     errors = [f"{name}_error" for name in study.responses]
@@ -398,7 +397,7 @@ def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(N
     ]
 
 
-def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
+def emulators_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     """Emulators of every response for the scripts of the page: mean and standard deviation without scatter, anywhere.
 
     The coordinates of a point are x = (factor - ``centre``) / ``half_range``. Each level of the ``categories`` is a coordinate of
@@ -433,7 +432,7 @@ def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
         }
     return {
         "centre": study.centre.tolist(),
-        "half_range": (region_of(study) * study.step).tolist(),
+        "half_range": (study.reach * study.step).tolist(),
         "categories": [
             {
                 "name": category.name,

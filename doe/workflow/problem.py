@@ -1,0 +1,330 @@
+"""A study resolved once and handed to every step: goals, design, region, tolerances, and its scenes at any point."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from itertools import compress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from doe.clearance import ADAPTIVE_EXTENDED, ADAPTIVE_SEEDS, CONFIRMATION_SEEDS, points_of, responses_of
+from doe.designs import Design
+from doe.duty import Duty, DutyScenes, Run, main_scene, scenes_of
+from doe.study_file import Study
+from doe.workflow.design import actual_of, design_of
+from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.faults import InputError, key_path, refuse
+from rbdyn.result import TEMPERATURES
+from rbdyn.scene import Scene
+from rbdyn.scene.thermal import first_guess_faults
+from rbdyn.scene.unknown import plain_values
+
+if TYPE_CHECKING:
+    from doe.pareto import Goals
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """The design runs before their simulation: design, actual factors (n, k), and by run the scene, label and factors."""
+
+    design: Design
+    actual: Array
+    scenes: list[Run]
+    labels: list[str]
+    factors: list[dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Problem(Study):
+    """A study with all that follows from it alone, computed when it is first asked for.
+
+    A scene is built once; a problem with another region or other levels shares the scenes of the one that it came from.
+    """
+
+    built: dict[tuple[Any, ...], Scene] = field(default_factory=dict, compare=False, repr=False)
+    """Scenes by their class and overrides."""
+
+    @cached_property
+    def goals(self) -> "Goals":
+        """Goals and limits of the responses."""
+        from doe.pareto.goals import BLANK, Goals
+
+        responses = self.file.response
+        settings = {key: [getattr(response, key) for response in responses] for key in BLANK}
+        return Goals.of([response.goal for response in responses], **settings)
+
+    @cached_property
+    def design(self) -> Design:
+        """The design in the order of its runs. Raises InputError for impossible settings."""
+        return design_of(self)
+
+    @cached_property
+    def reach(self) -> Array:
+        """Half ranges (k,), in coded units about the centre 0, of the box in which the study searches."""
+        return np.full(len(self.factors), self.design.reach)
+
+    @cached_property
+    def half_ranges(self) -> Array:
+        """The same in factor units."""
+        return self.reach * self.step
+
+    @cached_property
+    def ends(self) -> Array:
+        """Ends (k, 2) of the region, in factor units."""
+        return np.column_stack([self.centre - self.half_ranges, self.centre + self.half_ranges])
+
+    def rounded_within(self, point: Array) -> Array:
+        """A point (k,) in factor units, rounded to the resolution of the drawing without leaving the region."""
+        reach, rounded = self.half_ranges, self.rounded(point)
+        finest = np.array([factor.finest or 0.0 for factor in self.file.factor])
+        outside = np.abs(rounded - self.centre) > reach * (1.0 + 1e-9)
+        inward = self.rounded(rounded + np.sign(self.centre - rounded) * finest)
+        return np.where(outside & (np.abs(inward - self.centre) <= reach * (1.0 + 1e-9)), inward, rounded)
+
+    def beyond_runs(self, coded: Array) -> bool:
+        """Whether a coded point (k,) lies beyond the region that the runs reach, where the surfaces extrapolate."""
+        distance = np.linalg.norm(coded) if self.design.region == "ball" else np.abs(coded).max()
+        return bool(distance > self.design.extent * (1.0 + 1e-4))
+
+    @cached_property
+    def rigid(self) -> Mask:
+        """Factors (k,) without a tolerance: whole numbers, and those that mean nothing at the study's categories."""
+        return np.array([factor.whole or place in self.inactive for place, factor in enumerate(self.file.factor)])
+
+    @cached_property
+    def known_tolerances(self) -> dict[str, float]:
+        """Half widths of the factors that have any, in their units: their own, or that of the narrowest chain."""
+        half_widths = {}
+        for factor in compress(self.file.factor, ~self.rigid):
+            closing = [chain.half_width_mm for chain in self.file.chain if chain.factor == factor.name]
+            widths = [width for width in closing if width is not None]
+            if factor.tolerance is not None or widths:
+                half_widths[factor.name] = min(widths) if factor.tolerance is None else factor.tolerance
+        return half_widths
+
+    @cached_property
+    def coded_tolerances(self) -> Array:
+        """Half widths (k,) of all factors in coded units, 0 for factors without a tolerance.
+
+        Raises InputError for each half width that is missing or too wide.
+        """
+        half_widths = dict.fromkeys(compress(self.factors, self.rigid), 0.0) | self.known_tolerances
+        faults = [
+            f"{self.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that manufacture "
+            "keeps, here or as half_width_mm of a chain that closes on this factor"
+            for name in self.factors
+            if name not in half_widths
+        ]
+        faults += [
+            f"{self.path}: factor.tolerance of {name} = {half_widths[name]:g}: leaves no room in the region, which reaches "
+            f"{limit:g} to either side of the centre; narrow it or widen the design"
+            for name, limit in zip(self.factors, self.half_ranges, strict=True)
+            if half_widths.get(name, 0.0) >= limit
+        ]
+        refuse(faults)
+        return np.array([half_widths[name] for name in self.factors]) / self.step
+
+    def check_responses(self) -> None:
+        """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
+        heats = any(name in TEMPERATURES for name in self.figures) and self._states("thermal")
+        names = ", ".join(responses_of(heats))
+        refuse(
+            f"{self.path}: response.name = {name!r}: "
+            + (
+                f"{self.scene.file} has no [thermal], which computes temperatures; add that table there, or choose one of {names}"
+                if name in TEMPERATURES
+                else f"the simulation does not give it; choose one of {names}"
+            )
+            for name in self.figures
+            if name not in responses_of(heats)
+        )
+        refuse(
+            f'{self.path}: response.aggregate of {response.name} = "worst_relative": temperatures in °C have no ratio; write '
+            '"worst" or "mean"'
+            for response in self.file.response
+            if response.name in TEMPERATURES and response.aggregate == "worst_relative"
+        )
+
+    def _states(self, table: str) -> bool:
+        """Whether the study's scene has a table, in its file or by scene.set."""
+        return table in self.scene_tables or any(text.startswith(f"{table}.") for text in self.scene.set)
+
+    @property
+    def has_mounting(self) -> bool:
+        """Whether anything changes the clearances of the drawing."""
+        return self._states("mounting")
+
+    @cached_property
+    def scene_tables(self) -> dict[str, Any]:
+        """Tables of the study's scene file. Raises InputError for a missing file, or a factor's key that no scene has."""
+        path, data = self.path_of(self.scene.file), self.read(self.scene.file)
+        keys = (*(factor.key for factor in self.file.factor), *(category.key for category in self.file.category))
+        left_out = [
+            dotted
+            for dotted in keys
+            for table, _, key in (dotted.rpartition("."),)
+            if not isinstance(data.get(table), dict) or key not in data[table]
+        ]
+        scene_values: Mapping[str, Any] = {}
+        with suppress(InputError):
+            scene_values = plain_values(Scene.from_dict(data, str(path), self.scene.set)) if left_out else {}
+        refuse(
+            f"{self.path}: factor.key = {key!r}: no such key in {path}; write table.key as in that file"
+            for key in left_out
+            if key not in scene_values
+        )
+        return data
+
+    @cached_property
+    def duty(self) -> Duty | None:
+        """The duty; None without one."""
+        return Duty.of(self)
+
+    @cached_property
+    def duty_with_groups(self) -> Duty | None:
+        """The duty with its points that have one scene together; None without a duty. Raises InputError."""
+        if self.duty is None:
+            return None
+        (run,) = self.design_scenes(self.baseline[None])
+        keys = [point.key for point in points_of(scenes_of(run), list(self.duty.shares))]
+        groups = dict[str, list[str]]()
+        for name, key in zip(self.duty.shares, keys, strict=True):
+            groups.setdefault(key, []).append(name)
+        return replace(self.duty, groups=tuple(map(tuple, groups.values())))
+
+    @cached_property
+    def plan(self) -> RunPlan:
+        """Every run of the design. Raises InputError for an impossible design, scene or response."""
+        self.check_responses()
+        design = self.design
+        actual = actual_of(self, design)
+        scenes = self.design_scenes(actual, design.order.tolist())
+        labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
+        return RunPlan(design, actual, scenes, labels, [self.by_factor(point) for point in actual])
+
+    def assignments(self, factors: Array) -> list[str]:
+        """Overrides "key=value" of the scene at factor values (k,) and at the study's categories, without inactive factors."""
+        numbers = zip(self.file.factor, map(float, factors), strict=True)
+        values, inactive = self.categories, [self.factors[place] for place in self.inactive]
+        return [
+            *(
+                f"{factor.key}={round(x) if factor.whole else x!r}"
+                for factor, x in numbers
+                if factor.name not in inactive
+            ),
+            *(f"{category.key}={values[category.name]}" for category in self.file.category),
+        ]
+
+    def scene_at(self, factors: Array, seed: int, overrides: Sequence[str] = (), kind: type[Scene] = Scene) -> Scene:
+        """The scene at factor values (k,), with a seed and ``overrides`` after those of all runs, of this ``kind``.
+
+        Raises InputError for an impossible value.
+        """
+        texts = (*self.scene.set, *overrides, f"numerics.seed={seed}", *self.assignments(factors))
+        if (kind, *texts) not in self.built:
+            scene = kind.from_dict(self.scene_tables, str(self.path_of(self.scene.file)), texts)
+            keys = [factor.key for factor in self.file.factor]
+            refuse(
+                f"{self.path}: factor.key = {fault}"
+                for fault in first_guess_faults(scene.thermal, scene.lubricant, keys)
+            )
+            self.built[kind, *texts] = scene
+        return self.built[kind, *texts]
+
+    def over_duty(
+        self,
+        scene: Callable[[Sequence[str]], Scene],
+        baseline: Mapping[str, Scene] | None = None,
+        baseline_errors: bool = False,
+    ) -> Run:
+        """A run: ``scene`` of no further overrides, or of those at each point of the duty.
+
+        ``baseline`` and ``baseline_errors``: as of `DutyScenes`. Raises InputError, which names the point with an impossible scene.
+        """
+        if self.duty is None:
+            return scene(())
+        points, faults = dict[str, Scene](), dict[str, list[str]]()
+        for name, overrides in self.duty.overrides.items():
+            try:
+                points[name] = scene(overrides)
+                keys = {".".join(key_path(text) or ()) for text in overrides}
+                refuse(first_guess_faults(points[name].thermal, points[name].lubricant, keys))
+            except InputError as error:
+                faults[name] = error.faults
+        # A fault at all points is none of the duty.
+        everywhere = (
+            set.intersection(*map(set, faults.values())) if len(faults) == len(self.duty.shares) else set[str]()
+        )
+        at_points = [
+            f"{self.path}: duty.set of {name}: {fault}"
+            for name, sentences in faults.items()
+            for fault in sentences
+            if fault not in everywhere
+        ]
+        refuse([*sorted(everywhere), *at_points])
+        return DutyScenes(self.duty, points, baseline or {}, baseline_errors)
+
+    @cached_property
+    def baseline_scenes(self) -> dict[str, Scene]:
+        """Scenes of the confirmation of the original design by point of the duty, if any response compares with them; else none."""
+        original = self.with_levels(())
+        if self.duty is None or not self.duty.relative:
+            return {}
+        run = self.over_duty(partial(original._confirmation_scene, original.baseline))
+        return dict(run.scenes) if isinstance(run, DutyScenes) else {}
+
+    def design_scenes(self, points: Array, order: Sequence[int] | None = None) -> list[Run]:
+        """Scenes of the design runs (n, k); runs at one point differ only by their seed.
+
+        ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. Raises
+        InputError, which names the point with an impossible value of a factor.
+        """
+        first, places = self.file.design.seed, range(len(points)) if order is None else order
+        return [
+            self.over_duty(partial(self._scene_in_region, point, first + place), self.baseline_scenes)
+            for place, point in zip(places, points, strict=True)
+        ]
+
+    def _scene_in_region(self, point: Array, seed: int, overrides: Sequence[str]) -> Scene:
+        try:
+            return self.scene_at(point, seed, overrides)
+        except InputError as error:
+            keys = [factor.key for factor in self.file.factor]
+            place = ", ".join(f"{name} = {value:.4g}" for name, value in self.by_factor(point).items())
+            raise InputError(
+                [
+                    f"{self.path}: the region of the design reaches {place}, where {fault}, or narrow the region"
+                    if any(key in fault for key in keys) and not fault.startswith(f"{self.path}: ")
+                    else fault
+                    for fault in map(str, error.faults)
+                ]
+            ) from None
+
+    def confirmation_run(self, point: Array) -> Run:
+        """Scenes of a confirmation run: more replicates, fresh seeds."""
+        return self.over_duty(partial(self._confirmation_scene, point), self.baseline_scenes, baseline_errors=True)
+
+    def confirmation_scene(self, point: Array) -> Scene:
+        """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""
+        return main_scene(self.confirmation_run(point))
+
+    def _confirmation_scene(self, point: Array, sets: Sequence[str]) -> Scene:
+        settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
+        effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
+        return self.scene_at(point, seed, [*sets, *effort, *settings.set])
+
+    def adaptive_scenes(self, points: Array, replicates: Sequence[int], first: int) -> list[Run]:
+        """Scenes of runs (n, k) of an adaptive search, numbered from ``first``, each with its own replicates and seed."""
+        adaptive, seed = self.file.adaptive, self.file.adaptive.seed + ADAPTIVE_SEEDS + first
+        at_baseline = self.over_duty(lambda sets: self.scene_at(self.baseline, adaptive.seed, sets))
+        # Runs with drifting figures may become longer by the least factor over the duty.
+        usual = min(scene.numerics.extend_limit for scene in scenes_of(at_baseline))
+        shared = ["numerics.companion=false", f"numerics.extend_limit={min(usual, ADAPTIVE_EXTENDED)!r}", *adaptive.set]
+
+        def run(number: int, point: Array, count: int) -> Run:
+            effort = [f"numerics.replicates={count}", *shared]
+            return self.over_duty(lambda sets: self.scene_at(point, number, [*sets, *effort]), self.baseline_scenes)
+
+        return [run(*numbered) for numbered in zip(range(seed, seed + len(points)), points, replicates, strict=True)]
