@@ -19,10 +19,13 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from rbdyn.base.blocks import Table
+from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
+from rbdyn.base.folder import OutputFolder
+from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.loading import INTERRUPTED
 from rbdyn.base.notes import DANGER, Note, condensed, of_level
+from rbdyn.base.page import write_with_report
 from rbdyn.base.records import plain
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show
@@ -127,6 +130,20 @@ def hand_over(
     answer()
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
+
+
+def deliver(
+    folder: OutputFolder,
+    identity: Identity,
+    record: Callable[[], dict[str, Any]],
+    blocks: Callable[[], Sequence[Block]],
+    write: Callable[[Path], Sequence[str]],
+    as_json: bool,
+    detail: Detail = Detail.USUAL,
+) -> None:
+    """Write the files of a result with their report, then print the result: what every command with a result ends with."""
+    files = write_with_report(folder, identity, blocks, write)
+    hand_over(record, as_json, lambda: show([identity_line(identity), *blocks()], detail), folder.path, files)
 
 
 def alarm(notes: Iterable[Note | Mapping[str, Any]]) -> None:

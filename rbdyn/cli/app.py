@@ -11,8 +11,8 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import OutputFolder, output_folder
-from rbdyn.base.identity import identity_line, identity_of
-from rbdyn.base.page import REPORT_FILES, write_with_report
+from rbdyn.base.identity import identity_of
+from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted
 from rbdyn.cli.ball import ball
@@ -112,11 +112,8 @@ def simulate(
 
         identity = identity_of("rbdyn simulate", result.scene, [scene])
         blocks = partial(simulation_output.blocks, result, out)
-        written = write_with_report(folder, identity, blocks, partial(simulation_output.write, loaded, result))
-        detail = Detail.of(quiet, verbose)
-        command.hand_over(
-            result.as_dict, as_json, lambda: show_blocks([identity_line(identity), *blocks()], detail), out, written
-        )
+        write = partial(simulation_output.write, loaded, result)
+        command.deliver(folder, identity, result.as_dict, blocks, write, as_json, Detail.of(quiet, verbose))
     if result.status != "ok":
         if not as_json:
             command.alarm(result.notes)
@@ -146,11 +143,8 @@ def _over_duty(
     places = zip(*((point.inner_speed_rpm, point.radial_load_N) for point in found.points), strict=True)
     swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), places, strict=True))
     identity = identity_of("rbdyn simulate --duty", found.scene, files, swept=swept)
-    answer = partial(simulated_blocks, found)
-    written = write_with_report(folder, identity, answer, partial(write_simulated, found))
-    command.hand_over(
-        found.as_dict, as_json, lambda: show_blocks([identity_line(identity), *answer()], detail), folder.path, written
-    )
+    answer, write = partial(simulated_blocks, found), partial(write_simulated, found)
+    command.deliver(folder, identity, found.as_dict, answer, write, as_json, detail)
     return command.FAILED if found.failed else 0
 
 
@@ -259,15 +253,8 @@ def slip_map(
         swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
         inputs = [scene] if duty is None else [scene, duty]
         identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept)
-        blocks = partial(map_blocks, mapped, marked)
-        written = write_with_report(folder, identity, blocks, partial(_write_map, mapped, marked))
-        command.hand_over(
-            partial(_map_record, mapped, marked),
-            as_json,
-            lambda: show_blocks([identity_line(identity), *blocks()]),
-            out,
-            written,
-        )
+        record, blocks = partial(_map_record, mapped, marked), partial(map_blocks, mapped, marked)
+        command.deliver(folder, identity, record, blocks, partial(_write_map, mapped, marked), as_json)
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:

@@ -16,19 +16,18 @@ from rbdyn.base.command import (
     SceneFile,
     Set,
     alarm,
+    deliver,
     folder_option,
     guarded,
-    hand_over,
     notice,
     valued,
     verbose_flag,
 )
 from rbdyn.base.faults import InputError
 from rbdyn.base.folder import output_folder
-from rbdyn.base.identity import identity_line, identity_of
+from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import status_notes
-from rbdyn.base.page import REPORT_FILES, write_with_report
-from rbdyn.base.terminal import show
+from rbdyn.base.page import REPORT_FILES
 
 if TYPE_CHECKING:
     from rbdyn.scene import BallScene
@@ -103,15 +102,8 @@ def ball(
 
         result, path = with_runout(loaded, equilibrium(loaded))
         identity = identity_of("rbdyn ball", result.scene, [scene])
-        answer = partial(blocks, result)
-        files = write_with_report(folder, identity, answer, partial(write, result, path))
-        hand_over(
-            result.as_dict,
-            as_json,
-            lambda: show([identity_line(identity), *answer()], Detail.of(quiet, verbose)),
-            out,
-            files,
-        )
+        answer, files = partial(blocks, result), partial(write, result, path)
+        deliver(folder, identity, result.as_dict, answer, files, as_json, Detail.of(quiet, verbose))
     if not result.is_equilibrium:
         if as_json:
             alarm(status_notes(result.status))

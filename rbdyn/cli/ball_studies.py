@@ -10,14 +10,12 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
-from rbdyn.base.command import FAILED, checkpoint_message, hand_over, progress_bar
+from rbdyn.base.command import FAILED, checkpoint_message, deliver, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.folder import OutputFolder
-from rbdyn.base.identity import identity_line, identity_of
-from rbdyn.base.page import write_with_report
+from rbdyn.base.identity import identity_of
 from rbdyn.base.records import plain
 from rbdyn.base.table import Column, Sheet
-from rbdyn.base.terminal import show
 from rbdyn.base.words import counted, label, shown, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import RACES, remarks, ring_columns, row_columns, tipping
@@ -61,10 +59,8 @@ def run_sweep(
     with checkpoint_message(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
     identity = identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys)
-    answer = partial(sweep_blocks, result)
-    files = write_with_report(folder, identity, answer, partial(write_sweep, result))
-    screen = partial(show, [identity_line(identity), *answer()], Detail.of(quiet))
-    hand_over(result.as_dict, as_json, screen, folder.path, files)
+    answer, write = partial(sweep_blocks, result), partial(write_sweep, result)
+    deliver(folder, identity, result.as_dict, answer, write, as_json, Detail.of(quiet))
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
     return FAILED if result.failures else 0
@@ -247,10 +243,8 @@ def run(
     command = f"rbdyn ball --{name.replace('_', '-')}"
     swept = table.keys if table else {}
     identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
-    answer = partial(blocks, record, table)
-    files = write_with_report(folder, identity, answer, partial(write_study, name, record, table))
-    screen = partial(show, [identity_line(identity), *answer()], Detail.of(quiet))
-    hand_over(lambda: record, as_json, screen, folder.path, files)
+    answer, write = partial(blocks, record, table), partial(write_study, name, record, table)
+    deliver(folder, identity, lambda: record, answer, write, as_json, Detail.of(quiet))
     return 0
 
 

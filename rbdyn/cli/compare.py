@@ -11,9 +11,8 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.folder import output_folder
-from rbdyn.base.identity import Identity, identity_line, identity_of
-from rbdyn.base.page import REPORT_FILES, write_with_report
-from rbdyn.base.terminal import show
+from rbdyn.base.identity import Identity, identity_of
+from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.words import counted, improvement, quantity
 
 if TYPE_CHECKING:
@@ -63,12 +62,8 @@ def compare(
             found = run(a, b, assignments or [], both, workers, progress, command.notice(quiet))
         inputs = [file_of(path) for path in (a, b) if path is not None]
         identity = _identity(found, inputs)
-        answer = partial(blocks, found)
-        written = write_with_report(folder, identity, answer, partial(_write, found))
-        detail = Detail.of(quiet, verbose)
-        command.hand_over(
-            found.as_dict, as_json, lambda: show([identity_line(identity), *answer()], detail), out, written
-        )
+        answer, write = partial(blocks, found), partial(_write, found)
+        command.deliver(folder, identity, found.as_dict, answer, write, as_json, Detail.of(quiet, verbose))
     if found.failed:
         raise typer.Exit(command.FAILED)
 
