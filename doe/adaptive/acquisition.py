@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
-from doe.adaptive.emulators import Emulators, Inactive, without_inactive
+from doe.adaptive.emulators import Emulators
 from doe.pareto.search import REFERENCE, non_dominated
 from rbdyn.base.arrays import Array, Mask, Rows
 
@@ -28,7 +28,6 @@ CHILDREN = 128  # points about a front a round
 ROUNDS = (0.2, 0.1, 0.05, 0.02)  # how far from their parents, in shares of the region
 MUTATION = 0.6  # chance of each factor to change
 PRICE = 0.03  # of one cost, for the gain of another
-SWITCH = 0.2  # chance of each category to be drawn anew
 LIKELY = 0.5  # chance of keeping all limits at which a point counts as feasible
 LEVELS = 13  # 2^13 levels, of which only those count that something may still gain
 MOST_LEVELS = 1500  # of those
@@ -42,8 +41,7 @@ class Region(NamedTuple):
     """The box from ``low`` to ``high`` (k,) in coded units.
 
     A drawing has the values ``origin`` and whole numbers of ``finest`` (k,) from it (NaN: any). Points are twins unless they are
-    more than ``apart`` (k,) from each other in some factor. The last coordinates are of categories of so many ``levels``,
-    spread evenly from -1 to 1; ``inactive`` factors are at 0.
+    more than ``apart`` (k,) from each other in some factor.
     """
 
     low: Array
@@ -51,16 +49,13 @@ class Region(NamedTuple):
     origin: Array
     finest: Array
     apart: Array
-    levels: tuple[int, ...] = ()
-    inactive: Inactive = ()
 
     def snap(self, points: Array) -> Array:
         """Points (n, k) as a drawing can have them within the box."""
         ends = (self.low - self.origin) / self.finest, (self.high - self.origin) / self.finest
         steps = np.round((points - self.origin) / self.finest).clip(np.ceil(ends[0] - 1e-6), np.floor(ends[1] + 1e-6))
         free = points.clip(self.low, self.high)
-        rounded = np.where(np.isnan(self.finest), free, self.origin + steps * self.finest)
-        return without_inactive(rounded, self.levels, self.inactive)
+        return np.where(np.isnan(self.finest), free, self.origin + steps * self.finest)
 
     def twins(self, points: Array, others: Array) -> Mask:
         """Whether each of points (n, k) is a twin of any of the others (o, k)."""
@@ -110,11 +105,7 @@ def _children(region: Region, parents: Array, reach: float, random: np.random.Ge
     """Children (n, k) of parents (n, k), as far from them as ``reach`` shares of the region."""
     span, mutation = region.high - region.low, random.random(parents.shape) < MUTATION
     children = parents + reach * span * mutation * random.standard_normal(parents.shape)
-    children = children.clip(region.low, region.high)
-    for column, count in enumerate(region.levels, len(span) - len(region.levels)):
-        level = 2.0 * random.integers(0, count, len(children)) / (count - 1) - 1.0
-        children[:, column] = np.where(random.random(len(children)) < SWITCH, level, parents[:, column])
-    return children
+    return children.clip(region.low, region.high)
 
 
 def _front(emulators: Emulators, means: Array, deviations: Array) -> tuple[Rows, Array]:

@@ -16,8 +16,6 @@ from rbdyn.base.arrays import Array, Mask, Whole
 # Prior of the logarithm of a length scale in half ranges. The bearing's whirl turns several times between two levels of a
 # design: the emulators' own prior, of longer lengths, lost 1.5 % of its front in 5 of 5 searches.
 PRIOR = (0.0, 1.0)
-# Factors that mean nothing at a level of a category: places of the category, of its level, and of the factors.
-Inactive = tuple[tuple[int, int, tuple[int, ...]], ...]
 # Ratio of the ends of a factor up to which its logarithm may be emulated: of a wider one, an end may lie at a zero that means
 # nothing. Where the runs prefer logarithms, these gained 1 % of the front of a table of the bearing in 100 runs.
 LARGEST_RATIO = 10.0
@@ -59,7 +57,6 @@ Evaluate = Callable[[Array, Whole], tuple[Array, Array, Whole]]
 class Emulators:
     """Emulators ``by_response`` (m) from the runs that went well.
 
-    The last coordinates of points are of categories of so many ``levels``, at which ``inactive`` factors mean nothing.
     ``shares`` (m) are of the factors whose logarithms an emulator takes. Deviations are multiplied by ``stretch`` (m,), at
     least 1, so that runs left out one at a time lie within them.
     """
@@ -68,8 +65,6 @@ class Emulators:
     runs: Runs
     by_response: Sequence[Emulator]
     stretch: Array
-    levels: tuple[int, ...] = ()
-    inactive: Inactive = ()
     shares: tuple[tuple[float, ...], ...] = ()
 
     def predict(self, points: Array) -> tuple[Array, Array]:
@@ -129,17 +124,11 @@ class Emulators:
 
     def _coordinates(self, points: Array) -> list[Array]:
         """Coordinates of points (n, k) for the emulator of each response."""
-        active = without_inactive(points, self.levels, self.inactive)
-        return [coordinates(active, self.levels, shares) for shares in self.shares]
+        return [coordinates(points, shares) for shares in self.shares]
 
 
 def fit_emulators(
-    goals: Goals,
-    runs: Runs,
-    previous: Emulators | None = None,
-    levels: tuple[int, ...] = (),
-    inactive: Inactive = (),
-    shares: tuple[float, ...] = (),
+    goals: Goals, runs: Runs, previous: Emulators | None = None, shares: tuple[float, ...] = ()
 ) -> Emulators:
     """Emulators of all responses; ``previous`` ones, of nearly the same runs, shorten the search for their hyperparameters.
 
@@ -149,30 +138,18 @@ def fit_emulators(
     variances = _pooled(good, good.points) / good.replicates[:, None]
     responses = good.values.shape[1]
     starts = [None] * responses if previous is None else [one.hyperparameters for one in previous.by_response]
-    numbers, choices = good.points.shape[1] - len(levels), [(), shares] if any(shares) else [()]
-    points = without_inactive(good.points, levels, inactive)
+    choices = [(), shares] if any(shares) else [()]
     by_response, shares_by_response = [], []
     for values, variance, start in zip(good.values.T, variances.T, starts, strict=True):
         rivals = [
-            fit_emulator(
-                coordinates(points, levels, choice), values, variance, start=start, prior=PRIOR, trended=numbers
-            )
+            fit_emulator(coordinates(good.points, choice), values, variance, start=start, prior=PRIOR)
             for choice in choices
         ]
         best = max(range(len(choices)), key=lambda place: rivals[place].likelihood)
         by_response.append(rivals[best])
         shares_by_response.append(choices[best])
     stretch = np.array([_stretch(emulator) for emulator in by_response])
-    return Emulators(goals, good, by_response, stretch, levels, inactive, tuple(shares_by_response))
-
-
-def without_inactive(points: Array, levels: tuple[int, ...], inactive: Inactive) -> Array:
-    """Points (n, k) with the factors at 0 that mean nothing at their levels: all values of these are the same point."""
-    active, numbers = points.copy() if inactive else points, points.shape[1] - len(levels)
-    for category, place, factors in inactive:
-        there = np.rint(0.5 * (points[:, numbers + category] + 1.0) * (levels[category] - 1)) == place
-        active[np.ix_(there, factors)] = 0.0
-    return active
+    return Emulators(goals, good, by_response, stretch, tuple(shares_by_response))
 
 
 def shares_of(centre: Array, step: Array, low: Array, high: Array) -> tuple[float, ...]:
@@ -186,25 +163,18 @@ def shares_of(centre: Array, step: Array, low: Array, high: Array) -> tuple[floa
     return tuple(np.divide(step, centre, out=np.zeros(len(step)), where=where).tolist())
 
 
-def coordinates(points: Array, levels: tuple[int, ...], shares: tuple[float, ...] = ()) -> Array:
-    """Coordinates of points (n, k) for an emulator.
+def coordinates(points: Array, shares: tuple[float, ...] = ()) -> Array:
+    """Coordinates of points (n, k) for an emulator. A factor that has a share is given by its logarithm, with slope 1 where it is 0.
 
-    A category, one of the last coordinates of a point, has a coordinate for every level: any two levels are as unlike as
-    the lengths of their coordinates say. A factor that has a share is given by its logarithm, with slope 1 where it is 0.
-
-    Sources: Garrido-Merchan and Hernandez-Lobato, Dealing with categorical and integer-valued variables in Bayesian
-    optimization with Gaussian processes, Neurocomputing 380 (2020); Snoek, Swersky, Zemel and Adams, Input warping for
-    Bayesian optimization of non-stationary functions, ICML (2014).
+    Source: Snoek, Swersky, Zemel and Adams, Input warping for Bayesian optimization of non-stationary functions, ICML (2014).
     """
-    share, numbers = np.array(shares), points.shape[1] - len(levels)
+    share = np.array(shares)
     logarithmic = np.flatnonzero(share)
-    if logarithmic.size:
-        points = points.copy()
-        points[:, logarithmic] = np.log1p(share[logarithmic] * points[:, logarithmic]) / share[logarithmic]
-    parts = [points[:, :numbers]]
-    for count, column in zip(levels, points[:, numbers:].T, strict=True):
-        parts.append(np.eye(count)[np.rint(0.5 * (column + 1.0) * (count - 1)).astype(np.int64)])
-    return np.hstack(parts) if levels else points
+    if not logarithmic.size:
+        return points
+    warped = points.copy()
+    warped[:, logarithmic] = np.log1p(share[logarithmic] * points[:, logarithmic]) / share[logarithmic]
+    return warped
 
 
 def _stretch(emulator: Emulator) -> float:

@@ -247,8 +247,7 @@ class _Search:
         good = int(runs.good.sum())
         if good < 2 + len(self.centre):
             raise MethodError(f"only {counted(good, 'run')} went well; emulators need {2 + len(self.centre)}")
-        region = self.region
-        self.emulators = fit_emulators(self.goals, runs, self.emulators, region.levels, region.inactive, self.shares)
+        self.emulators = fit_emulators(self.goals, runs, self.emulators, self.shares)
         return self.emulators
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
@@ -505,7 +504,7 @@ def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator)
     pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
     span, draws = region.high - region.low, emulators.draws(FUNCTIONS, random)
     at_pick = []
-    for factor, side in product(range(pick.size - len(region.levels)), (-1, 1)):
+    for factor, side in product(range(pick.size), (-1, 1)):
         position = (region.high if side > 0 else region.low)[factor]
         if abs(pick[factor] - position) > NEAR * span[factor]:
             continue

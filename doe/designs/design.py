@@ -31,7 +31,7 @@ class Design:
     """Runs of a design in the order of execution.
 
     ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind`` (n,): kind of
-    each point, "cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given", "centre" or "added" in place of a
+    each point, "cube", "axial", "edge", "grid", "sample", "screening", "optimal", "centre" or "added" in place of a
     failed run. ``order`` (n,): place
     of each run in the standard order, which identifies the run in any order. ``region``: where the design is to predict, a
     ball through its outermost points or a box. ``reach``: half-range of every factor in coded units.
@@ -62,12 +62,11 @@ class Design:
     def by_blocks(self, seed: int | None = None) -> Self:
         """The design sorted by blocks, within each in standard order.
 
-        With a ``seed`` the order within a block is random, after runs of kind "given".
+        With a ``seed`` the order within a block is random.
         """
         ties = np.arange(len(self.coded))
         if seed is not None:
-            count = self.kind.count("given")
-            ties[count:] = count + np.random.default_rng(seed).permutation(len(self.coded) - count)
+            ties = np.random.default_rng(seed).permutation(len(self.coded))
         return self.rows(np.lexsort((ties, self.block)))
 
     def rows(self, rows: Rows) -> Self:

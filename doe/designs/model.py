@@ -8,7 +8,7 @@ Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th e
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from functools import cache
 from itertools import combinations, product
 from string import ascii_uppercase
@@ -26,12 +26,12 @@ MODELS: tuple[str, ...] = get_args(Model)
 Terms = tuple[str, ...]
 
 
-def model_terms(factors: int, model: str, without: Collection[int] = ()) -> Terms:
+def model_terms(factors: int, model: str) -> Terms:
     """Terms of a model: "linear", "interaction" (with two-factor products), "pure_quadratic" (with squares), else all.
 
-    ``without``: indices of factors that have no terms. A model that the data reduce needs runs for all its initial terms.
+    A model that the data reduce needs runs for all its initial terms.
     """
-    letters = [letter for place, letter in enumerate(ascii_uppercase[:factors]) if place not in without]
+    letters = ascii_uppercase[:factors]
     products = [a + b for a, b in combinations(letters, 2)] if model not in ("linear", "pure_quadratic") else []
     squares = [f"{letter}^2" for letter in letters] if model not in ("linear", "interaction") else []
     return ("1", *letters, *products, *squares)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.designs.design import Design, design_of_parts
-from doe.designs.model import Terms, block_contrasts, model_matrix, model_terms, moment_matrix
+from doe.designs.model import Terms, model_matrix, model_terms, moment_matrix
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
@@ -38,56 +38,38 @@ def optimal(
     seed: int = 1,
     terms: Terms | None = None,
     levels: Sequence[ArrayLike | None] | None = None,
-    earlier_runs: ArrayLike = (),
-    block: ArrayLike | None = None,
     centre_replicates: int = 0,
 ) -> Design:
-    """Design of ``runs`` new runs that, with the earlier runs, estimate a model best.
+    """Design of ``runs`` new runs that estimate a model best.
 
     criterion : "d", the largest determinant of X'X and so the smallest joint region of the coefficients; "i", the least
         mean variance of predictions over the box.
     terms : of the model, with "1"; by default those of the quadratic.
     levels : coded values that each factor may take, None for any; by default all may take any.
-    earlier_runs : coded points (m, k), which come first without change. The box from -1 to 1 grows to include them.
-    block : of each earlier run, from 0 (m,); where there are several blocks, the new runs are one more block.
     centre_replicates : number of additional centre points.
 
     The same seed gives the same design. Raises MethodError when the runs are too few for the terms, or too many.
     """
     terms = model_terms(factors, "quadratic") if terms is None else terms
-    old = np.asarray(earlier_runs, float).reshape(-1, factors)
-    groups = np.zeros(len(old), np.int64) if block is None else np.asarray(block, np.int64)
-    new = int(groups.max(initial=0)) + 1 if len(np.unique(groups)) > 1 else 0
-    fixed = np.vstack([old, np.zeros((centre_replicates, factors))])
-    needed = len(terms) + len(np.unique([*groups, new])) - 1
-    if len(fixed) + runs < needed:
-        least, model = needed + 1 - len(fixed), counted(len(terms), "term")
-        if not len(fixed):
-            raise MethodError(f"runs = {runs}: too few for a model of {model}; give at least {least}")
-        raise MethodError(
-            f"runs = {runs}: with {len(fixed)} given or at the centre too few for a model of {model}; give at least {least}"
-        )
+    if centre_replicates + runs < len(terms):
+        least, model = len(terms) + 1 - centre_replicates, counted(len(terms), "term")
+        at_centre = f"with {centre_replicates} at the centre " if centre_replicates else ""
+        raise MethodError(f"runs = {runs}: {at_centre}too few for a model of {model}; give at least {least}")
     if runs > MOST_RUNS:
         raise MethodError(
             f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; give fewer, or kind = 'sobol'"
         )
-    reach = max(1.0, float(np.abs(old).max(initial=0.0)))
-    blocks = np.concatenate([groups, np.full(centre_replicates + runs, new)])
-    contrasts = block_contrasts(blocks)
-    rows = np.hstack([model_matrix(fixed / reach, terms), contrasts[: len(fixed)]])
-    size = len(terms)
-    weights = np.zeros((rows.shape[1],) * 2)
-    weights[:size, :size] = moment_matrix(terms, factors, "box", 1.0)
+    centre = np.zeros((centre_replicates, factors))
+    rows = model_matrix(centre, terms)
     exchange = Exchange(
         terms,
-        contrasts[-1],
-        rows.T @ rows + RIDGE * np.eye(rows.shape[1]),
-        weights if criterion == "i" else None,
-        [None if values is None else np.asarray(values, float) / reach for values in levels or [None] * factors],
+        rows.T @ rows + RIDGE * np.eye(len(terms)),
+        moment_matrix(terms, factors, "box", 1.0) if criterion == "i" else None,
+        [None if values is None else np.asarray(values, float) for values in levels or [None] * factors],
     )
     points = exchange.best(exchange.starts(runs, np.random.default_rng(seed)))
-    kinds = [("given", old), ("centre", fixed[len(old) :]), ("optimal", reach * points[np.lexsort(points.T)])]
-    return design_of_parts(kinds, blocks.tolist(), reach, "box")
+    kinds = [("centre", centre), ("optimal", points[np.lexsort(points.T)])]
+    return design_of_parts(kinds, [0] * (centre_replicates + runs), 1.0, "box")
 
 
 def _on_parts(number: ArrayLike) -> Array:
@@ -99,12 +81,11 @@ def _on_parts(number: ArrayLike) -> Array:
 class Exchange:
     """Coordinate exchange in many designs (s, n, k) of new runs in parallel, in the box from -1 to 1.
 
-    ``block_row`` (b,): columns of the blocks in the row of every new run. ``fixed_information`` (p, p): X'X of the earlier
-    runs. ``moments`` (p, p): weights of the variances of an I-optimal design, None for a D-optimal one.
+    ``fixed_information`` (p, p): X'X of the runs at the centre. ``moments`` (p, p): weights of the variances of an I-optimal
+    design, None for a D-optimal one.
     """
 
     terms: Terms
-    block_row: Array
     fixed_information: Array
     moments: Array | None
     levels: Sequence[Array | None]
@@ -127,14 +108,8 @@ class Exchange:
         # Rounding makes equal designs equal, so that their last bits do not decide.
         return np.asarray(points[int(np.round(self._loss(points), 9).argmin())])
 
-    def _rows(self, points: Array) -> Array:
-        columns = model_matrix(points, self.terms)
-        return np.concatenate(
-            [columns, np.broadcast_to(self.block_row, (*columns.shape[:-1], self.block_row.size))], axis=-1
-        )
-
     def _information(self, points: Array) -> Array:
-        rows = self._rows(points)
+        rows = model_matrix(points, self.terms)
         return np.asarray(self.fixed_information + np.swapaxes(rows, -1, -2) @ rows)
 
     def _loss(self, points: Array) -> Array:
@@ -165,7 +140,7 @@ class Exchange:
         run, factor = place
         trial = np.repeat(points[:, run, None], values.shape[-1], axis=1)
         trial[..., factor] = values
-        old, new = self._rows(points[:, run]), self._rows(trial)
+        old, new = model_matrix(points[:, run], self.terms), model_matrix(trial, self.terms)
         gain = self.gain(inverse, old, new)
         every = np.arange(len(points))
         best = np.round(gain, 9).argmax(axis=1)

@@ -202,14 +202,13 @@ def fit_emulator(
     start: Hyperparameters | None = None,
     search: bool = True,
     prior: tuple[float, float] = PRIOR,
-    trended: int | None = None,
 ) -> Emulator:
     """Fit an emulator to runs at points (n, k) with values (n,) and known variances (n,) of these.
 
     Points are in units in which the region has a size of about 1, as coded units or quantiles: the prior of the trend asks for
     that. ``trend``: "none" (about 0), "constant", "linear" or "quadratic". ``start``: hyperparameters of nearly the same runs, from
     which the search starts; without ``search`` they stay. ``prior``: mean and deviation of the logarithm of a length scale in
-    half ranges, of one input alone. ``trended``: the trend is in the first so many coordinates, in all by default.
+    half ranges, of one input alone.
 
     Raises MethodError for numbers that are not finite, variances below 0 or fewer than two runs.
     """
@@ -226,7 +225,7 @@ def fit_emulator(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; fix it"
         )
     middle = 0.0 if trend == "none" else float(responses.mean())
-    form = DEGREES[trend], places.shape[1] if trended is None else trended
+    form = DEGREES[trend], places.shape[1]
     hyperparameters, about = start, responses - middle
     if search or hyperparameters is None:
         rows = slice(None, None, -(-len(places) // MOST_SEARCHED))

@@ -65,7 +65,7 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     """
     from doe.report.identity import study_identity
     from doe.report.sections.design import design_record, design_tables
-    from doe.workflow.design import augment_notes, evaluation
+    from doe.workflow.design import evaluation
     from doe.workflow.problem import Problem
     from doe.workflow.region import region_that_runs
     from doe.workflow.whole import check_study
@@ -80,7 +80,6 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
                 study, notes = region_that_runs(study, store)
             check_study(study)
         points = study.design
-        notes += augment_notes(study)
         output.claim(path)
         record = design_record(study, points, evaluation(study, points)) | notes_record(notes)
         answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))

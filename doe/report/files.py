@@ -149,7 +149,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
-        "pick": study.by_factor(outcome.pick.point) | study.categories,
+        "pick": study.by_factor(outcome.pick.point),
         "operating_clearances_mm": outcome.clearances.operating,
         "clearance_class": outcome.clearances.class_sentence,
         "confirmation": confirmation_record(outcome),

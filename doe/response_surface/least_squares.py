@@ -12,7 +12,7 @@ and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964) 211-252.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import TypedDict, cast
@@ -140,7 +140,7 @@ class Data:
 
     ``points`` (n, k) are coded; ``values`` (n,). ``standard_errors`` (n,): None unless all are known. ``replicates`` (n,):
     number behind each standard error, 0 if unknown. ``block`` (n,): label of each run. ``centre``, ``step`` (k,): actual value
-    at coded 0 and change per coded unit. ``without``: indices of factors without terms.
+    at coded 0 and change per coded unit.
     """
 
     points: Array
@@ -150,13 +150,12 @@ class Data:
     block: Whole
     centre: Array
     step: Array
-    without: Collection[int] = ()
 
     def rows(self, rows: Rows) -> "Data":
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]
-        return Data(*per_run, self.centre, self.step, self.without)
+        return Data(*per_run, self.centre, self.step)
 
     @property
     def block_columns(self) -> Array:
@@ -176,7 +175,6 @@ def run_data(
     standard_errors: ArrayLike | None,
     replicates: ArrayLike | None,
     block: ArrayLike | None,
-    without: Collection[int] = (),
 ) -> Data:
     """Runs as arrays. Raises MethodError when shapes differ, a number is not finite, or all values are equal."""
     points, response = np.asarray(coded, float), np.asarray(values, float)
@@ -200,7 +198,6 @@ def run_data(
         block=_whole(block, len(points)),
         centre=np.array(np.broadcast_to(centre, points.shape[1]), float),
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
-        without=without,
     )
 
 

@@ -8,7 +8,7 @@ Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th 
 and Ankenman, Standard errors for the eigenvalues in second-order response surface models (1996).
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from string import ascii_uppercase
 from typing import Any, Literal, TypedDict
@@ -304,7 +304,6 @@ def fit(
     replicates: ArrayLike | None = None,
     block: ArrayLike | None = None,
     transform: Transform | None = None,
-    without: Collection[int] = (),
 ) -> Surface:
     """Fit one response by least squares.
 
@@ -320,14 +319,13 @@ def fit(
     replicates : number behind each standard error, shape (n,); 0 for errors taken as exact.
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
-    without : indices of factors that the surface does not depend on.
 
     Raises MethodError when shapes differ, a value is not finite, all values are equal, or the model is unknown. It also
     refuses runs that cannot determine the terms, and a transform of values that are not positive.
     """
     if model not in MODELS:
         raise MethodError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
-    data = run_data(name, coded, values, centre, step, standard_errors, replicates, block, without)
+    data = run_data(name, coded, values, centre, step, standard_errors, replicates, block)
     return _fit(name, data, model, "none" if transform is None else transform, advised=True)
 
 
@@ -337,7 +335,7 @@ def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
 
 
 def _fit(name: str, data: Data, model: Model, transform: Transform, advised: bool) -> Surface:
-    terms = model_terms(data.points.shape[1], model, data.without)
+    terms = model_terms(data.points.shape[1], model)
     check_size(name, model, terms, data.block)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):

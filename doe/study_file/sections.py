@@ -52,35 +52,6 @@ class Factor(Consistent):
         return 1.0 if self.whole else self.resolution
 
 
-class Category(Consistent):
-    """A factor without numbers, which only the adaptive search changes; each of its values has a whole design."""
-
-    name: Name
-    """Name of the factor in tables and messages."""
-    key: Annotated[str, Field(min_length=3)]
-    """Its key in the scene, such as cage.guidance."""
-    categories: Annotated[list[str | bool], Field(min_length=2, max_length=8)]
-    """Values of the key; the first is the baseline's."""
-    inactive: dict[str, list[str]] = {}
-    """By value, the names of factors without effect there, such as {roller = ["guide_clearance_mm"]}: their keys keep the
-    values of the scene."""
-
-    def inactive_at(self, place: int) -> list[str]:
-        """Names of the factors without effect at the value in this place."""
-        return self.inactive.get(_in_toml(self.categories[place]), [])
-
-    def faults(self) -> Iterator[str]:
-        values = [_in_toml(value) for value in self.categories]
-        unknown = [name for name in self.inactive if name not in values]
-        yield from (f"inactive.{name}: unknown category; write one of {', '.join(values)}" for name in unknown)
-        if len(self.categories) > len({*map(str, self.categories)}):
-            yield f"categories = {self.categories}: name each value once"
-
-
-def _in_toml(value: str | bool) -> str:
-    return value if isinstance(value, str) else str(value).lower()
-
-
 Kind = Literal[
     "central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol", "definitive_screening",
     "d_optimal", "i_optimal",
@@ -95,8 +66,8 @@ KEYS_OF = {
     "latin_hypercube": {"runs"},
     "sobol": {"runs"},
     "definitive_screening": set[str](),
-    "d_optimal": {"runs", "augment"},
-    "i_optimal": {"runs", "augment"},
+    "d_optimal": {"runs"},
+    "i_optimal": {"runs"},
 }
 # Runs at the centre by default.
 CENTRES = {"central_composite": 6, "box_behnken": 6, "definitive_screening": 1}
@@ -119,11 +90,7 @@ class Design(Consistent):
     levels: Annotated[int, Field(ge=2, le=100)] = 3
     """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
-    """Runs of a Latin hypercube or Sobol sequence. An optimal design needs it: its runs besides those of augment and at the
-    centre."""
-    augment: str | None = None
-    """Table of earlier runs, next to the study: an optimal design keeps them and adds its own, so that all together are
-    optimal. Runs of this study in standard order with this seed are not simulated again in its folder."""
+    """Runs of a Latin hypercube or Sobol sequence. An optimal design needs it: its runs besides those at the centre."""
     order: Literal["standard", "random"] = "standard"
     """Order of the runs. The seed of a run is seed plus its place in the standard order, in either order."""
     seed: Annotated[int, Field(ge=0)] = 1

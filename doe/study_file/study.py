@@ -7,18 +7,17 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.designs.remaining import Remaining
 from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
-from doe.study_file.sections import Adaptive, Category, Design, Factor, Front, Robust, StudyChain, Tolerances
+from doe.study_file.sections import Adaptive, Design, Factor, Front, Robust, StudyChain, Tolerances
 from doe.study_file.table import COUNT, LABELS, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
@@ -120,8 +119,6 @@ class StudyFile(Consistent):
     """Whether the shares of the duty may have any sum, such as hours: they are then divided by it."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """The factors."""
-    category: Annotated[list[Category], Field(max_length=3)] = []
-    """Factors without numbers; a [[factor]] with "categories" is one of these."""
     response: Annotated[list[Response], Field(min_length=1)]
     """The responses."""
     design: Design = Design()
@@ -145,31 +142,15 @@ class StudyFile(Consistent):
     reference: Reference | None = None
     """A published table of the same design to compare with."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _categories_apart(cls, data: Any) -> Any:
-        factors = data.get("factor") if isinstance(data, dict) else None
-        if not isinstance(factors, list):
-            return data
-        apart = [isinstance(table, dict) and "categories" in table for table in factors]
-        category_tables, factor_tables = (
-            [table for table, is_one in zip(factors, apart, strict=True) if is_one is side] for side in (True, False)
-        )
-        return (
-            {**data, "factor": factor_tables, "category": [*data.get("category", []), *category_tables]}
-            if category_tables
-            else data
-        )
-
     def faults(self) -> list[str]:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
-        keys = [factor.key for factor in self.factor if factor.key] + [category.key for category in self.category]
+        keys = [factor.key for factor in self.factor if factor.key]
         faults: list[str] = []
         if self.scene is not None:
             faults += [f"factor[{n}].key: missing; add it" for n, factor in enumerate(self.factor, 1) if not factor.key]
             faults += ["factor: simulations need two factors; add another"] * (len(names) == 1)
         for kind, names_of_kind in (
-            ("factor.name", [*names, *(category.name for category in self.category)]),
+            ("factor.name", names),
             ("factor.key", keys),
             ("response.name", responses),
             ("chain.name", [chain.name for chain in self.chain]),
@@ -186,12 +167,6 @@ class StudyFile(Consistent):
                 f"{kind}.name = {name!r}: is another column of a table of runs; rename it" for name in repeated_names
             ]
         choices = ", ".join(names)
-        faults += [
-            f"factor.inactive of {category.name} = {name!r}: no such factor; name one of {choices}"
-            for category in self.category
-            for name in dict.fromkeys(name for group in category.inactive.values() for name in group)
-            if name not in names
-        ]
         faults += [
             f"baseline.{key}: no such factor; name one of {choices}" for key in self.baseline if key not in names
         ]
@@ -255,8 +230,6 @@ class Study:
 
     path: Path
     file: StudyFile
-    levels: tuple[int, ...] = ()
-    """Places of the values of its categories; by default the first of each, which are those of the baseline."""
     remaining: Remaining | None = field(default=None, compare=False)
     """What remains of the region where runs failed; None while none has."""
     tables: dict[Path, dict[str, Any]] = field(default_factory=dict, compare=False, repr=False)
@@ -357,35 +330,6 @@ class Study:
     def actual(self, coded: Array) -> Array:
         """Factor values of coded points (..., k)."""
         return to_actual(coded, self.centre, self.step)
-
-    def with_levels(self, levels: tuple[int, ...]) -> Self:
-        """The study with its categories at these places."""
-        return replace(self, levels=levels)
-
-    @property
-    def every_level(self) -> list[tuple[int, ...]]:
-        """Places of all combinations of the categories' values."""
-        return list(product(*(range(len(category.categories)) for category in self.file.category)))
-
-    @property
-    def categories(self) -> dict[str, str]:
-        """Values of the categories by name."""
-        places = self.levels or self.every_level[0]
-        return {
-            category.name: str(category.categories[place])
-            for category, place in zip(self.file.category, places, strict=True)
-        }
-
-    @property
-    def inactive(self) -> tuple[int, ...]:
-        """Places of the factors without effect at the values of its categories."""
-        places = self.levels or self.every_level[0]
-        inactive_names = {
-            name
-            for category, level in zip(self.file.category, places, strict=True)
-            for name in category.inactive_at(level)
-        }
-        return tuple(place for place, name in enumerate(self.factors) if name in inactive_names)
 
     def by_factor(self, point: Array) -> dict[str, float]:
         """Values (k,) by name of the factor."""

@@ -4,9 +4,8 @@ Its front is compared with that on the surfaces on one scale. Factor by factor, 
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -28,10 +27,10 @@ from doe.threads import one_thread
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
 from doe.workflow.problem import Problem
-from doe.workflow.runs import Runs, runs_of
+from doe.workflow.runs import Runs
 from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError, MethodError, RunError, check_all, refuse
+from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -44,15 +43,12 @@ ABOUT, HALF_LEVEL = 6, 0.5
 class Adaptive:
     """The front of an adaptive search, its failed runs and its wall time [s].
 
-    ``edges`` (k, 2): ends of the finally searched region in factor units. ``study`` has the categories of the pick, and
-    ``runs`` are those of its design. ``front``: the finalists of ``search`` with these categories.
+    ``edges`` (k, 2): ends of the finally searched region in factor units. ``front``: the finalists of ``search``.
     """
 
     name: ClassVar[str] = "adaptive"
     search: AdaptiveFront
     front: SimulatedFront
-    study: Problem
-    runs: Runs
     edges: Array
     failures: tuple[Failure, ...]
     seconds: float
@@ -89,19 +85,12 @@ class Evaluator:
         self._progress(points * self.done + count, max(points * self._total, points * self.done + total))
 
 
-def check_adaptive(study: Problem, search: bool) -> None:
-    """Raises InputError if the ``search`` asked for is impossible, or if none is asked for and categories need one."""
-    if not search:
-        refuse(
-            f"{study.path}: factor.categories of {category.name}: only the adaptive search changes them; add --adaptive"
-            for category in study.file.category
-        )
-        return
+def check_adaptive(study: Problem) -> None:
+    """Raises InputError for an impossible search."""
     border_of(study)
-    every = study.every_level
-    check_all([partial(study.with_levels(levels).adaptive_scenes, study.baseline[None], [2], 0) for levels in every])
+    study.adaptive_scenes(study.baseline[None], [2], 0)
     try:
-        check_budget(plan_of(study), sum(len(study.with_levels(levels).design.coded) for levels in every))
+        check_budget(plan_of(study), len(study.design.coded))
     except MethodError as error:
         raise InputError([f"{study.path}: adaptive.{error}"]) from None
 
@@ -120,25 +109,21 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     Raises RunError if the runs of a stage fail, InputError for impossible settings or limits, KeyboardInterrupt.
     """
     plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
-    baseline_levels, *other_levels = study.every_level
-    other_runs = {levels: _design_at(study.with_levels(levels), simulations) for levels in other_levels}
-    runs_by_levels = {baseline_levels: runs, **other_runs}
-    first_runs = _design_runs(study, runs_by_levels, plan)
+    first_runs = _design_runs(study, runs, plan)
     evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
     region = region_in_units(study)
-    counts = len(region.levels)
-    step = np.append(study.reach * study.step, np.ones(counts))
-    with named_faults(study, goals, lambda point: point[: len(study.factors)], ""):
+    step = study.reach * study.step
+    with named_faults(study, goals, lambda point: point, ""):
         try:
             search = adaptive_front(
                 evaluator,
-                np.append(study.centre, np.zeros(counts)),
+                study.centre,
                 step,
                 region,
                 first_runs,
                 goals,
                 plan,
-                np.append(study.baseline, -np.ones(counts)),
+                study.baseline,
                 evaluator.report,
                 border_of(study),
             )
@@ -149,65 +134,28 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
                 causes = "; ".join(group["cause"] for group in grouped(evaluator.failures))
                 raise RunError(f"adaptive front: {error} ({causes})") from None
             raise InputError([f"{study.path}: adaptive.{error}"]) from None
-    ends = np.column_stack([search.region.low, search.region.high])[: len(study.factors)]
-    edges = study.centre[:, None] + step[: len(ends), None] * ends
-    levels = levels_at(study, search.front.points[search.front.pick])
-    study_of_pick = study.with_levels(levels)
-    front = replace(_at_levels(study, search.front, levels), searched=_samples_about_finalists(study, search, levels))
-    failures = *evaluator.failures, *(failure for design in other_runs.values() for failure in design.failures)
-    return Adaptive(
-        search, front, study_of_pick, runs_by_levels[levels], edges, failures, time.perf_counter() - start_s
-    )
+    ends = np.column_stack([search.region.low, search.region.high])
+    edges = study.centre[:, None] + step[:, None] * ends
+    front = replace(search.front, searched=_samples_about_finalists(study, search))
+    return Adaptive(search, front, edges, tuple(evaluator.failures), time.perf_counter() - start_s)
 
 
 def predicted_costs(study: Problem, adaptive: Adaptive, points: Array) -> Array:
-    """Costs (n, q) that the emulators predict at points (n, k) of the drawing, with the pick's categories."""
+    """Costs (n, q) that the emulators predict at points (n, k) of the drawing."""
     search = adaptive.search
-    categories = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
-    coded = np.hstack([study.coded(points) / study.reach, categories])
-    means, _ = search.emulators.predict(search.region.snap(coded))
+    means, _ = search.emulators.predict(search.region.snap(study.coded(points) / study.reach))
     return adaptive.front.goals.costs(means)
 
 
 def emulator_draws(study: Problem, adaptive: Adaptive, coded: Array, draws: int, random: np.random.Generator) -> Array:
-    """Responses (d, n, m) at coded points (n, k), with the pick's categories, of functions drawn from the emulators.
+    """Responses (d, n, m) at coded points (n, k), of functions drawn from the emulators.
 
     Their scatter about the means is stretched by the errors of the emulators at runs that were left out.
     """
     emulators = adaptive.search.emulators
-    categories = np.tile(_coded_levels(study, adaptive.study.levels), (len(coded), 1))
-    points = np.hstack([coded / study.reach, categories])
+    points = coded / study.reach
     means = emulators.predict(points)[0]
     return np.asarray(means + emulators.stretch * (emulators.draws(draws, random)(points) - means))
-
-
-def levels_at(study: Problem, point: Array) -> tuple[int, ...]:
-    """Places of the categories' values at a point (k + c,) of the search."""
-    counts = [len(category.categories) for category in study.file.category]
-    coded = point[len(study.factors) :].tolist()
-    return tuple(round(0.5 * (x + 1.0) * (count - 1)) for x, count in zip(coded, counts, strict=True))
-
-
-def _coded_levels(study: Problem, levels: tuple[int, ...]) -> list[float]:
-    counts = [len(category.categories) for category in study.file.category]
-    return [2.0 * place / (count - 1) - 1.0 for place, count in zip(levels, counts, strict=True)]
-
-
-def _design_at(study: Problem, simulations: Simulations) -> Runs:
-    words = ", ".join(study.categories.values())
-    ordered = study.plan
-    ordered = replace(ordered, labels=[f"{label} with {words}" for label in ordered.labels])
-    return runs_of(study, ordered, simulations, simulations.progress(f"design runs with {words}"))
-
-
-def _at_levels(study: Problem, front: SimulatedFront, levels: tuple[int, ...]) -> SimulatedFront:
-    """The points of a front with these levels of the categories, without the columns of the categories."""
-    rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
-    parts = ("points", "values", "standard_errors", "costs", "cost_errors", "freedom")
-    columns = {name: getattr(front, name)[rows] for name in parts}
-    columns["points"] = columns["points"][:, : len(study.factors)]
-    failures = front.failures[:, : len(study.factors)]
-    return replace(front, **columns, failures=failures, pick=int(np.flatnonzero(rows == front.pick)[0]))
 
 
 def region_in_units(study: Problem) -> Region:
@@ -215,16 +163,8 @@ def region_in_units(study: Problem) -> Region:
     half = study.reach * study.step
     finest = np.array([factor.finest or np.nan for factor in study.file.factor]) / half
     apart = np.where(np.isnan(finest), ALIKE, finest * (1.0 + 1e-9))
-    levels = tuple(len(category.categories) for category in study.file.category)
-    ones, between = np.ones(half.size + len(levels)), np.array([2.0 / (count - 1) for count in levels])
-    origin = np.append(-study.centre / half, -np.ones(len(levels)))
-    inactive = tuple(
-        (number, place, tuple(map(study.factors.index, names)))
-        for number, category in enumerate(study.file.category)
-        for place in range(len(category.categories))
-        if (names := category.inactive_at(place))
-    )
-    return Region(-ones, ones, origin, np.append(finest, between), np.append(apart, 0.5 * between), levels, inactive)
+    ones = np.ones(half.size)
+    return Region(-ones, ones, -study.centre / half, finest, apart)
 
 
 def border_of(study: Problem) -> Border | None:
@@ -247,8 +187,8 @@ def border_of(study: Problem) -> Border | None:
     def possible(corners: Array) -> bool:
         try:
             for corner in corners:
-                numbers = study.centre + reach * corner[: reach.size]
-                (run,) = study.with_levels(levels_at(study, corner)).adaptive_scenes(numbers[None], [2], 0)
+                numbers = study.centre + reach * corner
+                (run,) = study.adaptive_scenes(numbers[None], [2], 0)
                 least_mm = min(scene.mounted_clearance_mm for scene in scenes_of(run))
                 if 1e3 * least_mm < study.file.adaptive.least_clearance_um:
                     return False
@@ -257,8 +197,7 @@ def border_of(study: Problem) -> Border | None:
         return True
 
     low, high = (ends - study.centre[:, None]).T / reach
-    levels = np.ones(len(study.file.category))
-    return Border(np.append(low, -levels), np.append(high, levels), possible)
+    return Border(low, high, possible)
 
 
 def advice(study: Problem, surfaces: list[Surface]) -> list[str]:
@@ -290,31 +229,24 @@ class _PointEvaluator(Evaluator):
         # Points at the resolution of the drawing, whatever their last bits were.
         scenes = []
         for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):
-            rounded_point = self._study.rounded(point[: len(self._study.factors)])
-            study = self._study.with_levels(levels_at(self._study, point))
-            scenes += study.adaptive_scenes(rounded_point[None], [count], number)
+            scenes += self._study.adaptive_scenes(self._study.rounded(point)[None], [count], number)
         values, errors, samples = self.run(scenes, "adaptive run")
         return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
 
-def _design_runs(study: Problem, runs_by_levels: Mapping[tuple[int, ...], Runs], plan: Plan) -> SearchRuns:
-    """The runs of all designs as samples of the search."""
-    parts = []
-    for levels, runs in runs_by_levels.items():
-        number = independent_values(runs)
-        errors, count = standard_errors(runs.errors, number), len(runs.coded)
-        points = np.hstack([runs.coded / study.reach, np.tile(_coded_levels(study, levels), (count, 1))])
-        parts.append(SearchRuns(points, runs.values, errors, np.maximum(number - 1, 0), np.full(count, plan.usual)))
-    return reduce(SearchRuns.plus, parts)
+def _design_runs(study: Problem, runs: Runs, plan: Plan) -> SearchRuns:
+    """The runs of the design as samples of the search."""
+    number = independent_values(runs)
+    errors, replicates = standard_errors(runs.errors, number), np.full(len(runs.coded), plan.usual)
+    return SearchRuns(runs.coded / study.reach, runs.values, errors, np.maximum(number - 1, 0), replicates)
 
 
-def _samples_about_finalists(study: Problem, search: AdaptiveFront, levels: tuple[int, ...]) -> Samples:
+def _samples_about_finalists(study: Problem, search: AdaptiveFront) -> Samples:
     """Predictions of the emulators about the finalists, in factor units; slopes of the front are taken from them."""
-    reach, factors = study.reach, len(study.factors)
+    factors = len(study.factors)
     offsets = HALF_LEVEL * (2.0 * qmc.Sobol(factors, seed=search.front.seed).random_base2(ABOUT) - 1.0)
-    coded = (study.coded(search.front.points[:, :factors])[:, None] + offsets).reshape(-1, factors)
-    categories = np.tile(_coded_levels(study, levels), (len(coded), 1))
-    means, deviations = search.emulators.predict(np.hstack([coded / reach, categories]))
+    coded = (study.coded(search.front.points)[:, None] + offsets).reshape(-1, factors)
+    means, deviations = search.emulators.predict(coded / study.reach)
     return Samples(study.actual(coded), means, deviations)
 
 

@@ -140,7 +140,7 @@ class LostPickError(RunError):
 
 def simulate_original(study: Problem, simulations: Simulations) -> Confirmed:
     """The original design, simulated with fresh seeds. Raises RunError where it fails, InputError, KeyboardInterrupt."""
-    run = study.with_levels(()).confirmation_run(study.baseline)
+    run = study.confirmation_run(study.baseline)
     (result,) = simulations.run([run], ["baseline"], simulations.progress("baseline"))
     if isinstance(result, Failure):
         raise RunError(f"the original design cannot be simulated: {result}")

@@ -1,5 +1,6 @@
-"""The design of a study: its points, what its models need of them, and stated runs to which it adds."""
+"""The design of a study: its points, and what its models need of them."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
@@ -9,16 +10,12 @@ import numpy as np
 
 from doe import designs
 from doe.designs import Design
-from doe.designs.design import replicate_groups
 from doe.designs.model import Model, Terms, lost_terms, model_terms
 from doe.study_file import Study
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
-from doe.study_file.table import Table, read_table
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, refuse
-from rbdyn.base.notes import Notes
-from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
@@ -27,32 +24,25 @@ MAKERS: dict[str, Callable[..., Design]] = {
     **{kind: getattr(designs, kind) for kind in KEYS_OF if kind not in OPTIMAL},
 }
 SEEDED = {"latin_hypercube", "sobol", *OPTIMAL}
-# Steps from the centre within which all stated runs lie: those of the star points of a rotatable design in 8 factors.
-FARTHEST = 4.0
 # Most whole numbers of a factor from which an optimal design chooses; evenly spread if there are more.
 MOST_LEVELS = 41
 Values = tuple[float, ...]
 
 
 class OptimalBasis(NamedTuple):
-    """The basis of an optimal design beyond its settings: the terms, and coded levels of each factor (None: any value).
-
-    ``earlier_runs`` and ``block``: coded points and blocks of the runs that the design adds to.
-    """
+    """The basis of an optimal design beyond its settings: the terms, and coded levels of each factor (None: any value)."""
 
     terms: Terms
     levels: tuple[Values | None, ...]
-    earlier_runs: tuple[Values, ...]
-    block: tuple[int, ...]
 
 
 def terms_of(study: Study, model: Model) -> Terms:
-    """Terms of a model in the factors that are active at the study's categories."""
-    return model_terms(len(study.factors), model, study.inactive)
+    """Terms of a model in the factors of the study."""
+    return model_terms(len(study.factors), model)
 
 
 def design_of(study: Study) -> Design:
-    """The design in the order of its runs; whole numbers are rounded, and inactive factors are at their centre.
+    """The design in the order of its runs; whole numbers are rounded.
 
     Raises InputError for impossible settings.
     """
@@ -62,8 +52,7 @@ def design_of(study: Study) -> Design:
         design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), basis)
     except MethodError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
-    design = replace(design, coded=realised(study, design.coded, design.reach))
-    return _without_inactive(design, list(study.inactive)) if study.inactive else design
+    return replace(design, coded=realised(study, design.coded, design.reach))
 
 
 def realised(study: Study, coded: Array, reach: float) -> Array:
@@ -80,21 +69,12 @@ def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
     return nearest.clip(np.ceil(low - slack), np.floor(high + slack))
 
 
-def _without_inactive(design: Design, inactive: list[int]) -> Design:
-    """Runs with the inactive factors at their centre, without the repetitions that this makes."""
-    centred = design.coded.copy()
-    centred[:, inactive] = 0.0
-    rows = np.argsort((centred != design.coded).any(axis=1), kind="stable")
-    groups, earlier_groups = (replicate_groups(points[rows], design.block[rows]) for points in (centred, design.coded))
-    return replace(design, coded=centred).rows(np.sort(rows[earlier_groups == earlier_groups[groups]]))
-
-
 @cache
 def _design(text: str, factors: int, basis: OptimalBasis | None) -> Design:
     """The design of settings in JSON; cached, because several steps of a study ask for it and some designs are slow."""
     settings = DesignSettings.model_validate_json(text)
     seed, basis_keys = {"seed"} if settings.kind in SEEDED else set(), {} if basis is None else basis._asdict()
-    keys = settings.model_dump(include=(KEYS_OF[settings.kind] | seed) - {"augment"})
+    keys = settings.model_dump(include=KEYS_OF[settings.kind] | seed)
     design = MAKERS[settings.kind](factors, centre_replicates=settings.centres, **keys, **basis_keys)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
 
@@ -105,55 +85,15 @@ def all_terms(study: Study) -> Terms:
 
 
 def _optimal_basis(study: Study) -> OptimalBasis:
-    """The basis of an optimal design. Raises InputError for a table with impossible runs."""
-    terms = all_terms(study)
-    earlier_points, block = np.empty((0, 1)), np.empty(0, np.int64)
-    if (name := study.file.design.augment) is not None:
-        table = _table(study, name)
-        earlier_points, block = study.coded(table.actual), np.unique(table.block, return_inverse=True)[1]
-    reach = np.abs(earlier_points).max(initial=1.0)
     levels: list[Values | None] = []
-    for place, factor in enumerate(study.file.factor):
-        if place in study.inactive:
-            levels.append((0.0,))
-        elif factor.whole:
-            ends = factor.centre + reach * factor.step * np.array([-1.0, 1.0])
-            low, high = np.ceil(ends[0] - 1e-9), np.floor(ends[1] + 1e-9)
-            numbers = np.unique(np.rint(np.linspace(low, high, min(int(high - low) + 1, MOST_LEVELS))))
+    for factor in study.file.factor:
+        if factor.whole:
+            low, high = math.ceil(factor.centre - factor.step - 1e-9), math.floor(factor.centre + factor.step + 1e-9)
+            numbers = np.unique(np.rint(np.linspace(low, high, min(high - low + 1, MOST_LEVELS))))
             levels.append(tuple(((numbers - factor.centre) / factor.step).tolist()))
         else:
             levels.append(None)
-    return OptimalBasis(terms, tuple(levels), tuple(map(tuple, earlier_points.tolist())), tuple(block.tolist()))
-
-
-def _table(study: Study, name: str) -> Table:
-    """The table of stated runs. Raises InputError for a table that cannot be read or has impossible runs."""
-    where = f"{study.path}: design.augment = {name!r}"
-    try:
-        table = read_table(study.path_of(name), study.factors, [], study.path)
-    except InputError as error:
-        raise InputError([f"{where}: {fault}" for fault in error.faults]) from None
-    distance = np.abs(study.coded(table.actual))
-    refuse(
-        f"{where}: {study.factors[column]} in row {row + 1} = {table.actual[row, column]:g}: lies {distance[row, column]:.4g} "
-        f"steps from the centre, outside any region of a design (at most {FARTHEST:g}); check its unit, or widen step"
-        for row, column in np.argwhere(distance > FARTHEST).tolist()
-    )
-    refuse(
-        f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; fix the row"
-        for column, factor in enumerate(study.file.factor)
-        for row in np.flatnonzero(factor.whole & (table.actual[:, column] % 1.0 != 0.0)).tolist()
-    )
-    return table
-
-
-def actual_of(study: Study, design: Design) -> Array:
-    """Factor values (n, k) of the runs; those of stated runs are exact, because coding may change their last bits."""
-    actual, name = study.actual(design.coded), study.file.design.augment
-    if name is not None and not study.inactive:
-        rows = [row for row, kind in enumerate(design.kind) if kind == "given"]
-        actual[rows] = _table(study, name).actual[design.order[rows]]
-    return actual
+    return OptimalBasis(all_terms(study), tuple(levels))
 
 
 def check_runs(study: Study, design: Design) -> None:
@@ -207,9 +147,3 @@ def evaluation(study: Study, design: Design) -> dict[str, Any]:
     )
     figures = evaluate(design.coded, terms_of(study, model), design.block, region=design.region, reach=design.extent)
     return {"model": model, **figures}
-
-
-def augment_notes(study: Study) -> Notes:
-    """How the table of design.augment was read, where that is unusual. Raises InputError."""
-    name = study.file.design.augment
-    return () if name is None else read_sheet(study.path_of(name)).notes

@@ -162,7 +162,7 @@ def lives(
 
     names, life = [point.name for point in study.file.duty], {}
     for name, place in ends.items():
-        run = (study.with_levels(()) if name == "baseline" else study).confirmation_run(place)
+        run = study.confirmation_run(place)
         by_name = {**dict(zip(study.shares, scenes_of(run), strict=True)), **hot.get(name, {})}
         life[name] = roller_duty_life([by_name[point] for point in names], [study.shares[point] for point in names])
     return life

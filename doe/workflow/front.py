@@ -82,7 +82,6 @@ def find_front(
             # Before any point is simulated nothing is expected but the surfaces.
             errors = doubt.expected if simulated else doubt.at_share(SHARES[-1])
             pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
-    pareto = _with_inactive_at(study, study.centre, pareto)
     pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
     if box is None or pareto.violations is not None:
         return pareto
@@ -93,7 +92,7 @@ def find_front(
             )
         except InfeasibleError as error:
             return replace(pareto, tolerance_violations=error.violations)
-    return replace(pareto, tolerance_aware=_with_inactive_at(study, np.zeros_like(study.centre), aware))
+    return replace(pareto, tolerance_aware=aware)
 
 
 @one_thread
@@ -113,12 +112,6 @@ def with_survival(
         for point in (study.coded(pareto.points[pareto.pick]), aware.points[aware.pick])
     )
     return replace(pareto, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
-
-
-def _with_inactive_at(study: Problem, centre: Array, pareto: AnyFront) -> AnyFront:
-    """The same points with the inactive factors, whose values mean nothing, at a centre (k,)."""
-    inactive = np.isin(np.arange(centre.size), study.inactive)
-    return replace(pareto, points=np.where(inactive, centre, pareto.points)) if inactive.any() else pareto
 
 
 def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int) -> AnyFront:

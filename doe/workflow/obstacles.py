@@ -194,7 +194,7 @@ def _beyond(study: Problem, surfaces: Sequence[Surface], pick: Confirmed) -> Ite
     """The least moves of each factor at a bound, else of all of them together, that meet all limits."""
     ends = study.ends
     sides = sides_of(pick.point[None], ends)[0]
-    places = [place for place in np.flatnonzero(sides).tolist() if place not in study.inactive]
+    places = np.flatnonzero(sides).tolist()
     ways = [moved for place in places if (moved := _least_move(study, surfaces, pick, sides, [place])) is not None]
     if not ways and len(places) > 1:
         ways = [moved for moved in [_least_move(study, surfaces, pick, sides, places)] if moved is not None]

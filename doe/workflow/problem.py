@@ -13,7 +13,7 @@ from doe.clearance import ADAPTIVE_EXTENDED, ADAPTIVE_SEEDS, CONFIRMATION_SEEDS,
 from doe.designs import Design
 from doe.duty import Duty, DutyScenes, Run, main_scene, scenes_of
 from doe.study_file import Study
-from doe.workflow.design import actual_of, design_of
+from doe.workflow.design import design_of
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError, key_path, refuse
 from rbdyn.result import TEMPERATURES
@@ -40,7 +40,7 @@ class RunPlan:
 class Problem(Study):
     """A study with all that follows from it alone, computed when it is first asked for.
 
-    A scene is built once; a problem with another region or other levels shares the scenes of the one that it came from.
+    A scene is built once; a problem with another region shares the scenes of the one that it came from.
     """
 
     built: dict[tuple[Any, ...], Scene] = field(default_factory=dict, compare=False, repr=False)
@@ -90,8 +90,8 @@ class Problem(Study):
 
     @cached_property
     def rigid(self) -> Mask:
-        """Factors (k,) without a tolerance: whole numbers, and those that mean nothing at the study's categories."""
-        return np.array([factor.whole or place in self.inactive for place, factor in enumerate(self.file.factor)])
+        """Factors (k,) without a tolerance: whole numbers."""
+        return np.array([factor.whole for factor in self.file.factor])
 
     @cached_property
     def known_tolerances(self) -> dict[str, float]:
@@ -160,7 +160,7 @@ class Problem(Study):
     def scene_tables(self) -> dict[str, Any]:
         """Tables of the study's scene file. Raises InputError for a missing file, or a factor's key that no scene has."""
         path, data = self.path_of(self.scene.file), self.read(self.scene.file)
-        keys = (*(factor.key for factor in self.file.factor), *(category.key for category in self.file.category))
+        keys = [factor.key for factor in self.file.factor]
         left_out = [
             dotted
             for dotted in keys
@@ -199,23 +199,15 @@ class Problem(Study):
         """Every run of the design. Raises InputError for an impossible design, scene or response."""
         self.check_responses()
         design = self.design
-        actual = actual_of(self, design)
+        actual = self.actual(design.coded)
         scenes = self.design_scenes(actual, design.order.tolist())
         labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
         return RunPlan(design, actual, scenes, labels, [self.by_factor(point) for point in actual])
 
     def assignments(self, factors: Array) -> list[str]:
-        """Overrides "key=value" of the scene at factor values (k,) and at the study's categories, without inactive factors."""
+        """Overrides "key=value" of the scene at factor values (k,)."""
         numbers = zip(self.file.factor, map(float, factors), strict=True)
-        values, inactive = self.categories, [self.factors[place] for place in self.inactive]
-        return [
-            *(
-                f"{factor.key}={round(x) if factor.whole else x!r}"
-                for factor, x in numbers
-                if factor.name not in inactive
-            ),
-            *(f"{category.key}={values[category.name]}" for category in self.file.category),
-        ]
+        return [f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers]
 
     def scene_at(self, factors: Array, seed: int, overrides: Sequence[str] = (), kind: type[Scene] = Scene) -> Scene:
         """The scene at factor values (k,), with a seed and ``overrides`` after those of all runs, of this ``kind``.
@@ -269,10 +261,9 @@ class Problem(Study):
     @cached_property
     def baseline_scenes(self) -> dict[str, Scene]:
         """Scenes of the confirmation of the original design by point of the duty, if any response compares with them; else none."""
-        original = self.with_levels(())
         if self.duty is None or not self.duty.relative:
             return {}
-        run = self.over_duty(partial(original._confirmation_scene, original.baseline))
+        run = self.over_duty(partial(self._confirmation_scene, self.baseline))
         return dict(run.scenes) if isinstance(run, DutyScenes) else {}
 
     def design_scenes(self, points: Array, order: Sequence[int] | None = None) -> list[Run]:

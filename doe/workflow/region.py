@@ -21,7 +21,6 @@ from doe.clearance import Simulations, points_of
 from doe.running.runner import Progress
 from doe.running.store import Failure, Store
 from doe.study_file.sections import Factor
-from doe.workflow.design import actual_of
 from doe.workflow.problem import Problem
 from doe.workflow.runs import STORE
 from rbdyn.base.arrays import Array
@@ -176,7 +175,7 @@ def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Regio
     if not study.has_mounting:
         return Region(study)
     original, (heat, notes) = study, _heat(study, balance)
-    stays = study.file.reference is not None or study.file.design.augment is not None
+    stays = study.file.reference is not None
     hotter, moves, seen = dict[str, float](), dict[str, Taken](), set[tuple[float, ...]]()
     for _ in range(MOST_LOOKS):
         worst = _worst(study, heat, hotter)
@@ -291,17 +290,15 @@ def _running(study: Problem, point: Array, heat: Heat) -> Iterator[tuple[str, di
 
 
 def _worst(study: Problem, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
-    """The place that takes most of each clearance, by its key, over all points of the designs at all categories."""
+    """The place that takes most of each clearance, by its key, over all points of the design."""
     worst: dict[str, Taken] = {}
-    for levels in study.every_level:
-        variant = study.with_levels(levels)
-        points = np.unique(actual_of(variant, variant.design), axis=0)
-        for point in points[:: -(-len(points) // MOST_POINTS)]:
-            for name, clearances in _running(variant, point, heat):
-                for running in clearances.values():
-                    taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
-                    if running.key not in worst or taken.needed > worst[running.key].needed:
-                        worst[running.key] = taken
+    points = np.unique(study.actual(study.design.coded), axis=0)
+    for point in points[:: -(-len(points) // MOST_POINTS)]:
+        for name, clearances in _running(study, point, heat):
+            for running in clearances.values():
+                taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
+                if running.key not in worst or taken.needed > worst[running.key].needed:
+                    worst[running.key] = taken
     return worst
 
 
@@ -456,16 +453,16 @@ def _with_baseline(
     original: Problem, moved: Problem, balance: Balances, heat: dict[str, list[Temperatures]]
 ) -> tuple[Problem, list[Note]]:
     """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
-    first, point = original.with_levels(()), original.baseline
+    point = original.baseline
     seized = [
         (running, name)
-        for name, clearances in _running(first, point, heat)
+        for name, clearances in _running(original, point, heat)
         for running in clearances.values()
         if running.seizes
     ]
     if not seized:
-        ends = _endangered(first, point, heat)
-        found = _balanced(first, balance, point, list(ends), "the original design")
+        ends = _endangered(original, point, heat)
+        found = _balanced(original, balance, point, list(ends), "the original design")
         seized = [(ends[name], name) for name, outcome in found.items() if not isinstance(outcome, Temperatures)]
     baseline: dict[str, Any] = original.by_factor(point)
     notes = []

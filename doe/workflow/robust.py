@@ -205,7 +205,7 @@ def find_robust_front(
         note = "no point keeps the limits over the unknown inputs"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
     candidates = {"pick": (pick, "the pick"), **_choices(study, robust_front, emulators)}
-    designs = {"baseline": study.with_levels(()).assignments(study.baseline)}
+    designs = {"baseline": study.assignments(study.baseline)}
     designs |= {name: study.assignments(point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
@@ -422,7 +422,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     case, goals = case_of_study(study), study.goals
     joint, seed = case.joint(case.every), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
-    designs = {"baseline": study.with_levels(()).assignments(study.baseline), "pick": study.assignments(pick)}
+    designs = {"baseline": study.assignments(study.baseline), "pick": study.assignments(pick)}
     pairs, spent, failures = _pairs_in_rounds(study, case, quantiles, designs, simulations)
     gains, variances = pairs.gains(goals)
     # For the emulators, the effects of the other inputs are scatter.
@@ -505,7 +505,7 @@ def case_of_study(study: Problem) -> Case:
     data = deepcopy(study.scene_tables)
     for override in study.scene.set:
         set_key(data, override, f"{study.path}: scene.set")
-    keys = *(factor.key for factor in study.file.factor), *(category.key for category in study.file.category)
+    keys = [factor.key for factor in study.file.factor]
     duty = study.duty_with_groups
     fixed = dict.fromkeys([] if duty is None else duty.keys, "a key of the duty")
     fixed |= dict.fromkeys(keys, "a factor of the study")

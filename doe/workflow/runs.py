@@ -156,7 +156,6 @@ def _with_replacements(
         return None
     remaining = Remaining(design.coded[rows], design.coded[failed])
     places = lattice(len(study.factors), design.reach)
-    places[:, list(study.inactive)] = 0.0
     if design.region == "ball":
         places = places[np.linalg.norm(places, axis=1) <= design.extent + SAME_POINT]
     candidates = realised(study, places[remaining.excess(places) < -SAME_POINT], design.reach)

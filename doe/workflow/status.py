@@ -38,11 +38,7 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
 
     The most runs of a stage include the further points that a broken limit may need.
     """
-    works = {
-        key: work
-        for levels in (study.every_level if adaptive else [study.levels])
-        for key, work in design_works(study.with_levels(levels))
-    }
+    works = dict(design_works(study))
     confirmation = study.confirmation_run(study.baseline)
     stages = [
         _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),
@@ -54,8 +50,8 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
 
         usual = main_scene(study.design_scenes(study.baseline[None])[0]).numerics.replicates
         (search,) = study.adaptive_scenes(study.baseline[None], [usual], 0)
-        settings, design = study.file.adaptive, [study.with_levels(levels).design for levels in study.every_level]
-        runs = max(settings.budget - sum(len(levels.coded) for levels in design), 0)
+        settings = study.file.adaptive
+        runs = max(settings.budget - len(study.design.coded), 0)
         # The shortest search stops after one batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
         stages.append(_stage_of("adaptive front", runs, search, fewest=fewest))
@@ -116,10 +112,10 @@ def inputs_digest(study: Problem, adaptive: bool = False, robust: bool = False) 
 
 
 def named_files(study: Problem) -> list[Path]:
-    """Files that the study names: scene, chains, published table, runs to augment, samples of unknown inputs."""
+    """Files that the study names: scene, chains, published table, samples of unknown inputs."""
     names = [study.scene.file, *(chain.file for chain in study.file.chain)]
     names += [] if study.file.reference is None else [study.file.reference.file]
-    return [study.path_of(name) for name in (*names, study.file.design.augment, *_samples(study)) if name is not None]
+    return [study.path_of(name) for name in (*names, *_samples(study)) if name is not None]
 
 
 def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:

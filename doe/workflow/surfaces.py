@@ -42,7 +42,7 @@ def fit_surfaces(study: Problem, runs: Runs) -> list[Surface]:
     surfaces, faults = [], []
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
-    units: dict[str, Any] = {"centre": study.centre, "step": study.step, "without": study.inactive}
+    units: dict[str, Any] = {"centre": study.centre, "step": study.step}
     columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
     for response, values, error, samples in columns:
         settings = response.model_dump(include={"name", *Fitted.model_fields}) | units

@@ -40,7 +40,7 @@ from doe.workflow.confirmation import (
     whirl_sentence,
 )
 from doe.workflow.dangers import worse_notes
-from doe.workflow.design import augment_notes, check_runs
+from doe.workflow.design import check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.first_look import first_look
 from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
@@ -98,7 +98,7 @@ def operating_clearances(study: Problem, points: Mapping[str, Scene]) -> Operati
 
 def scenes_of(study: Problem, baseline: Array, pick: Array) -> dict[str, Scene]:
     """Scenes of the baseline and of the pick (k,), by name."""
-    return {"baseline": study.with_levels(()).confirmation_scene(baseline), "pick": study.confirmation_scene(pick)}
+    return {"baseline": study.confirmation_scene(baseline), "pick": study.confirmation_scene(pick)}
 
 
 def bore_of(scene: Scene) -> float | None:
@@ -168,11 +168,7 @@ def solve_chains(
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
     solved, notes = {}, list[Note]()
     for number, chain in enumerate(study.file.chain):
-        if (place := study.factors.index(chain.factor)) in study.inactive:
-            sentence = f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories"
-            notes.append(Note("chain", sentence))
-            continue
-        limit, half_width = half_widths[place], chain.half_width_mm
+        limit, half_width = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
         if half_width is not None and half_width > limit:
             sentence = (
                 f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
@@ -210,7 +206,7 @@ def check_study(study: Problem, adaptive: bool = False, robust: bool = False) ->
             lambda: check_runs(study, study.plan.design),
             lambda: study.confirmation_scene(study.baseline),
             lambda: check_chains(study),
-            lambda: check_adaptive(study, adaptive),
+            lambda: check_adaptive(study) if adaptive else None,
             lambda: check_robust(study) if robust else None,
         )
     )
@@ -277,11 +273,11 @@ class StudyResult:
     @cached_property
     def clearances_at_points(self) -> dict[str, OperatingClearances]:
         """The same at each point of the duty, whose temperatures and speeds differ; empty without a duty."""
-        ends = {"baseline": (self.study.with_levels(()), self.baseline), "pick": (self.study, self.pick)}
-        runs = {name: study.confirmation_run(end.point) for name, (study, end) in ends.items()}
+        ends = {"baseline": self.baseline, "pick": self.pick}
+        runs = {name: self.study.confirmation_run(end.point) for name, end in ends.items()}
         return {
             point: operating_clearances(
-                self.study, {name: ends[name][1].hot.get(point, scene_at(run, point)) for name, run in runs.items()}
+                self.study, {name: ends[name].hot.get(point, scene_at(run, point)) for name, run in runs.items()}
             )
             for point in self.study.shares
         }
@@ -312,11 +308,7 @@ class StudyResult:
         for chain in self.study.file.chain:
             place = self.study.factors.index(chain.factor)
             widest = 0.0 if self.tolerances is None else self.tolerances.half_widths[place]
-            if (
-                chain.name not in self.chains
-                and place not in self.study.inactive
-                and (chain.half_width_mm or widest > 0.0)
-            ):
+            if chain.name not in self.chains and (chain.half_width_mm or widest > 0.0):
                 missed[chain.name] = "no parts close it, as the notes say"
         return missed
 
@@ -407,8 +399,6 @@ def run_study(
         study, turns = with_remaining(study, runs), runs.turns
         surfaces, surface_front = _surfaces_and_front(study, runs, clock)
         searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
-        if searched is not None:
-            study, runs, surfaces, surface_front = _with_its_categories(searched, runs, surfaces, surface_front)
         selection = choose(study, surfaces, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
         edge = _edge(study, surfaces, selection, searched, simulations)
@@ -419,7 +409,7 @@ def run_study(
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
-    notes += [*moves, *unsearched, *augment_notes(study), *(reference.notes if reference else ())]
+    notes += [*moves, *unsearched, *(reference.notes if reference else ())]
     return StudyResult(
         study=study,
         inputs=inputs,
@@ -473,16 +463,6 @@ def _searched(
         return None, [Note("advice", sentence)]
     finally:
         clock.lap("adaptive_s")
-
-
-def _with_its_categories(
-    searched: Adaptive, runs: Runs, surfaces: list[Surface], surface_front: ParetoFront
-) -> tuple[Problem, Runs, list[Surface], ParetoFront]:
-    """Study, runs, surfaces and front with the categories of the search's pick."""
-    if searched.runs is not runs:
-        surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
-        surface_front = find_front(searched.study, surfaces)
-    return with_remaining(searched.study, searched.runs), searched.runs, surfaces, surface_front
 
 
 def _edge(

@@ -38,15 +38,6 @@ def dtlz2(points):
     return radius[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
 
 
-def two_spheres(points):
-    """Three costs of five numbers and a category of two levels, -1 and 1, each with an eighth of a sphere as DTLZ2 has it: the
-    second is flatter, and lies where the last three numbers are lower."""
-    other = points[:, -1] > 0.0
-    x = (points[:, :-1] + 1.0) / 2.0
-    at = np.hstack([points[:, :2], 2.0 * x[:, 2:] - np.where(other, 0.6, 1.2)[:, None]])
-    return dtlz2(at) * np.where(other[:, None], [0.8, 1.1, 1.1], [1.0, 1.0, 1.0])
-
-
 def true_front(problem, count):
     """So many points spread over the front."""
     if problem is zdt1:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +16,6 @@ from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.page import html_report
 from doe.report.sections.search import emulators_record
-from doe.study_file.sections import Category
 from doe.workflow.problem import Problem
 
 
@@ -28,94 +26,69 @@ def browser(tmp_path_factory):
         yield both
 
 
-def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dict[str, Any], Emulators]:
-    """The record as after a search whose region has grown at the end of the last factor, and its emulators; the second factor
-    means nothing at the second of the levels."""
+def with_emulators(record: dict[str, Any]) -> tuple[dict[str, Any], Emulators]:
+    """The record as after a search whose region has grown at the end of the last factor, and its emulators."""
     random = np.random.default_rng(3)
-    numbers = random.uniform(-1.0, 1.0, (24, 3))
-    kinds = np.where(random.uniform(size=24) < 0.5, -1.0, 1.0)
+    points = random.uniform(-1.0, 1.0, (24, 3))
     values = np.column_stack(
         [
-            5.0 * numbers[:, 0] ** 2 + 3.0 * np.sin(4.0 * numbers[:, 1]) + kinds,
-            0.4 + 0.1 * numbers[:, 2] * numbers[:, 0],
-            240.0 - 9.0 * numbers[:, 1] + 4.0 * np.cos(3.0 * numbers[:, 2] + kinds),
+            5.0 * np.sin(3.0 * np.log1p(0.42 * points[:, 0]) / 0.42) + points[:, 1],
+            0.4 + 0.1 * points[:, 2] * points[:, 0],
+            240.0 - 9.0 * points[:, 1] + 4.0 * np.cos(3.0 * points[:, 2]),
         ]
     )
-    points = np.column_stack([numbers, kinds]) if levels else numbers
     whole, errors = np.full((24, 3), 7), 0.02 * np.abs(values) * random.uniform(0.5, 1.0, (24, 3))
-    runs = Runs(points, values, errors, whole, np.full(24, 8))
-    category, idle = [], ()
-    if levels:
-        named = {"categories": list(levels), "inactive": {levels[1]: [FACTORS[1]]}}
-        category, idle = [Category(name="guidance", key="cage.guidance", **named)], ((0, 1, (1,)),)
-    shares = (0.42, 0.0, 0.28)
-    emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, (len(levels),) if levels else (), idle, shares)
+    runs, shares = Runs(points, values, errors, whole, np.full(24, 8)), (0.42, 0.0, 0.28)
+    emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, shares)
     assert shares in emulators.shares and () in emulators.shares
     study = Problem.load(EXAMPLES / "clearance_study.toml")
-    study = replace(study, file=study.file.model_copy(update={"category": category}))
-    found = SimpleNamespace(
-        search=SimpleNamespace(emulators=emulators), study=SimpleNamespace(levels=(1,) * len(category))
-    )
+    found = SimpleNamespace(search=SimpleNamespace(emulators=emulators))
     region = {each["name"]: [each["low"], each["high"]] for each in record["asked"]["factors"]}
     region[FACTORS[2]][1] += 0.1
     return record | {"adaptive": {"emulators": emulators_record(study, found), "region": region}}, emulators
 
 
-@pytest.mark.parametrize("levels", [(), ("outer", "inner")])
-def test_oracle_scripts_evaluate_emulators_as_python_does(browser, levels):
+def test_oracle_scripts_evaluate_emulators_as_python_does(browser):
     """Oracle: means and deviations of `doe.adaptive.emulators` at points in and beyond the runs, in all responses."""
     driver, folder = browser
-    record, emulators = with_emulators(summary(), levels)
+    record, emulators = with_emulators(summary())
     (folder / "emulated.html").write_text(html_report(record), encoding="utf-8")
     page = opened(browser, name="emulated.html")
     points = np.random.default_rng(4).uniform(-1.3, 1.3, (40, 3))
-    points[:10] = emulators.runs.points[:10, :3]
+    points[:10] = emulators.runs.points[:10]
     half = record["adaptive"]["emulators"]["half_range"]
-    kinds = np.arange(len(points)) % 2
-    asked = np.column_stack([points, 2.0 * kinds - 1.0]) if levels else points
     found = page.execute_script(
         """const all = page.data.emulators;
-        return Object.values(all.responses).map(one => arguments[0].map((factors, i) => {
-          const point = emulator.point(all, factors, [arguments[1][i]]);
+        return Object.values(all.responses).map(one => arguments[0].map(factors => {
+          const point = emulator.point(all, factors);
           return [emulator.mean(all, one, point), emulator.deviation(all, one, point)];
         }));""",
         (CENTRE + half * points).tolist(),
-        kinds.tolist(),
     )
     scale = 1e-8 * np.ptp(emulators.runs.values, axis=0)
-    for column, each in enumerate(emulators.predict(asked)):
+    for column, each in enumerate(emulators.predict(points)):
         off = np.abs(np.array(found)[:, :, column].T - each)
         assert (off < scale).all(), off.max(axis=0)
     assert driver.get_log("browser") == []
 
 
 def test_the_widget_switches_between_polynomial_and_emulator(browser):
-    """Same colours for both, a level of a category to choose, the emulator's deviation read out, nothing of it without a search."""
+    """Same colours for both, the emulator's deviation read out, nothing of it without a search."""
     from selenium.webdriver.support.ui import Select
 
     driver, folder = browser
-    record, emulators = with_emulators(summary(), ("outer", "inner"))
+    record, emulators = with_emulators(summary())
     (folder / "switched.html").write_text(html_report(record), encoding="utf-8")
     page = opened(browser, name="switched.html")
     page.find_element("id", "surface_pick").click()
     chosen = np.array(list(record["front"]["pick"]["factors"].values()))
     coded = (chosen - CENTRE) / record["adaptive"]["emulators"]["half_range"]
-    told = {}
-    for level, name in ((1.0, "inner"), (-1.0, "outer")):
-        (kinds,) = (each for each in page.find_elements("css selector", "#surface select") if "outer" in each.text)
-        Select(kinds).select_by_visible_text(name)
-        (mean, *_), (deviation, *_) = (part[0] for part in emulators.predict(np.array([[*coded, level]])))
-        told[name] = text_of(page, "surface_read")
-        value, spread = re.match(
-            r"impact force (\S+) N by the emulator, standard deviation (\S+) N; ", told[name]
-        ).groups()
-        assert float(value) == pytest.approx(mean, abs=deviation) and float(spread) == pytest.approx(
-            deviation, rel=0.06
-        )
-        assert f"guidance {name}" in told[name]
+    (mean, *_), (deviation, *_) = (part[0] for part in emulators.predict(coded[None]))
+    told = text_of(page, "surface_read")
+    value, spread = re.match(r"impact force (\S+) N by the emulator, standard deviation (\S+) N; ", told).groups()
+    assert float(value) == pytest.approx(mean, abs=deviation) and float(spread) == pytest.approx(deviation, rel=0.06)
     polynomial = predicted(RESPONSES[0], [(x - c) / s for x, c, s in zip(chosen, CENTRE, STEP, strict=True)])
-    assert f"; {polynomial:.2f} ± " in told["inner"] and " N by the polynomial; at radial" in told["inner"]
-    assert "not known to the polynomial" in told["outer"], "it was fitted to runs with the categories of the pick"
+    assert f"; {polynomial:.2f} ± " in told and " N by the polynomial; at radial" in told
     page.find_element("id", "surface_pick").click()
     maps = []
     for by in ("polynomial", "emulator"):

@@ -62,7 +62,6 @@ KEYS = [
     "calibrate.seed", "operation.schedule", "operation.schedule.shape", "bearing.outer_waviness", "materials.cage.density_kg_m3",
     "bearing.kind", "bearing.radial_clearance_mm", "traction.constants", "format", "cage.mass_g\n", "a" * 3000, "support.stiffness_N_m",
 ]  # fmt: skip
-CATEGORY = {"name": "guidance", "key": "cage.guidance", "categories": ["outer", "inner"]}
 
 
 def law_of(draw: random.Random, key: str) -> dict[str, Any]:
@@ -148,8 +147,6 @@ def spoilt(draw: random.Random, table: dict[str, Any]) -> dict[str, Any]:
 def study_with(draw: random.Random, folder: Path, table: dict[str, Any]) -> tuple[Case, list[str]]:
     """The case of the example study with the table, and a design of it as assignments."""
     data = read_toml(STUDY)
-    if draw.random() < 0.3:
-        data["factor"] = [*data["factor"], CATEGORY]
     if draw.random() < 0.3:
         data["scene"] = {**data["scene"], "set": draw.sample(SETS, 2)}
     study = Problem(

@@ -289,37 +289,6 @@ def test_what_limits_the_pick_is_stated(border, limited_by):
     assert (face.side, face.limited_by) == (1, limited_by) and face.better > 0.9
 
 
-def two_kinds(points):
-    """Bowls, which the second of three kinds lowers and the third turns."""
-    kind = np.rint(points[:, 2]).astype(int)
-    costs = bowls(points[:, :2])
-    return np.where((kind == 0)[:, None], costs - 0.3, np.where((kind == 1)[:, None], costs[:, ::-1] + 0.2, costs))
-
-
-def test_the_right_category_is_found_and_no_other_is_asked_often():
-    evaluate = noisy(two_kinds, 1, 0.01)
-    apart = np.array([0.01, 0.01, 0.5])
-    region = Region(-np.ones(3), np.ones(3), np.array([0.0, 0.0, -1.0]), np.array([np.nan, np.nan, 1.0]), apart, (3,))
-    numbers, ones = first_runs(evaluate, 3, 24, 1).points[:, :2], np.ones(24, dtype=np.int64)
-    points = np.column_stack([numbers, np.repeat([-1.0, 0.0, 1.0], 8)])
-    design, zero = Runs(points, *evaluate(points, ones), ones), np.zeros(3)
-    plan = Plan(60, least=1, most=1, usual=1)
-    found = adaptive_front(evaluate, zero, np.ones(3), region, design, TWO, plan, zero)
-    assert set(np.unique(found.front.searched.points[:, 2])) == {-1.0, 0.0, 1.0}
-    assert set(found.front.points[:, 2]) == {0.0}
-    assert (found.front.searched.points[24:, 2] == 0.0).mean() > 0.7
-    line = bowls(found.front.points[:, :2])
-    assert np.sqrt(line).sum(axis=1) == pytest.approx(np.full(len(line), np.sqrt(2.0)), rel=0.03)
-
-
-def test_levels_of_a_category_have_coordinates_of_their_own():
-    """Interpreted: equal levels are as near as the numbers say, others farther, by no order of the levels."""
-    points = np.array([[0.3, -1.0, 1.0], [0.3, 0.0, 1.0], [0.3, 1.0, -1.0]])
-    at = coordinates(points, (3, 2))
-    assert at.tolist() == [[0.3, 1, 0, 0, 0, 1], [0.3, 0, 1, 0, 0, 1], [0.3, 0, 0, 1, 1, 0]]
-    assert coordinates(points, ()) is points
-
-
 def test_factors_that_are_never_near_zero_may_be_emulated_by_their_logarithms():
     """Shares of 4/10: from 6 to 14; the second passes zero, and the ends of the third are more than ten times apart."""
     centre, step, one = np.array([10.0, 1.0, 5.0, 0.0]), np.array([4.0, 3.0, 4.9, 1.0]), np.ones(4)
@@ -327,7 +296,7 @@ def test_factors_that_are_never_near_zero_may_be_emulated_by_their_logarithms():
     assert shares == (0.4, 0.0, 0.0, 0.0)
     assert shares_of(-centre, step, -one, one) == (-0.4, 0.0, 0.0, 0.0)
     points = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 4))
-    at = coordinates(points, (), shares)
+    at = coordinates(points, shares)
     assert at[:, 0] == pytest.approx(np.log((10.0 + 4.0 * points[:, 0]) / 10.0) / 0.4)
     assert np.array_equal(at[:, 1:], points[:, 1:])
 

@@ -94,10 +94,8 @@ def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach
         ("levels = 4", 3, ["design.levels: kind = 'central_composite' has no"]),
         ('kind = "sobol"\nalpha = 1.5', 3, ["design.alpha: kind = 'sobol' has no such key"]),
         ('kind = "definitive_screening"\nruns = 5', 3, ["design.runs: kind = 'definitive_screening' has no such key"]),
-        ('kind = "sobol"\naugment = "a.csv"', 3, ["design.augment: kind = 'sobol' has no such key"]),
         ('kind = "d_optimal"', 3, ["design.runs: missing; kind = 'd_optimal' needs the number of runs to make"]),
         ('kind = "i_optimal"\nruns = 9', 3, ["design.runs = 9: too few for a model of 10 terms; give at least 11"]),
-        ('kind = "d_optimal"\nruns = 9\naugment = "a.csv"', 3, ["design.augment = 'a.csv'", "a.csv: no such file; check"]),
         ('kind = "full_factorial"\nlevels = 30', 4, ["design.levels = 30: 4 factors give 810000 runs"]),
     ],
 )  # fmt: skip

@@ -19,7 +19,6 @@ from doe.designs import central_composite
 from doe.designs.model import lost_terms, model_terms
 from doe.designs.remaining import Remaining, added_points
 from doe.running.store import Failure
-from doe.workflow.design import actual_of
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
 from doe.workflow.region import moved_region, region_in_store, region_that_runs
@@ -215,7 +214,7 @@ def test_unit_impossible_regions_are_refused_in_a_sentence(tmp_path):
 
 
 def test_unit_a_table_of_earlier_runs_keeps_its_region(tmp_path):
-    """Unit: runs to augment keep their points; what they come near to is a danger."""
+    """Unit: published runs keep their points; what they come near to is a danger."""
     shutil.copy(EXAMPLES / "ccd_table4.csv", tmp_path)
     study = hot_study(
         tmp_path, centre=0.22, step=0.06, tables='[reference]\nfile = "ccd_table4.csv"\nlabel = "published"\n'
@@ -233,7 +232,7 @@ def test_unit_every_corner_at_every_point_of_the_duty_is_looked_at(tmp_path):
     study = hot_study(tmp_path, tables=duty)
     moved, (note,) = moved_region(study, unheated)
     assert ": at take-off heat takes " in note
-    for run in moved.design_scenes(actual_of(moved, moved.design)):
+    for run in moved.design_scenes(moved.actual(moved.design.coded)):
         for scene in run.scenes.values():
             assert all(
                 clear.play.operating > clear.floor for clear in scene.running_clearances(scene.mounting).values()

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import sqlite3
-from dataclasses import replace
 
-import instant_runs
 import numpy as np
 import pytest
 from coarse_search import coarsely
@@ -186,7 +184,7 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
     with pytest.raises(
         InputError, match=r"factor.allowed of pocket_clearance_mm = \[0.25, 0.4\]: must reach over the region"
     ):
-        check_adaptive(Problem.load(narrow), True)
+        check_adaptive(Problem.load(narrow))
 
 
 RADIAL = """name = "radial_clearance_mm"
@@ -201,16 +199,11 @@ key = "bearing.rollers"
 centre = 10
 step = 1
 whole = true
-
-[[factor]]
-name = "guidance"
-key = "cage.guidance"
-categories = ["outer", "inner"]
 """
 
 
-def with_kinds(folder, *more):
-    """Whole rollers and a guidance in the place of the radial clearance."""
+def with_rollers(folder, *more):
+    """Whole rollers in the place of the radial clearance."""
     path = written(
         folder,
         (RADIAL, ROLLERS),
@@ -225,53 +218,27 @@ def with_kinds(folder, *more):
     return path
 
 
-def guided(monkeypatch):
-    """Runs in no time, whose impact is half under guidance by the inner ring, and the less the more rollers."""
+def test_whole_numbers_end_to_end(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
-    plain = instant_runs.instant_result
-
-    def result(scene):
-        found = plain(scene)
-        share = (0.5 if scene.cage.guidance == "inner" else 1.0) * (1.2 - 0.02 * scene.bearing.rollers)
-        return replace(found, impact_force_N=replace(found.impact_force_N, value=share * found.impact_force_N.value))
-
-    monkeypatch.setattr(instant_runs, "instant_result", result)
-
-
-def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
-    guided(monkeypatch)
     unillustrated(monkeypatch.setattr)
-    study = Problem.load(with_kinds(tmp_path))
+    study = Problem.load(with_rollers(tmp_path))
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
-    assert outcome.study.categories == {"guidance": "inner"}
     assert float(outcome.pick.point[0]).is_integer()
-    assert outcome.pick.values[0] < 0.6 * outcome.baseline.values[0], "the baseline is guided by the outer ring"
     assert all(float(point[0]).is_integer() for point in outcome.runs.actual)
     record = write(outcome, tmp_path)
-    assert record["pick"]["guidance"] == "inner"
-    assert {each["factors"]["guidance"] for each in record["adaptive"]["front"]} == {"inner"}
-    assert "guidance = inner (baseline: outer): by simulation" in record["adaptive"]["sentence"]
-    assert record["adaptive"]["history"][0]["runs"] == 40, "a design at each of the two"
     assert all(float(each["factors"]["rollers"]).is_integer() for each in record["adaptive"]["points"])
-    with (tmp_path / "front.csv").open(encoding="utf-8") as file:
-        assert {row["guidance"] for row in csv.DictReader(file)} == {"inner"}
-    words = r"factor.categories of guidance: only the adaptive search changes them; add --adaptive"
-    with pytest.raises(InputError, match=words):
-        check_adaptive(study, False)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('["outer", "inner"]', '["outer", "upper"]', "cage.guidance = 'upper'"),
-        ('["outer", "inner"]', '["outer", "outer"]', "categories = .*: name each value once"),
         ("whole = true", "whole = true\nresolution = 1.0", "resolution = 1: whole = true has none but 1"),
         ("step = 1\n", "step = 0.5\n", "step = 0.5: is less than a whole number; widen it"),
     ],
 )
-def test_faults_of_categories_and_whole_numbers(tmp_path, old, new, words):
+def test_faults_of_whole_numbers(tmp_path, old, new, words):
     with pytest.raises(InputError, match=words) as error:
-        check_adaptive(Problem.load(with_kinds(tmp_path, (old, new))), True)
+        Problem.load(with_rollers(tmp_path, (old, new)))
     assert len(error.value.faults) == 1
 
 

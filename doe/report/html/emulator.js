@@ -1,22 +1,16 @@
 "use strict";
 // An emulator of the simulator, a trend and a process with the runs of a search behind it: mean and standard deviation of a
-// response without its scatter, at factors that are -1 to 1 in the region of the design and levels of the categories.
+// response without its scatter, at factors that are -1 to 1 in the region of the design.
 const emulator = (() => {
   const factorizations = new Map(), transformed_runs = new Map();
 
-  // A point as the emulators use it: a coordinate for each factor, 0 where that has no meaning, and one for each level.
-  const idle = (all, k, kinds) => all.categories.some((category, c) => category.inactive[kinds[c]].includes(k));
-  const embedded = (all, coded, kinds) =>
-    [...coded.map((x, k) => idle(all, k, kinds) ? 0 : x), ...all.categories.flatMap((category, c) => category.levels.map((_, level) => level === kinds[c] ? 1 : 0))];
-
-  const point = (all, factors, kinds) =>
-    embedded(all, factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]), kinds);
+  const point = (all, factors) => factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]);
 
   // A point as one emulator uses it: factors with a share by their logarithms.
   const transformed = (one, scaled) => scaled.map((x, k) => one.shares[k] ? Math.log1p(one.shares[k] * x) / one.shares[k] : x);
 
   function runs(all, one) {
-    if (!transformed_runs.has(one)) transformed_runs.set(one, all.points.map((run, i) => transformed(one, embedded(all, run, all.kinds[i]))));
+    if (!transformed_runs.has(one)) transformed_runs.set(one, all.points.map(run => transformed(one, run)));
     return transformed_runs.get(one);
   }
 

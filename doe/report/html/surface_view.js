@@ -4,7 +4,6 @@
 (() => {
   const {data, by} = page, STEPS = 41, TURN = 0.08, searched = data.emulators;
   const ends = data.factors.map((each, k) => searched ? searched.region[k] : [each.low, each.high]);
-  const kinds = searched ? searched.categories.map(each => each.pick) : [], choices = [];
   let emulated = Boolean(searched);
   const view = {azimuth: 0.9, elevation: 0.5};
   const at = data.factors.map(each => each.centre);
@@ -18,21 +17,21 @@
   const shapes = {baseline: "square", pick: "star"};
   const along = (k, share) => ends[k][0] + (ends[k][1] - ends[k][0]) * share;
 
-  // The polynomial is known in the region of the design and with the categories of the pick, the emulator all over.
+  // The polynomial is known in the region of the design, the emulator all over.
   function polynomial(one, place) {
-    const out = searched && (searched.categories.some((each, c) => each.pick !== kinds[c])
-      || data.factors.some((each, k) => place[k] < each.low - 1e-6 * each.step || place[k] > each.high + 1e-6 * each.step));
+    const out = searched
+      && data.factors.some((each, k) => place[k] < each.low - 1e-6 * each.step || place[k] > each.high + 1e-6 * each.step);
     return out ? NaN : model.value(one, coded(place));
   }
   const by_emulator = (one, place, what = emulator.mean) =>
-    what(searched, searched.responses[one.name], emulator.point(searched, place, kinds));
+    what(searched, searched.responses[one.name], emulator.point(searched, place));
 
   // Runs behind the surface that is shown: those of the design, or all of the search too.
   function runs(one) {
-    if (!emulated) return data.runs.map(run => ({factors: run.factors, value: run.values[one.name], alike: true}));
+    if (!emulated) return data.runs.map(run => ({factors: run.factors, value: run.values[one.name]}));
     return searched.points.map((point, i) => ({
       factors: searched.centre.map((centre, k) => centre + searched.half_range[k] * point[k]),
-      value: searched.responses[one.name].values[i], alike: searched.kinds[i].every((kind, c) => kind === kinds[c])}));
+      value: searched.responses[one.name].values[i]}));
   }
 
   function scene() {
@@ -50,7 +49,7 @@
     const here = factors => factors.every((value, k) => k === x || k === y || near(value, at[k], k));
     const on = factors => height(one, at.map((value, k) => k === x || k === y ? factors[k] : value));
     const points = runs(one).filter(run => run.value !== null && !run.factors.includes(null)).map(run => (
-      {x: run.factors[x], y: run.factors[y], z: run.value, here: run.alike && here(run.factors), surface: on(run.factors)}));
+      {x: run.factors[x], y: run.factors[y], z: run.value, here: here(run.factors), surface: on(run.factors)}));
     const marks = Object.entries(data.marks).map(([name, factors]) => (
       {x: factors[x], y: factors[y], shape: shapes[name], here: here(factors), surface: on(factors)}));
     const run_values = searched ? searched.responses[one.name].values : points.map(each => each.z);
@@ -82,7 +81,6 @@
       const known = Number.isFinite(polynomial(one, place)) ? `${height} by the polynomial` : "not known to the polynomial";
       const [value, deviation] = page.rounded(by_emulator(one, place), by_emulator(one, place, emulator.deviation));
       height = `${value}${unit} by the emulator, standard deviation ${deviation}${unit}; ${known};`;
-      searched.categories.forEach((each, c) => where.push(`${each.name} ${each.levels[kinds[c]]}`));
     }
     by("surface_read").textContent = `${one.words} ${height} at ${where.join(", ")}`;
   }
@@ -124,8 +122,6 @@
 
   function go_to(name) {
     data.marks[name].forEach((value, k) => { at[k] = value; marker[k] = value; });
-    // The first level of a category is the baseline's.
-    choices.forEach((select, c) => { select.value = kinds[c] = name === "pick" ? searched.categories[c].pick : 0; });
     sliders();
     draw();
   }
@@ -192,7 +188,6 @@
   }
   if (searched) {
     choice("Surface by", ["polynomial", "emulator"], 1, chosen => { emulated = chosen === 1; }).id = "surface_by";
-    searched.categories.forEach((each, c) => choices.push(choice(each.name, each.levels, each.pick, level => { kinds[c] = level; })));
     by("surface_help").textContent += " The polynomial knows the runs of the design, the emulator those of the search too; one scale colours both.";
   }
   sliders();

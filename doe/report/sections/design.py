@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from doe.designs import Design
 from doe.report.sections.record import Record, factors
 from doe.report.still import GUIDE, Point, Still
-from doe.workflow.design import actual_of
 from doe.workflow.problem import Problem
 from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.records import quoted_cell
@@ -130,7 +129,7 @@ def _variance(across: str, curves: Mapping[str, Sequence[Point]], axis: "Axes") 
 
 def runs_record(study: Problem, design: Design) -> list[dict[str, Any]]:
     """Runs in their order, from 1."""
-    actual = actual_of(study, design)
+    actual = study.actual(design.coded)
     rows = zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True)
     return [
         {

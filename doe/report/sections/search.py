@@ -16,7 +16,7 @@ from doe.pareto.front import DRAWS, noisy_hypervolume
 from doe.report.sections.answer import point_record
 from doe.report.sections.record import Record, factors, part
 from doe.report.still import COLOURS, SMALL, Still, name_marks
-from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, levels_at, near_limits, pulls
+from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
 from doe.workflow.problem import Problem
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array, Rows
@@ -186,11 +186,7 @@ def search_sentences(outcome: StudyResult) -> list[str]:
 
 
 def _answer(outcome: StudyResult) -> str:
-    study, before = outcome.study, outcome.study.with_levels(()).categories
-    point = zip(study.factors, outcome.pick.point.tolist(), strict=True)
-    places = [_place(*value) for place, value in enumerate(point) if place not in study.inactive]
-    places += [f"{name} = {kind} (baseline: {before[name]})" for name, kind in study.categories.items()]
-    places += [f"no {study.factors[place]}, which has no meaning there" for place in study.inactive]
+    places = [_place(*value) for value in outcome.study.by_factor(outcome.pick.point).items()]
     gains = [f"{gain.response} {improvement(gain.percent, None, gain.goal)}" for gain in outcome.gains["pick"]]
     return f"The pick has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
 
@@ -376,13 +372,9 @@ def _actual(study: Problem, factor: int, coded: float) -> float:
     return float(study.centre[factor] + study.reach[factor] * study.step[factor] * coded)
 
 
-def _factors(study: Problem, point: Array, rounded: bool = True) -> dict[str, Any]:
-    """Numbers of a point (k + c,) of the search, rounded as on the drawing unless stated otherwise, and its categories, by name."""
-    numbers = point[: len(study.factors)]
-    return (
-        study.by_factor(study.rounded(numbers) if rounded else numbers)
-        | study.with_levels(levels_at(study, point)).categories
-    )
+def _factors(study: Problem, point: Array, rounded: bool = True) -> dict[str, float]:
+    """Factors of a point (k,) of the search by name, rounded as on the drawing unless stated otherwise."""
+    return study.by_factor(study.rounded(point) if rounded else point)
 
 
 def archive_table(study: Problem, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:
@@ -400,19 +392,15 @@ def archive_table(study: Problem, adaptive: Adaptive, rows: Rows | slice = slice
 def emulators_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     """Emulators of every response for the scripts of the page: mean and standard deviation without scatter, anywhere.
 
-    The coordinates of a point are x = (factor - ``centre``) / ``half_range``. Each level of the ``categories`` is a coordinate of
-    its own, 1 for the level of the point and 0 for the others; ``pick``: place of the level of the pick. ``inactive`` lists by
-    level the places of factors that are at 0 there. ``points`` (n, k) are the runs' factors, ``kinds`` (n, c) the places of their
-    levels. A response with ``shares`` s of factors uses ln(1 + s x)/s of these.
+    The coordinates of a point are x = (factor - ``centre``) / ``half_range``; ``points`` (n, k) are those of the runs. A response
+    with ``shares`` s of factors uses ln(1 + s x)/s of these.
 
     A response is a trend of ``terms`` with ``coefficients``, A being the first factor, plus a process: the covariances of the point
     with the runs times ``weights`` (n,). They are Matern of smoothness 5/2, with ``lengths`` by coordinate and ``variance``. The
     runs' ``values`` (n,) have the variances ``noise`` (n,), the coefficients the prior variances ``coefficient_variances``. The
     deviation is that of the posterior times ``stretch``, and ``least`` at least.
     """
-    emulators, numbers = adaptive.search.emulators, len(study.factors)
-    runs = emulators.runs.points
-    categories = zip(study.file.category, adaptive.study.levels, strict=True)
+    emulators = adaptive.search.emulators
     responses = {}
     each_one = zip(study.responses, emulators.by_response, emulators.stretch.tolist(), emulators.shares, strict=True)
     for name, one, stretch, shares in each_one:
@@ -433,19 +421,6 @@ def emulators_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     return {
         "centre": study.centre.tolist(),
         "half_range": (study.reach * study.step).tolist(),
-        "categories": [
-            {
-                "name": category.name,
-                "levels": list(category.categories),
-                "pick": place,
-                "inactive": [
-                    [*map(study.factors.index, category.inactive_at(level))]
-                    for level in range(len(category.categories))
-                ],
-            }
-            for category, place in categories
-        ],
-        "points": runs[:, :numbers].tolist(),
-        "kinds": [levels_at(study, point) for point in runs],
+        "points": emulators.runs.points.tolist(),
         "responses": responses,
     }
