@@ -1,7 +1,8 @@
 """Numbers that must not change by accident: short motions, equilibria, surfaces and chains, kept with their platform.
 
-``python tests/golden/regenerate.py`` writes ``golden.json`` anew. That is right only where a law or a default was changed
-on purpose; the difference of the file says how far the numbers moved.
+``python tests/golden/regenerate.py numbers`` writes ``golden.json`` anew, ``... regenerate.py simulate fit`` the outputs of
+these cases, ``... regenerate.py`` everything. That is right only where a law, a default, a key or a sentence was changed on
+purpose; the difference of the files says how far the numbers moved and what else changed.
 """
 
 from __future__ import annotations
@@ -106,6 +107,22 @@ def computed(case: str) -> list[float]:
 
 if __name__ == "__main__":
     sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent), str(HERE.parent / "helpers")]
-    cases = {case: computed(case) for case in CASES}
-    FILE.write_text(json.dumps({"platform": this_platform(), "cases": cases}, indent=0) + "\n", encoding="utf-8")
-    print(f"{FILE.name}: {sum(map(len, cases.values()))} numbers of {len(cases)} cases")
+    import outputs
+
+    asked = sys.argv[1:] or ["numbers", *outputs.OUTPUTS]
+    if unknown := set(asked) - {"numbers", *outputs.OUTPUTS}:
+        sys.exit(f"{', '.join(sorted(unknown))}: no case; choose numbers or {' or '.join(outputs.OUTPUTS)}")
+    if "numbers" in asked:
+        cases = {case: computed(case) for case in CASES}
+        FILE.write_text(json.dumps({"platform": this_platform(), "cases": cases}, indent=0) + "\n", encoding="utf-8")
+        print(f"{FILE.name}: {sum(map(len, cases.values()))} numbers of {len(cases)} cases")
+    place = outputs.FOLDER / "platform.json"
+    if set(asked) >= set(outputs.OUTPUTS):
+        outputs.FOLDER.mkdir(exist_ok=True)
+        place.write_text(json.dumps(this_platform(), indent=1) + "\n", encoding="utf-8")
+    elif set(asked) != {"numbers"} and json.loads(place.read_text("utf-8")) != this_platform():
+        sys.exit("outputs were kept on another platform; write all of them anew")
+    for case in asked:
+        if case != "numbers":
+            outputs.keep(case)
+            print(f"outputs/{case}")
