@@ -52,8 +52,10 @@ cruise,0.7,24000,1300
 """
 LONG, SHOWN = 6, 2  # lists and tables of more entries than LONG show SHOWN at either end
 DATE = re.compile(r"\b20\d\d-\d\d-\d\d\b(?:[T ]\d\d:\d\d(?::\d\d)?)?")
-NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-MASKED = ("versions", "machine", "inputs_sha256", "code", "sha256")
+NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")  # as text, whatever its sign
+DIGEST = re.compile(r"\b(?=[a-f]*\d)[0-9a-f]{12,64}\b")
+DURATION = re.compile(r"\btook [\d.]+ (s|min|h)\b")
+MASKED = ("versions", "machine", "seconds")
 
 
 class Output(NamedTuple):
@@ -63,6 +65,7 @@ class Output(NamedTuple):
     files: Callable[[Path], Any] = lambda folder: None
     settings: tuple[tuple[str, Any], ...] = ()
     slow: bool = False
+    steady: bool = False  # other bits of a sum change no word
 
 
 def study(folder: Path, addition: str = "") -> None:
@@ -100,11 +103,11 @@ OUTPUTS = {
     "simulate_duty": Output(("rbdyn", "simulate", ROLLER, "--duty", "duty.csv", *SHORT), duty),
     "map": Output(("rbdyn", "map", ROLLER, "--speed", "15000,24000", "--load", "500", *SHORT)),
     "accuracy": Output(("rbdyn", "accuracy", ROLLER, *SHORT), settings=BRIEF_ACCURACY),
-    "ball": Output(("rbdyn", "ball", "angular_contact_ball.toml")),
-    "design": Output(("doe", "design", "study.toml"), study),
-    "fit": Output(("doe", "fit", *TABLE, "--verbose"), study),
+    "ball": Output(("rbdyn", "ball", "angular_contact_ball.toml"), steady=True),
+    "design": Output(("doe", "design", "study.toml"), study, steady=True),
+    "fit": Output(("doe", "fit", *TABLE, "--verbose"), study, steady=True),
     "front": Output(("doe", "front", *TABLE), study),
-    "chain": Output(("doe", "chain", "bearing_chains.toml")),
+    "chain": Output(("doe", "chain", "bearing_chains.toml"), steady=True),
     "study": Output(("doe", "study", "study.toml", "--verbose"), study),
     "uncertainty": Output(("doe", "uncertainty", ROLLER, "--points", "16", "--target", "50%"), unknown, BRIEF_DECISION),
     "calibrate": Output(("doe", "calibrate", ROLLER, "--data", "rig.csv"), unknown, slow=True),
@@ -168,13 +171,18 @@ def handed_out(case: str) -> dict[str, str]:
 
 
 def words_of(text: str) -> str:
-    """Text without dates, versions, the name of the processor and spaces at the ends of lines."""
+    """Text without dates, durations, digests, versions, the name of the processor and spaces at the ends of lines."""
     from rbdyn.accuracy.report import processor
     from rbdyn.result import versions
 
     for version in (processor(), *versions().values()):
         text = text.replace(str(version), "*")
-    return "\n".join(line.rstrip() for line in DATE.sub("DATE", text).splitlines()) + "\n"
+    return "\n".join(line.rstrip() for line in masked(text).splitlines()) + "\n"
+
+
+def masked(text: str) -> str:
+    """Text without what differs from run to run."""
+    return DIGEST.sub("DIGEST", DURATION.sub("took TIME", DATE.sub("DATE", text)))
 
 
 def digest_of(value: str) -> str:
@@ -193,7 +201,7 @@ def shortened(value: Any, key: str = "") -> Any:
         if len(rows) > LONG:
             rows[SHOWN:-SHOWN] = [f"{len(rows)} entries, digest {digest_of(json.dumps(rows))}"]
         return rows
-    return DATE.sub("DATE", value) if isinstance(value, str) else value
+    return masked(value) if isinstance(value, str) else value
 
 
 def lines_of(record: Any) -> str:
@@ -254,17 +262,18 @@ def keep(case: str) -> None:
         (place / name).write_text(text, "utf-8")
 
 
-def keys_of(value: Any, path: str = "") -> set[str]:
-    """Paths of all keys within a record, entries of a list as one."""
-    if isinstance(value, dict):
-        return {path}.union(*(keys_of(each, f"{path}.{key}") for key, each in value.items()))
-    return {path}.union(*(keys_of(each, f"{path}[]") for each in value)) if isinstance(value, list) else {path}
+def keys_of(value: Any, depth: int, path: str = "") -> set[str]:
+    """Paths of the keys within a record down to a depth."""
+    if not isinstance(value, dict) or not depth:
+        return {path}
+    return {path}.union(*(keys_of(each, depth - 1, f"{path}.{key}") for key, each in value.items()))
 
 
-def form_of(name: str, text: str) -> Any:
-    """What of a file another platform must share: keys of a record, header of a table, words of a text."""
+def form_of(case: str, name: str, text: str) -> Any:
+    """What of a file another platform must share, where motions part: upper keys of a record, header of a table; the words of
+    a text that depends on no motion and no search."""
     if name == "record.json":
-        return keys_of(json.loads(text))
+        return keys_of(json.loads(text), 1 + OUTPUTS[case].steady)
     if name.endswith(".csv"):
         return next(csv.reader(io.StringIO(text)))
-    return NUMBER.sub("#", text).split()
+    return NUMBER.sub("#", text).split() if OUTPUTS[case].steady or name == "files.txt" else None

@@ -1,4 +1,4 @@
-"""What the commands hand out on small runs, against what is kept: to the letter on its platform, elsewhere keys and words."""
+"""What the commands hand out on small runs, against what is kept: to the letter on its platform, elsewhere keys, headers and words."""
 
 import json
 
@@ -25,4 +25,4 @@ def test_golden_outputs(case):
         if alike:
             assert text.splitlines() == before[name].splitlines(), f"{case}/{name}"
         else:
-            assert form_of(name, text) == form_of(name, before[name]), f"{case}/{name}"
+            assert form_of(case, name, text) == form_of(case, name, before[name]), f"{case}/{name}"
