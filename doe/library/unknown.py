@@ -17,6 +17,7 @@ from rbdyn.base.words import counted, quantity, shown
 
 if TYPE_CHECKING:
     from doe.workflow.uncertainty import Uncertainty
+    from rbdyn.base.table import Sheet
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -34,38 +35,22 @@ class UncertaintyAnswer(Answer):
         return uncertainty_blocks(self.uncertainty)
 
     def rows(self) -> Mapping[str, Rows]:
-        outputs, sets = self.record["responses"], self.uncertainty.sets
-        return {
-            "ranges": [
-                {
-                    "output": name,
-                    "nominal": output["value"],
-                    **{key: output["input"][key] for key in ("low", "median", "high")},
-                    **{f"variance_{cause}": share for cause, share in output["variance"].items()},
-                }
-                for name, output in outputs.items()
-            ],
-            "shares": [
-                {"output": name, "input": key, "share": share, "low": low, "high": high}
-                for name, output in outputs.items()
-                for key, (share, low, high) in (output["shapley"] or output["total"] or {}).items()
-            ],
-            "inputs": [
-                {"input": entry["key"], **entry["law"], "source": entry["reason"]} for entry in self.record["inputs"]
-            ],
-            "sets": [
-                {**values, **dict(zip(outputs, figures, strict=True))}
-                for values, figures in zip(sets.inputs, sets.outputs.tolist(), strict=True)
-            ],
+        from doe.report.sections.unknown import input_sheet, range_sheet, set_rows, share_sheet
+
+        outputs = self.uncertainty.responses.values()
+        sheets: dict[str, Sheet[Any]] = {
+            "ranges": range_sheet(outputs),
+            "shares": share_sheet(outputs),
+            "inputs": input_sheet(self.uncertainty.inputs),
         }
+        return {name: sheet.records for name, sheet in sheets.items()} | {"sets": set_rows(self.uncertainty)}
 
     def brief(self) -> str:
         ranges = []
-        for name, output in self.record["responses"].items():
+        for name, output in self.uncertainty.responses.items():
             words, unit = quantity(name)
-            ends = output["input"]
-            ranges.append(f"{words} {shown(ends['low'], 3)} to {shown(ends['high'], 3)} {unit}".rstrip())
-        return f"{', '.join(ranges)} in 90 % of the cases; {counted(self.record['runs'], 'input set')}"
+            ranges.append(f"{words} {shown(output.input.low, 3)} to {shown(output.input.high, 3)} {unit}".rstrip())
+        return f"{', '.join(ranges)} in 90 % of the cases; {counted(self.uncertainty.runs, 'input set')}"
 
 
 def uncertainty(
@@ -96,7 +81,7 @@ def uncertainty(
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
     from doe.report.identity import scene_identity
-    from doe.report.sections.unknown import uncertainty_record, write_uncertainty
+    from doe.report.sections.unknown import write_uncertainty
     from doe.running.runner import ANSWER
     from doe.workflow.status import content_digest, runs_digest
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
@@ -120,7 +105,7 @@ def uncertainty(
                 result = find_uncertainty(path, assignments, simulations, points, accuracy, outputs)
             agenda.enter(ANSWER)
             identity = scene_identity("doe uncertainty", path, assignments)
-            answer = UncertaintyAnswer(uncertainty_record(result), folder, (), identity=identity, uncertainty=result)
+            answer = UncertaintyAnswer(result.as_dict(), folder, (), identity=identity, uncertainty=result)
             files = write_with_report(output, identity, answer.blocks, partial(write_uncertainty, result))
             agenda.finish(files)
     return replace(answer, files=tuple(files))

@@ -17,7 +17,7 @@ from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_record, fit_tables
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import notes_of, readable
-from doe.report.sections.robust import robust_tables
+from doe.report.sections.robust import decider_sheet, robust_input_sheet
 from doe.report.sections.search import (
     adaptive_record,
     archive_table,
@@ -26,7 +26,6 @@ from doe.report.sections.search import (
     limiting_sentence,
     search_sentences,
 )
-from doe.report.sections.unknown import robust_record
 from doe.report.summary import restored
 from doe.running.store import grouped
 from doe.workflow.adaptive import Adaptive
@@ -72,7 +71,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.duty is not None:
         tables["duty_points.csv"] = duty_rows(restored(record))
     if outcome.robust is not None:
-        tables |= robust_tables(record["robust"])
+        tables |= {
+            sheet.file: sheet.records for sheet in (robust_input_sheet(outcome.robust), decider_sheet(outcome.robust))
+        }
     if outcome.reference_values is not None:
         tables["beside_reference.csv"] = _reference_table(outcome)
     for name, rows in tables.items():
@@ -84,7 +85,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     plots.pareto_front(outcome, folder / "pareto_front.png")
     if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
         pictures.append("robust_front.png")
-        plots.robust_front(outcome.robust.responses, outcome.robust.front, folder / pictures[-1])
+        plots.robust_front(outcome.robust.front, folder / pictures[-1])
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
         plots.adaptive_search(restored(record), folder / pictures[-1])
@@ -181,7 +182,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     if outcome.searched_pick is not None:
         record["adaptive"]["chosen"] = _chosen_record(outcome.searched_pick)
     if outcome.robust is not None:
-        record["robust"] = robust_record(outcome.robust, study.factors)
+        record["robust"] = outcome.robust.as_dict()
     if outcome.tolerances is not None:
         record["tolerances"] = outcome.tolerances.as_dict()
         record["tolerances_gains"] = outcome.tolerances.gains_record()

@@ -18,8 +18,8 @@ from doe.report.sections.record import Record
 from doe.report.sections.search import search_stills
 from doe.response_surface import Surface
 from doe.workflow.asked import Asked
+from doe.workflow.judgement import RobustFront
 from doe.workflow.problem import Problem
-from doe.workflow.robust import RobustFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 
@@ -112,14 +112,15 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
         axis.set_ylabel(asked.responses[j].label)
 
 
-def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
+def robust_front(front: RobustFront, path: Path) -> None:
     """Every pair of gains that hold over the unknown inputs: predicted along the front, and simulated."""
+    responses = list(front.q2)
     for axis, (i, j) in _pairs(drawn_pairs(["min"] * len(responses)), path):
-        gains = 100.0 * front.gains
-        axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="predicted by emulators")
-        for (name, point), marker in zip(front.confirmed.items(), "*o^v", strict=False):
-            x, y = 100.0 * point.gains[[i, j]]
-            words = f"{name}, simulated: better in all in {100.0 * point.better.all.value:.0f} %"
+        across, up = ([100.0 * point.gains[responses[place]] for point in front.points] for place in (i, j))
+        axis.plot(across, up, ".", color="tab:blue", markersize=4, label="predicted by emulators")
+        for point, marker in zip(front.confirmed, "*o^v", strict=False):
+            x, y = (100.0 * point.gains[responses[place]] for place in (i, j))
+            words = f"{point.name}, simulated: better in all in {100.0 * point.better.all.value:.0f} %"
             color = "tab:red" if marker == "*" else "black"
             axis.plot(x, y, marker, mfc="none", color=color, markersize=9, label=words)
         axis.axhline(0.0, color="tab:gray", linewidth=1.0)

@@ -6,6 +6,7 @@ from typing import Any
 
 from doe.report.sections.record import drop_undefined
 from doe.workflow.asked import Settings
+from doe.workflow.judgement import Robust
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
@@ -50,7 +51,7 @@ class Summary(Record, kw_only=True):
     seeds: dict[str, int]
     duty: Any = None
     adaptive: Any = None
-    robust: Any = None
+    robust: Robust | None = None
     tolerances: Any = None
     tolerances_gains: Any = None
     tolerances_sentence: str | None = None

@@ -44,6 +44,7 @@ from doe.emulator import Emulator, fit_emulator, leave_one_out
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import Record, keyed
 
 # Points of true values for a row and at most, steps of their weights and earlier ones, and the cases that an interval holds.
 POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER, CONFIDENCE = 4, 1024, 100, 25, 0.95
@@ -53,23 +54,22 @@ LEAST_NOISE = 1e-9  # standard deviation over the size of the values; smaller no
 Hits = Callable[[Array], NDArray[np.bool_]]  # from points (k, m) to whether each hits (k, q)
 
 
-@dataclass(frozen=True)
-class Better:
-    """Probability that each gain is positive, and that all are, with 95 % intervals."""
+class Better(Record):
+    """Probability that each gain is positive, by its name, and that all are, with 95 % intervals."""
 
-    gains: list[Share]
+    gains: dict[str, Share] = keyed("better")
     all: Share
 
 
 @one_thread
-def better(gains: Array, variances: Array, seed: int) -> Better:
+def better(names: Sequence[str], gains: Array, variances: Array, seed: int) -> Better:
     """Probabilities that the true gains (n, m) are positive, from simulated gains and their smoothed variances (n, m).
 
     Raw variances of few replicates scatter, and the distribution would follow the noise of a row that seems sure by chance."""
     *alone, every = _likely_shares(
         gains, variances, lambda points: np.column_stack([points > 0.0, (points > 0.0).all(axis=1)]), seed
     )
-    return Better(alone, every)
+    return Better(dict(zip(names, alone, strict=True)), every)
 
 
 def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> list[Share]:

@@ -37,6 +37,7 @@ from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.threads import one_thread
 from doe.unknown.inputs import Joint, nested, strongest
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.records import Record
 
 # An emulator is trusted that predicts this share of what noise leaves to predict.
 TRUSTED = 0.8
@@ -50,6 +51,12 @@ class Share(NamedTuple):
     value: float
     low: float
     high: float
+
+    @property
+    def of_hundred(self) -> str:
+        """'87 (80 to 92)': in how many of 100 cases, with the ends of the interval."""
+        value, low, high = (100.0 * number for number in self)
+        return f"{value:.0f} ({low:.0f} to {high:.0f})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +121,13 @@ def residual_variance(emulator: Emulator) -> float:
     return max(float((missed**2).mean() - emulator.variances.mean()), 0.0)
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Range of an output over its inputs.
-
-    low, median, high, errors : 5 %, 50 % and 95 % quantiles and their standard errors
-    variance : shares of the variance of single runs by cause
-    hidden : whether simulation noise exceeds the effect of the inputs
-    by_emulator, q2, ceiling : whether the emulator is trusted, its predicted share of variance, and the most possible
-    """
+class Range(Record):
+    """5 %, 50 % and 95 % quantiles of an output over its inputs, and the standard errors of these."""
 
     low: float
     median: float
     high: float
     errors: tuple[float, ...]
-    variance: dict[str, float]
-    hidden: bool
-    by_emulator: bool
-    q2: float
-    ceiling: float
 
     @property
     def relative_error(self) -> float:
@@ -164,19 +159,20 @@ def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), lo
     return Emulated(emulator, columns, logarithmic, float((smooth * unit).mean()), emulator.q2(), ceiling)
 
 
+def variance_by_cause(runs: Runs, fitted: Emulated) -> dict[str, float]:
+    """Shares of the variance of single runs by "simulation", "numerical" and "inputs"; 0 of the last where noise exceeds it."""
+    inputs = max(float(runs.values.var(ddof=1)) - fitted.noise - runs.numerical, 0.0)
+    variances = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": inputs}
+    whole = sum(variances.values()) or 1.0
+    return {cause: variance / whole for cause, variance in variances.items()}
+
+
 @one_thread
-def spread_of(runs: Runs, fitted: Emulated, fresh: Array, seed: int) -> Spread:
+def range_of(fitted: Emulated, fresh: Array, seed: int) -> Range:
     """Range of an output; ``fresh``: quantiles (m, d) of many input sets of the same distribution as those of the runs."""
-    random = np.random.default_rng(seed)
-    whole = float(runs.values.var(ddof=1))
-    inputs = max(whole - fitted.noise - runs.numerical, 0.0)
-    shares = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": inputs}
-    total = sum(shares.values()) or 1.0
-    shares = {name: value / total for name, value in shares.items()}
-    ends, errors = _quantiles(fitted, fresh, random)
-    by_emulator = fitted.trusted, fitted.q2, fitted.ceiling
+    ends, errors = _quantiles(fitted, fresh, np.random.default_rng(seed))
     low, median, high = ends.tolist()
-    return Spread(low, median, high, tuple(errors.tolist()), shares, inputs == 0.0, *by_emulator)
+    return Range(low, median, high, tuple(errors.tolist()))
 
 
 def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ until the further runs that the study allows are spent. The robust front holds p
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -20,7 +20,7 @@ from doe.running.runner import Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
-from doe.unknown.decision import Better, Decides, InputWorth, Interval, Verdict, better, decides, in_doubt, odds, shrunk
+from doe.unknown.decision import Decides, InputWorth, better, decides, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
 from doe.unknown.propagation import Emulated, Runs, Share, emulated
 from doe.workflow.input_sets import (
@@ -35,11 +35,11 @@ from doe.workflow.input_sets import (
     strongest_inputs,
     work_of_set,
 )
+from doe.workflow.judgement import Decider, Decision, FrontPoint, Pair, Robust, RobustFront, RobustPoint, worded
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import refuse, set_key
-from rbdyn.base.notes import Notes
-from rbdyn.scene.unknown import Input, is_number
+from rbdyn.scene.unknown import Input, UnknownInput, is_number
 
 
 @dataclass(frozen=True)
@@ -150,33 +150,6 @@ SEARCHED, CONFIRMED, POINTS = 128, 128, 3
 POPULATION, GENERATIONS = 60, 40
 
 
-@dataclass(frozen=True, eq=False)
-class RobustPoint:
-    """A design simulated over the unknown inputs: its point (k,) and the reason for its choice.
-
-    ``better``: how likely it gains; ``gains`` (q,): mean or quantile of its gains over the inputs.
-    """
-
-    point: Array
-    reason: str
-    better: Better
-    gains: Array
-
-
-@dataclass(frozen=True, eq=False)
-class RobustFront:
-    """Points (f, k) and their predicted gains (f, q); ``confirmed`` points by name, the plain pick first.
-
-    ``q2``: predictivity of the emulator of each gain. ``note``: why there is no front; empty if there is one.
-    """
-
-    points: Array
-    gains: Array
-    confirmed: Mapping[str, RobustPoint]
-    q2: list[float]
-    note: str = ""
-
-
 def find_robust_front(
     study: Problem, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
 ) -> tuple[RobustFront, int, tuple[Failure, ...]]:
@@ -189,7 +162,8 @@ def find_robust_front(
     sets, places, rows = _runs(study, case, pairs, (low, high), simulations)
     emulators = _emulators(case, goals, sets, places, pairs.rows(rows), (low, high))
     share = settings.quantile if settings.front == "quantile" else None
-    spent, q2 = settings.points, [emulator.q2 for emulator in emulators.gain]
+    names = [study.responses[index] for index in goals.objectives]
+    spent, q2 = settings.points, dict(zip(names, (emulator.q2 for emulator in emulators.gain), strict=True))
     try:
         robust_front = front(
             lambda points: emulators.objectives(points, share),
@@ -203,25 +177,26 @@ def find_robust_front(
         )
     except InfeasibleError:
         note = "no point keeps the limits over the unknown inputs"
-        return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
+        return RobustFront([], [], q2, note), spent, sets.failures
     candidates = {"pick": (pick, "the pick"), **_choices(study, robust_front, emulators)}
     designs = {"baseline": study.assignments(study.baseline)}
     designs |= {name: study.assignments(point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
     fresh_pairs, new_failures = simulate_designs(case, case.every, quantiles, designs, simulations)
-    confirmed = {}
+    confirmed = list[RobustPoint]()
     for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
         gains, variances = fresh_pairs.gains(goals, number)
-        gains_over_inputs = _over_inputs(shrunk(gains, variances), share)
-        confirmed[name] = RobustPoint(point, reason, better(gains, variances, case.uncertain.seed), gains_over_inputs)
+        gained = dict(zip(names, _over_inputs(shrunk(gains, variances), share).tolist(), strict=True))
+        odds_of_gains = better(names, gains, variances, case.uncertain.seed)
+        confirmed.append(RobustPoint(name, reason, study.by_factor(point), gained, odds_of_gains))
     # The baseline and the pick ran before at the sets that are the study's own.
     spent += CONFIRMED * (len(candidates) - 1) + 2 * int((rows >= settings.points).sum())
-    return (
-        RobustFront(robust_front.points, robust_front.values[:, : len(q2)], confirmed, q2),
-        spent,
-        (*sets.failures, *new_failures),
-    )
+    predicted = [
+        FrontPoint(study.by_factor(point), dict(zip(names, gains, strict=False)))
+        for point, gains in zip(robust_front.points, robust_front.values.tolist(), strict=True)
+    ]
+    return RobustFront(predicted, confirmed, q2), spent, (*sets.failures, *new_failures)
 
 
 def fresh_rows(points: int) -> Whole:
@@ -348,69 +323,6 @@ ROUNDS = 3
 FRESH = 8192
 
 
-@dataclass(frozen=True)
-class Decider:
-    """A deciding input: ``flip`` is the value at which the better design changes, None without one.
-
-    ``worth``: gain in the probability of the right choice by measuring the input. ``above``: whether the pick is better
-    above the flip. Intervals are of 95 %; that of a flip which may not exist is None.
-    """
-
-    key: str
-    flip: Any
-    worth: float
-    above: bool
-    flip_interval: tuple[Any, Any] | None
-    worth_interval: Interval
-
-
-@dataclass(frozen=True)
-class Decision:
-    """Whether the first of the deciding inputs is surely the first: the verdict, and the ``rivals`` by key, the best first.
-
-    ``needed``: about how many pairs of runs decide between them. ``pair_interval``: 95 % interval of the worth of the best
-    pair of inputs, None without a pair.
-    """
-
-    verdict: Verdict
-    rivals: list[str]
-    needed: float
-    pair_interval: Interval | None
-
-
-@dataclass(frozen=True)
-class Robust:
-    """The robust judgement of the pick over all unknown ``inputs``.
-
-    ``responses`` are those with a goal, and ``better`` is how likely each gain and all gains are. ``decides``: deciding
-    inputs by worth; ``decision``: which of them is the first; ``pair``: the two that are worth most together.
-    ``explained``: how well inputs predict each gain. ``halved``: change in the probability of all gains if the ranges of
-    the inputs were half as wide. ``front``: the robust front, None if the study asks for none.
-
-    ``screened``: by key of the inputs outside the emulators, the largest share of a gain's variance by the main effect.
-    ``pairs``, ``runs``, ``doubtful``: input sets, runs spent, and sets whose gain is in doubt. ``notes``: doubts about a
-    posterior sample, and keys that do not vary. ``odds``: by limited response, the probability that the pick keeps its
-    limits.
-    """
-
-    responses: list[str]
-    better: Better
-    decides: list[Decider]
-    pair: tuple[str, str, float] | None
-    explained: list[float]
-    halved: float
-    front: RobustFront | None
-    inputs: list[Input]
-    screened: dict[str, float]
-    pairs: int
-    runs: int
-    doubtful: int
-    failures: tuple[Failure, ...]
-    decision: Decision
-    notes: Notes = ()
-    odds: Mapping[str, Share] = field(default_factory=dict)
-
-
 def check_robust(study: Problem) -> None:
     """Raises InputError if the unknown inputs of the study's scene are declared wrongly."""
     case_of_study(study)
@@ -424,6 +336,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     quantiles = joint.sets(study.file.robust.points, seed)
     designs = {"baseline": study.assignments(study.baseline), "pick": study.assignments(pick)}
     pairs, spent, failures = _pairs_in_rounds(study, case, quantiles, designs, simulations)
+    names = [study.responses[index] for index in goals.objectives]
     gains, variances = pairs.gains(goals)
     # For the emulators, the effects of the other inputs are scatter.
     places, outside_shares = strongest_inputs(case, pairs.quantiles, gains)
@@ -443,25 +356,25 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, new_failures = find_robust_front(study, case, pairs, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *new_failures)
-    deciders, pair, decision = _decision_by_keys(case, inputs, analysis)
-    return Robust(
-        responses=[study.responses[index] for index in goals.objectives],
-        better=better(gains, variances, seed),
-        decides=deciders,
+    odds_of_gains = better(names, gains, variances, seed)
+    pair, decision = _decision_by_keys(case, inputs, analysis)
+    robust = Robust(
+        better=odds_of_gains,
+        undecided=None,
         pair=pair,
-        explained=analysis.explained,
-        halved=analysis.halved,
+        halved=min(max(odds_of_gains.all.value + analysis.halved, 0.0), 1.0),
         front=front,
-        inputs=case.every,
+        explained=dict(zip(names, analysis.explained, strict=True)),
+        inputs=[UnknownInput.of(entry) for entry in case.every],
         screened=outside_shares,
         pairs=len(gains),
         runs=points_in(case.duty) * spent,
         doubtful=int(in_doubt(gains, variances).size),
         failures=failures,
-        decision=decision,
-        notes=(*case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")),
         odds=limit_odds(study, pairs, seed),
     )
+    notes = (*case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study"))
+    return worded(robust, decision, notes)
 
 
 def _pairs_in_rounds(
@@ -530,29 +443,28 @@ def _input_readings(case: Case, inputs: Sequence[Input], fresh: Array, seed: int
     return readings
 
 
-def _decision_by_keys(
-    case: Case, inputs: Sequence[Input], analysis: Decides
-) -> tuple[list[Decider], tuple[str, str, float] | None, Decision]:
-    """Deciding inputs, the best pair and the decision, by keys and values of the inputs."""
+def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: Decides) -> tuple[Pair | None, Decision]:
+    """The best pair and the decision, by keys and values of the inputs."""
 
     def decider(deciding: InputWorth) -> Decider:
-        deciding_input, value = inputs[deciding.place], lambda quantile: _value(case, inputs[deciding.place], quantile)
-        low, high = (None, None) if deciding.flip_interval is None else map(value, deciding.flip_interval)
-        # Choices have no order, and so no interval.
-        interval = (low, high) if is_number(low) else None
+        deciding_input = inputs[deciding.place]
+        low, high = (_value(case, deciding_input, quantile) for quantile in deciding.flip_interval or (None, None))
         return Decider(
-            deciding_input.key, value(deciding.flip), deciding.worth, deciding.above, interval, deciding.worth_interval
+            key=deciding_input.key,
+            flip=_value(case, deciding_input, deciding.flip),
+            worth=deciding.worth,
+            pick_above=deciding.above,
+            # Choices have no order, and so no interval.
+            flip_interval=(low, high) if is_number(low) else None,
+            worth_interval=deciding.worth_interval,
         )
 
-    keys, best_pair = [unknown_input.key for unknown_input in inputs], analysis.pair
-    decision = Decision(
-        analysis.verdict,
-        [keys[place] for place in analysis.rivals],
-        analysis.needed,
-        None if best_pair is None else best_pair.interval,
+    keys, best = [unknown_input.key for unknown_input in inputs], analysis.pair
+    pair = None if best is None else Pair((keys[best.places[0]], keys[best.places[1]]), best.worth, best.interval)
+    rivals = [keys[place] for place in analysis.rivals]
+    return pair, Decision(
+        [decider(deciding) for deciding in analysis.inputs], analysis.verdict, rivals, analysis.needed
     )
-    pair = None if best_pair is None else (keys[best_pair.places[0]], keys[best_pair.places[1]], best_pair.worth)
-    return [decider(deciding) for deciding in analysis.inputs], pair, decision
 
 
 def _value(case: Case, unknown_input: Input, quantile: float | None) -> Any:

@@ -1,7 +1,7 @@
 """Ranges of a scene's outputs over its unknown inputs, and the share of each input: ``doe uncertainty``."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +12,16 @@ from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown.propagation import (
     Emulated,
-    Indices,
+    Range,
     Runs,
     Share,
-    Spread,
     emulated,
     explained,
+    range_of,
     residual_variance,
     shapley,
     sobol,
-    spread_of,
+    variance_by_cause,
 )
 from doe.workflow.input_sets import (
     NORMAL,
@@ -37,9 +37,10 @@ from doe.workflow.input_sets import (
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record, derived, outside_json, spread
 from rbdyn.base.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
-from rbdyn.scene.unknown import Input
+from rbdyn.scene.unknown import UnknownInput
 
 # Outputs of every scene; those with a heat balance also have their temperatures.
 OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
@@ -55,43 +56,59 @@ STILL = 1e-9
 WHOLE = 0.9
 
 
-@dataclass(frozen=True)
-class OutputRange:
-    """One output: its ``nominal`` value at the scene's own inputs, and its ``spread`` over all unknown inputs.
+class OutputRange(Record):
+    """One output: its ``nominal`` value at the scene's own inputs, its range over all unknown inputs, and variances by cause.
 
-    The inputs of its emulator, ``keys``, explain the share ``explained`` of its variance. The share of each is a Sobol'
-    index (``indices``), or a ``shapley`` effect if inputs depend on each other; both are None without a valid emulator.
-    ``floor``: apparent share of an input without effect.
+    The share of each input of its emulator is a Sobol' index, ``first`` and ``total``, or a ``shapley`` effect if inputs depend on
+    each other; all are None unless the emulator is ``trusted``. ``floor``: apparent share of an input without effect. ``q2``, ``ceiling``:
+    share of the variance that the emulator predicts, and the most possible; ``explained``: share that its inputs explain.
     """
 
-    nominal: Quantity
-    spread: Spread
-    keys: list[str]
-    explained: float
-    indices: Indices | None = None
-    shapley: list[Share] | None = None
-    floor: Share | None = None
+    nominal: Quantity = spread()
+    input: Range
+    variance: dict[str, float]
+    first: dict[str, Share] | None
+    total: dict[str, Share] | None
+    shapley: dict[str, Share] | None
+    floor: Share | None
+    q2: float
+    ceiling: float
+    trusted: bool
+    name: str = outside_json()
+    explained: float = outside_json()
 
     @property
-    def shares(self) -> list[Share] | None:
-        """Share of each input: its total index, or its Shapley effect."""
-        return self.shapley if self.indices is None else self.indices.total
+    def hidden(self) -> bool:
+        """Whether simulation noise exceeds the effect of the inputs."""
+        return self.variance["inputs"] == 0.0
+
+    @property
+    def shares(self) -> dict[str, Share]:
+        """Share of each input, its total index or its Shapley effect; empty where they are unknown."""
+        return self.total or self.shapley or {}
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """Everything a report needs. ``inputs``: all unknown inputs, which vary in every set.
+class Uncertainty(Record, kw_only=True):
+    """Ranges of a scene's outputs by name. ``inputs``: all unknown inputs, which vary in every set of ``sets``.
 
     ``screened``: by key of the inputs outside all emulators, the largest share of an output's variance by the main effect.
     """
 
-    path: Path
-    inputs: list[Input]
-    screened: Mapping[str, float]
-    outputs: Mapping[str, OutputRange]
-    sets: Sets
+    format: str = derived(lambda self: "doe.uncertainty/2")
+    scene: str
+    responses: dict[str, OutputRange]
+    inputs: list[UnknownInput]
+    screened: dict[str, float]
+    runs: int = derived(lambda self: len(self.sets.outputs))
+    failed: int = derived(lambda self: len(self.sets.failures) + len(self.sets.impossible))
     seed: int
     notes: Notes
+    sets: Sets = outside_json()
+
+    @property
+    def keys(self) -> list[str]:
+        """Inputs of the emulators."""
+        return [entry.key for entry in self.inputs if entry.key not in self.screened]
 
 
 @one_thread
@@ -124,17 +141,17 @@ def find_uncertainty(
     while True:
         case, sets = _varying(case, replicated_sets(case, joint.sets(count, seed), simulations, effort), idle)
         fitted = [_emulated(case, sets, nominal, place) for place in range(len(case.outputs))]
-        spreads = [spread_of(runs, emulator, fresh_sets, seed) for runs, emulator in fitted]
-        if effort < MOST_EFFORT and any(spread.variance["simulation"] > NOISY for spread in spreads):
+        ranges = [range_of(emulator, fresh_sets, seed) for _, emulator in fitted]
+        if effort < MOST_EFFORT and any(variance_by_cause(*pair)["simulation"] > NOISY for pair in fitted):
             effort *= 2
-        elif count < MOST and any(spread.relative_error > target for spread in spreads):
+        elif count < MOST and any(interval.relative_error > target for interval in ranges):
             count *= 2
         else:
             break
-    outputs = {
-        name: _output(case, _quantity(nominal, name), spread, emulator, fresh_sets)
-        for name, spread, (_, emulator) in zip(case.outputs, spreads, fitted, strict=True)
-    }
+    outputs = [
+        _output(case, nominal, name, interval, *pair, fresh_sets)
+        for name, interval, pair in zip(case.outputs, ranges, fitted, strict=True)
+    ]
     covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
     outside_shares = shares_outside(case, covered_places, sets.quantiles, sets.signals)
     notes = _notes(
@@ -144,7 +161,15 @@ def find_uncertainty(
         count,
         target,
     )
-    return Uncertainty(path, case.every, outside_shares, outputs, sets, seed, notes)
+    return Uncertainty(
+        scene=str(path),
+        responses={output.name: output for output in outputs},
+        inputs=[UnknownInput.of(entry) for entry in case.every],
+        screened=outside_shares,
+        seed=seed,
+        notes=notes,
+        sets=sets,
+    )
 
 
 def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) -> Case:
@@ -190,22 +215,36 @@ def _quantity(nominal: SimulationResult, name: str) -> Quantity:
     return Quantity.from_dict(dict(quantity_of(nominal.as_dict(), name)))
 
 
-def _output(case: Case, nominal: Quantity, spread: Spread, fitted: Emulated, fresh_sets: Array) -> OutputRange:
-    inputs = [case.every[place] for place in fitted.columns[:-1]]
-    share = explained(fitted, fitted(fresh_sets), residual_variance(fitted.emulator))
-    figures, seed = (nominal, spread, [unknown_input.key for unknown_input in inputs], share), case.uncertain.seed
-    if not spread.by_emulator:
-        return OutputRange(*figures)
-    joint = case.joint(inputs)
-    if not joint.independent:
-        *effects, floor = shapley(fitted, joint, seed)
-        return OutputRange(*figures, shapley=effects, floor=floor)
-    indices = sobol(fitted, joint.inputs + 1, seed)
-    return OutputRange(*figures, Indices(indices.first[:-1], indices.total[:-1]), floor=indices.total[-1])
+def _output(
+    case: Case, nominal: SimulationResult, name: str, interval: Range, runs: Runs, fitted: Emulated, fresh_sets: Array
+) -> OutputRange:
+    inputs, seed = [case.every[place] for place in fitted.columns[:-1]], case.uncertain.seed
+    by_key = dict[str, dict[str, Share] | None](first=None, total=None, shapley=None)
+    floor, joint = None, case.joint(inputs)
+    if fitted.trusted:
+        effects = sobol(fitted, joint.inputs + 1, seed)._asdict() if joint.independent else {}
+        effects = effects or {"shapley": shapley(fitted, joint, seed)}
+        # The last is that of an input without effect.
+        by_key |= {
+            kind: dict(zip((entry.key for entry in inputs), shares, strict=False)) for kind, shares in effects.items()
+        }
+        floor = (effects.get("total") or effects["shapley"])[-1]
+    return OutputRange(
+        nominal=_quantity(nominal, name),
+        input=interval,
+        variance=variance_by_cause(runs, fitted),
+        **by_key,
+        floor=floor,
+        q2=fitted.q2,
+        ceiling=fitted.ceiling,
+        trusted=fitted.trusted,
+        name=name,
+        explained=explained(fitted, fitted(fresh_sets), residual_variance(fitted.emulator)),
+    )
 
 
 def _notes(
-    case_notes: Collection[Note], sets: Sets, outputs: Mapping[str, OutputRange], count: int, target: float
+    case_notes: Collection[Note], sets: Sets, outputs: Sequence[OutputRange], count: int, target: float
 ) -> Notes:
     notes = [*case_notes]
     lost_sets = len(sets.failures) + len(sets.impossible)
@@ -213,17 +252,16 @@ def _notes(
         cause = (*map(str, sets.failures), *sets.impossible)[0]
         lost = f"{counted(lost_sets, 'input set')} gave no result and {are(lost_sets)} left out: {cause}"
         notes.append(Note("lost-runs", lost))
-    for name, output in outputs.items():
-        spread = output.spread
-        sentence = ""
-        if spread.hidden:
+    for output in outputs:
+        name, error, sentence = output.name, output.input.relative_error, ""
+        if output.hidden:
             sentence = (
                 f"{name}: simulation noise exceeds the effect of the inputs; raise numerics.replicates or "
                 "numerics.turns in uncertain.set"
             )
-        elif not spread.by_emulator:
+        elif not output.trusted:
             sentence = (
-                f"{name}: its emulator predicts too little (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to "
+                f"{name}: its emulator predicts too little (Q2 {output.q2:.2f} of at most {output.ceiling:.2f}) to "
                 "give the shares of inputs"
             )
         elif output.explained < WHOLE:
@@ -232,10 +270,10 @@ def _notes(
                 "inputs and the error of the emulator"
             )
         notes += [Note("emulator", sentence)] if sentence else []
-        if spread.relative_error > target and not spread.hidden:
+        if error > target and not output.hidden:
             sentence = (
                 f"{name}: after {count} input sets the standard error of an end of its range is "
-                f"{100.0 * spread.relative_error:.0f} % of its width"
+                f"{100.0 * error:.0f} % of its width"
             )
             notes.append(Note("emulator", sentence))
     return tuple(notes)

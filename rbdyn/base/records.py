@@ -139,6 +139,9 @@ def restore(kind: Any, value: Any) -> Any:
         return origin(restore(kinds[0], item) for item in value)
     elif kind is Note:
         return Note.of(value)
+    elif isinstance(kind, type) and issubclass(kind, tuple) and isinstance(value, list):
+        if len(value) == len(_kinds(kind)):
+            return kind(*map(restore, _kinds(kind).values(), value))
     elif isinstance(kind, type) and issubclass(kind, Record) and isinstance(value, dict):
         return kind.from_dict(value)
     elif type(value) is kind or (kind is float and type(value) is int):

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 from pydantic import BaseModel
 
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, refuse
+from rbdyn.base.records import Record
+from rbdyn.base.words import shown, with_error
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import LEFT_OUT, MARKING, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
@@ -35,6 +37,57 @@ class Input(NamedTuple):
     key: str
     law: Law | Sampled
     reason: str
+
+
+# Words of the laws of inputs.
+LAWS = {
+    "uniform": "evenly",
+    "log_uniform": "evenly by ratio",
+    "triangular": "most likely near the middle",
+    "normal": "normal",
+    "choices": "one of these",
+    "sample": "by a sample of measurements",
+}
+
+
+class InputLaw(Record):
+    """The law of an input as a record states it: numbers as in [uncertain], or ``rows`` of a sample and its ends."""
+
+    law: str
+    rows: int | None = None
+    low: Any = None
+    high: Any = None
+    mode: float | None = None
+    mean: float | None = None
+    sd: float | None = None
+    values: list[Any] | None = None
+    weights: list[float] | None = None
+    times: str | None = None
+    kind: str | None = None
+    measurable: float | None = None
+
+    @property
+    def words(self) -> str:
+        """'0.3 to 3 (evenly by ratio)'."""
+        times = f" times {self.times}" if self.times else ""
+        if self.mean is not None:
+            return f"{with_error(self.mean, self.sd)} (1 sd){times} ({LAWS[self.law]})"
+        if self.low is not None and self.high is not None:
+            return f"{shown(self.low)} to {shown(self.high)}{times} ({LAWS[self.law]})"
+        return f"{', '.join(map(str, self.values or ()))} ({LAWS[self.law]})"
+
+
+class UnknownInput(Record):
+    """An unknown input with its law and the reason for that."""
+
+    key: str
+    law: InputLaw
+    reason: str
+
+    @classmethod
+    def of(cls, entry: Input) -> "UnknownInput":
+        """The record of an input of a scene."""
+        return cls(entry.key, InputLaw(**entry.law.model_dump(exclude_none=True)), entry.reason)
 
 
 def inputs_of(

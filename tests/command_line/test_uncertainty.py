@@ -14,12 +14,12 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.sections.unknown import MOST_PAIRS, robust_record, robust_sentences
 from doe.study_file.sections import Robust
 from doe.workflow.confirmation import odds_sentence
 from doe.workflow.input_sets import ROUND_SEEDS, override_notes, read_case, replicated_sets, run
+from doe.workflow.judgement import MOST_PAIRS, Decision, Pair, worded
 from doe.workflow.problem import Problem
-from doe.workflow.robust import Decision, check_robust, fresh_rows, judge
+from doe.workflow.robust import check_robust, fresh_rows, judge
 from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
 from rbdyn.base.digests import code_behind
@@ -311,53 +311,46 @@ def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Any]:
 
 
 def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Problem, Any]) -> None:
-    study, found = judgement
-    shares = dict(zip(found.responses, found.better.gains, strict=True))
-    assert shares["impact_force_N"].value > 0.98 and shares["power_loss_W"].value > 0.98
+    _, found = judgement
+    imbalance, mass = found.decision.inputs
+    assert all(found.better.gains[name].value > 0.98 for name in ("impact_force_N", "power_loss_W"))
     assert found.better.all.value == pytest.approx(0.4, abs=0.05)
-    assert found.decides[0].key == "cage.imbalance_um"
-    assert found.decides[0].flip == pytest.approx(20.0, abs=1.5)
-    assert found.decides[0].worth == pytest.approx(0.4, abs=0.05)
-    assert found.decides[1].worth < 0.02 and found.decides[1].flip is None
-    assert not found.decides[0].above
+    assert imbalance.key == "cage.imbalance_um" and imbalance.flip == pytest.approx(20.0, abs=1.5)
+    assert imbalance.worth == pytest.approx(0.4, abs=0.05) and not imbalance.pick_above
+    assert mass.worth < 0.02 and mass.flip is None
     # Half as wide about its median the imbalance lies between 12.5 and 37.5 um, 0.3 of that below 20.
-    assert found.better.all.value + found.halved == pytest.approx(0.3, abs=0.05)
-    record = robust_record(found, study.factors)
-    assert set(record) >= {"better", "all", "decides", "pairs"} and record["pairs"] == 128
-    first, words = record["decides"][0], record["sentences"][1]
-    assert first["flip_interval"][0] < 20.0 < first["flip_interval"][1] < 22.0
-    assert first["worth_interval"][0] < first["worth"] < first["worth_interval"][1]
-    assert record["undecided"] is None and record["pair"] is None
-    assert words.startswith(f"Most decisive unknown: cage.imbalance_um. Above {first['flip']:.3g} (")
+    assert found.halved == pytest.approx(0.3, abs=0.05)
+    first, words = found.decides[0], found.sentences[1]
+    assert first.flip_interval[0] < 20.0 < first.flip_interval[1] < 22.0
+    assert first.worth_interval[0] < first.worth < first.worth_interval[1]
+    assert found.undecided is None and found.pair is None and found.pairs == 128
+    assert words.startswith(f"Most decisive unknown: cage.imbalance_um. Above {first.flip:.3g} (")
     assert " µm keep the original. Measuring it raises the chance of the right choice by " in words
-    assert json.loads(json.dumps(record)) == record
+    record = json.loads(json.dumps(found.as_dict()))
+    assert type(found).from_dict(record).as_dict() == record
 
 
 def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Problem, Any]) -> None:
     """The words of each verdict; only a decided one lists inputs."""
-    study, found = judgement
-    rivals = ["cage.imbalance_um", "cage.mass_g"]
+    _, found = judgement
+    rivals, first = ["cage.imbalance_um", "cage.mass_g"], found.decision.inputs[0]
     for needed, words in ((300.0, "About 512 pairs would decide"), (np.inf, "More than 1024 pairs, the most that")):
-        unsure = replace(found, decision=Decision("undecided", rivals, needed, None))
-        record = robust_record(unsure, study.factors)
-        assert record["decides"] == [] and words in record["undecided"]
-        assert all(key in record["undecided"] for key in rivals)
-        assert record["sentences"][1] == record["undecided"]
-    small = [replace(each, worth=0.0, worth_interval=(0.0, 0.011)) for each in found.decides]
-    never = replace(found, decides=small, decision=Decision("nothing", [], 128.0, None))
-    record = robust_record(never, study.factors)
-    assert record["decides"] == [] and record["undecided"] is None
-    assert "No measurement of one unknown is worth making: it would raise" in record["sentences"][1]
-    assert "by at most 2 points" in record["sentences"][1]
-    both = replace(never, pair=(*rivals, 0.3), decision=Decision("nothing", [], 128.0, (0.25, 0.34)))
-    record = robust_record(both, study.factors)
-    assert record["pair"] == {"keys": rivals, "worth": 0.3, "worth_interval": [0.25, 0.34]}
-    assert record["sentences"][1].endswith("together raises that chance by 30 (25 to 34) points.")
-    choice = replace(found.decides[0], flip="flooded", flip_interval=None)
-    words = robust_sentences(replace(found, decides=[choice]), study.factors)[1]
+        unsure = worded(found, replace(found.decision, verdict="undecided", rivals=rivals, needed=needed))
+        assert unsure.decides == [] and words in unsure.undecided and all(key in unsure.undecided for key in rivals)
+        assert unsure.sentences[1] == unsure.undecided
+    small = [replace(each, worth=0.0, worth_interval=(0.0, 0.011)) for each in found.decision.inputs]
+    nothing = Decision(small, "nothing", [], 128.0)
+    never = worded(found, nothing)
+    assert never.decides == [] and never.undecided is None
+    assert "No measurement of one unknown is worth making: it would raise" in never.sentences[1]
+    assert "by at most 2 points" in never.sentences[1]
+    both = worded(replace(found, pair=Pair(tuple(rivals), 0.3, (0.25, 0.34))), nothing)
+    assert both.sentences[1].endswith("together raises that chance by 30 (25 to 34) points.")
+    choice = replace(found.decision, inputs=[replace(first, flip="flooded", flip_interval=None)])
+    words = worded(found, choice).sentences[1]
     assert "flooded" not in words and words.startswith("Most decisive unknown: cage.imbalance_um. Measuring it")
-    loose = replace(found.decides[0], flip_interval=None)
-    words = robust_sentences(replace(found, decides=[loose]), study.factors)[1]
+    loose = replace(found.decision, inputs=[replace(first, flip_interval=None)])
+    words = worded(found, loose).sentences[1]
     assert "The value at which it changes the choice is too uncertain to state. Measuring it" in words
     assert Robust.model_fields["points"].metadata[-1].le == MOST_PAIRS
 
@@ -418,7 +411,7 @@ def test_inputs_without_an_effect_on_levels_still_count(tmp_path: Path) -> None:
     (other,) = {"cage.pocket_contact_length_mm", "lubricant.oil_fraction"} - named
     # Its main effect is a third of the variance: 1/16 of 3/16.
     assert found.screened[other] == max(found.screened.values()) == pytest.approx(0.25, abs=0.12)
-    assert json.loads(json.dumps(robust_record(found, study.factors)))["screened"] == found.screened
+    assert json.loads(json.dumps(found.as_dict()))["screened"] == found.screened
 
 
 @pytest.mark.parametrize(("points", "first"), [(256, 128), (1024, 128), (64, 32), (16, 8)])
@@ -472,7 +465,7 @@ def test_replicates_follow_the_share_of_noise(
     ran = dict(zip(simulations.seeds[1:], simulations.replicates[1:], strict=True))
     assert max(ran.values()) == max(most // 2, 2) and sum(ran.values()) == 64 * most
     share = error**2 / most / (error**2 / most + 25.0 / 12.0)
-    assert found.outputs["impact_force_N"].spread.variance["simulation"] == pytest.approx(share, rel=0.4, abs=0.01)
+    assert found.responses["impact_force_N"].variance["simulation"] == pytest.approx(share, rel=0.4, abs=0.01)
 
 
 def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:
@@ -510,8 +503,8 @@ def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: py
 def test_a_study_says_where_input_sets_differ_from_its_runs(judgement: tuple[Problem, Any]) -> None:
     _, found = judgement
     runs = "other runs of the study, not the input sets: uncertain.set gives these numerics.turns=20, numerics.replicates=2"
-    assert found.notes[0].startswith("2 of 26 inputs vary, the others count as exact (")
-    assert found.notes[1:] == (f"scene.set: numerics.turns=40, numerics.replicates=8 changes {runs}",)
+    assert found.sentences[-2].startswith("2 of 26 inputs vary, the others count as exact (")
+    assert found.sentences[-1] == f"scene.set: numerics.turns=40, numerics.replicates=8 changes {runs}."
 
 
 def test_a_factor_cannot_be_unknown_too(tmp_path: Path) -> None:
@@ -528,10 +521,10 @@ def test_what_varies_or_is_read_with_an_error_is_worth_less(tmp_path: Path) -> N
     reading = np.linspace(-80.0, 130.0, 4000)
     below, within = (stats.norm.cdf((high - reading) / 15.0) - stats.norm.cdf(-reading / 15.0) for high in (20.0, 50.0))
     chance = np.trapezoid(np.maximum(below, within - below), reading) / 50.0
-    assert found.decides[0].worth == pytest.approx(chance - 0.6, abs=0.02)
+    assert found.decision.inputs[0].worth == pytest.approx(chance - 0.6, abs=0.02)
     varies = _study(tmp_path, IMBALANCE.replace("high = 50.0 }", 'high = 50.0, kind = "varies" }', 1))
     found = judge(varies, varies.baseline * pick, _Simulations(0.002))  # type: ignore[arg-type]
-    assert [each.key for each in found.decides] == ["cage.mass_g"] and found.decides[0].worth < 0.02
+    assert [each.key for each in found.decision.inputs] == ["cage.mass_g"] and found.decision.inputs[0].worth < 0.02
 
 
 class _Trade(_Simulations):
@@ -551,25 +544,25 @@ def test_robust_front_keeps_what_it_promises(tmp_path: Path, kind: str) -> None:
     """Closed form: the gain in whirl is pocket - 0.05 guide imbalance, whose 10 % quantile is that at 45 um, its mean at 25."""
     study = _study(tmp_path, IMBALANCE, front=kind)
     found = judge(study, np.add(study.baseline, [0.0, 0.08, -0.05]), _Trade(0.002)).front  # type: ignore[arg-type]
-    assert found is not None and min(found.q2) > 0.95
-    pocket, guide = 0.3 - found.points[:, 2], found.points[:, 1] - 0.15
+    assert found is not None and min(found.q2.values()) > 0.95
+    predicted = np.array([list(point.factors.values()) for point in found.points])
+    pocket, guide = 0.3 - predicted[:, 2], predicted[:, 1] - 0.15
     at = np.where(guide > 0.0, 45.0, 5.0) if kind == "quantile" else 25.0
     truth = np.column_stack([pocket, pocket - 0.05 * guide * at, 2.0 * guide])
-    assert np.abs(found.gains - truth).max() < 0.01
+    assert np.abs(np.array([list(point.gains.values()) for point in found.points]) - truth).max() < 0.01
     # The smallest pocket is best in impact and whirl; guide clearance trades loss for whirl.
     assert pocket == pytest.approx(np.full(len(pocket), pocket.max()), abs=0.01)
     assert np.ptp(guide) > 0.05
-    names = list(found.confirmed)
-    assert names[:2] == ["pick", "robust surest"]
+    pick, surest, *_ = found.confirmed
+    assert (pick.name, surest.name) == ("pick", "robust surest")
     # The pick's guide costs more whirl than its pocket gains where the imbalance is above 12.5 um.
-    assert found.confirmed["pick"].better.all.value == pytest.approx(0.25, abs=0.05)
-    assert found.confirmed["robust surest"].better.all.value > 0.98
-    for each in found.confirmed.values():
-        x, y = 0.3 - each.point[2], each.point[1] - 0.15
+    assert pick.better.all.value == pytest.approx(0.25, abs=0.05) and surest.better.all.value > 0.98
+    for each in found.confirmed:
+        _, guide_mm, pocket_mm = each.factors.values()
+        x, y = 0.3 - pocket_mm, guide_mm - 0.15
         worst = 45.0 if y > 0.0 else 5.0
-        assert each.gains == pytest.approx(
-            [x, x - 0.05 * y * (worst if kind == "quantile" else 25.0), 2.0 * y], abs=0.01
-        )
+        middle = x - 0.05 * y * (worst if kind == "quantile" else 25.0)
+        assert list(each.gains.values()) == pytest.approx([x, middle, 2.0 * y], abs=0.01)
 
 
 def test_a_factor_need_not_stand_in_the_scene(tmp_path: Path) -> None:
@@ -584,7 +577,7 @@ def test_a_study_is_not_finished_once_its_steps_change() -> None:
     assert set(code_behind(CODE)) > {
         "doe.unknown.decision",
         "doe.response_surface.least_squares",
-        "doe.report.sections.unknown",
+        "doe.workflow.judgement",
     }
 
 

@@ -7,7 +7,16 @@ import pytest
 from scipy import stats
 
 from doe.unknown.inputs import Joint, effect_shares, main_effects, nested, ranks, retained, screening_design, strongest
-from doe.unknown.propagation import Runs, emulated, explained, residual_variance, shapley, sobol, spread_of
+from doe.unknown.propagation import (
+    Runs,
+    emulated,
+    explained,
+    range_of,
+    residual_variance,
+    shapley,
+    sobol,
+    variance_by_cause,
+)
 from rbdyn.base.arrays import Array
 
 ISHIGAMI = 0.5 + 49.0 / 8.0 + 0.1 * np.pi**4 / 5.0 + 0.01 * np.pi**8 / 18.0
@@ -30,30 +39,32 @@ def _noisy(function: Callable[[Array], Array], inputs: int, points: int, sd: flo
 def test_variance_of_inputs_of_a_linear_function() -> None:
     """y = 3 a + b of normal a, b: V_in = 10 beside noise of variance 2, range -+ 1.645 sqrt(10)."""
     runs = _noisy(lambda q: stats.norm.ppf(q[:, :2]) @ [3.0, 1.0], 3, 1024, np.sqrt(2.0), 1)
-    found = spread_of(runs, emulated(runs), nested(3, 8192, 2), 1)
-    assert found.variance["inputs"] * runs.values.var(ddof=1) == pytest.approx(10.0, rel=0.06)
-    assert found.variance["simulation"] == pytest.approx(2.0 / 12.0, rel=0.1)
-    assert sum(found.variance.values()) == pytest.approx(1.0)
-    assert found.by_emulator and not found.hidden
+    fitted = emulated(runs)
+    found, variance = range_of(fitted, nested(3, 8192, 2), 1), variance_by_cause(runs, fitted)
+    assert variance["inputs"] * runs.values.var(ddof=1) == pytest.approx(10.0, rel=0.06)
+    assert variance["simulation"] == pytest.approx(2.0 / 12.0, rel=0.1)
+    assert sum(variance.values()) == pytest.approx(1.0)
+    assert fitted.trusted
     assert [found.low, found.high] == pytest.approx(stats.norm.ppf([0.05, 0.95]) * np.sqrt(10.0), rel=0.05)
     assert found.median == pytest.approx(0.0, abs=0.2)
 
 
 def test_noise_that_hides_the_inputs_is_said() -> None:
     runs = _noisy(lambda q: 0.01 * q[:, 0], 2, 64, 1.0, 3)
-    found = spread_of(runs, emulated(runs), nested(2, 1024, 4), 1)
-    assert not found.by_emulator
-    assert found.variance["inputs"] < 0.3
+    fitted = emulated(runs)
+    assert not fitted.trusted
+    assert variance_by_cause(runs, fitted)["inputs"] < 0.3
     none = Runs(runs.quantiles, runs.values, 4.0 * np.ones(64), runs.freedom)
-    assert spread_of(none, emulated(none), nested(2, 1024, 4), 1).hidden
+    assert variance_by_cause(none, emulated(none))["inputs"] == 0.0
 
 
 def test_untrusted_ranges_are_shrunk_by_their_noise() -> None:
     """A function too rough to emulate: the range is that of the runs, less their noise."""
     rough = np.random.default_rng(5).permutation(128)
     runs = _noisy(lambda q: np.sqrt(12.0) * (rough[np.argsort(np.argsort(q[:, 0]))] / 128.0 - 0.5), 2, 128, 0.5, 5)
-    found = spread_of(runs, emulated(runs), nested(2, 1024, 6), 1)
-    assert not found.by_emulator
+    fitted = emulated(runs)
+    assert not fitted.trusted
+    found = range_of(fitted, nested(2, 1024, 6), 1)
     # Uniform of variance 1: 90 % lie within 0.9 sqrt(12); without shrinking noise would add an eighth.
     assert found.high - found.low == pytest.approx(0.9 * np.sqrt(12.0), rel=0.06)
     assert 0.02 < found.relative_error < 0.1
@@ -201,7 +212,7 @@ def test_inputs_outside_the_emulator_widen_the_range() -> None:
         fitted = emulated(runs, 2)
         assert fitted.columns.tolist() == [0, 1, MANY.size] and fitted.trusted
         fresh = nested(MANY.size + 1, 2048, 50 + seed)
-        found = spread_of(runs, fitted, fresh, seed)
+        found = range_of(fitted, fresh, seed)
         ends.append([found.low, found.high])
         truth = _of_many(nested(MANY.size + 1, 4096, 90 + seed))
         covers.append(((truth > found.low) & (truth < found.high)).mean())
@@ -225,7 +236,7 @@ def test_residuals_that_grow_with_the_output_bend_no_end() -> None:
     scatter = np.random.default_rng(1).random(256)
     runs = _noisy(lambda q: 10.0 * q[:, 0] * (0.2 + 1.6 * scatter) - 1.0, 2, 256, 1e-3, 1)
     fitted, fresh = emulated(runs), nested(2, 2048, 51)
-    found = spread_of(runs, fitted, fresh, 1)
+    found = range_of(fitted, fresh, 1)
     plain = np.quantile(fitted(fresh) + np.random.default_rng(2).choice(fitted.residuals, 2048), 0.05)
     end = np.quantile(runs.values, 0.05)
     assert not fitted.logarithmic and plain < end - 1.0

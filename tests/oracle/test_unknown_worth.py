@@ -26,7 +26,7 @@ def test_the_input_that_decides_and_where_it_flips() -> None:
     truth = np.column_stack([0.4 - quantiles[:, 1], np.full(256, 1.0) + 0.2 * quantiles[:, 0]])
     gains, variances, freedom = noisy(truth, 0.05, 5)
     variances = smooth(quantiles, variances, freedom)
-    assert better(gains, variances, 1).all.value == pytest.approx(0.4, abs=0.05)
+    assert better("ab", gains, variances, 1).all.value == pytest.approx(0.4, abs=0.05)
     found = decides(quantiles, gains, variances, fresh, 1)
     first = found.inputs[0]
     assert first.place == 1

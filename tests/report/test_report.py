@@ -23,6 +23,9 @@ from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.sections.record import change, scalars
 from doe.report.still import Still
+from doe.unknown.decision import Better
+from doe.unknown.propagation import Share
+from doe.workflow.judgement import Robust, RobustFront, RobustPoint
 from doe.workflow.pick import Outward
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
@@ -348,14 +351,14 @@ def test_the_odds_of_the_gains_follow_these():
     sentence = (
         "Of 100 cases the pick is better in all of these in 57 (51 to 63): the gains depend on what is not known."
     )
-    point = {
-        "name": "robust knee",
-        "factors": {each: 0.1 for each in FACTORS},
-        "gains": {name: 0.031 for name in names},
-        "better": {name: [0.8, 0.7, 0.9] for name in names},
-        "all": [0.57, 0.51, 0.63],
-    }
-    record = summary() | {"robust": {"sentences": [sentence], "all": point["all"], "front": {"confirmed": [point]}}}
+    better = dict.fromkeys(names, Share(0.8, 0.7, 0.9))
+    odds, factors = Better(better, Share(0.57, 0.51, 0.63)), dict.fromkeys(FACTORS, 0.1)
+    front = RobustFront([], [RobustPoint("robust knee", "", factors, dict.fromkeys(names, 0.031), odds)], {})
+    robust = Robust(
+        better=odds, undecided=None, pair=None, halved=0.6, front=front, explained=dict.fromkeys(names, 0.9), inputs=[],
+        screened={}, pairs=128, runs=256, doubtful=0, sentences=[sentence],
+    )  # fmt: skip
+    record = summary() | {"robust": robust.as_dict()}
     page = html_report(record, motion())
     words = " ".join(Outline(page).words)
     assert f'class="warning"><strong>Warning:</strong> {sentence}' in page and "--robust states" not in page

@@ -143,7 +143,7 @@ def test_unit_answers_hold_the_figures_of_their_records(work):
     written = {"fit.json", "anova.csv", "coefficients.csv", "runs.csv", "report.html", "tables.xlsx"}
     assert set(fit.files) == written and all((fit.folder / name).is_file() for name in written)
     ranges = sets.table().set_index("output")
-    assert (ranges["low"] < ranges["high"]).all() and len(sets.table("sets")) == sets["runs"] == 16
+    assert (ranges["low_5_percent"] < ranges["high_95_percent"]).all() and len(sets.table("sets")) == sets["runs"] == 16
     assert work.answers["front"]["point"]["factors"]["pocket_clearance_mm"] == 0.25
     assert set(work.answers["front"].table("picks")["point"]) > {"baseline", "knee"}
 

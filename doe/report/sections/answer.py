@@ -103,17 +103,17 @@ def _judged(summary: Record) -> list[Block]:
 def _command_for_odds(summary: Record) -> Paragraph:
     """The command that states the odds, where these are unknown."""
     command = f"doe study {summary.asked.study_file} --robust"
-    return Paragraph("" if part(summary, "robust") else f"{command} states the odds over the unknown inputs.")
+    return Paragraph("" if summary.robust else f"{command} states the odds over the unknown inputs.")
 
 
 def _gained(summary: Record) -> list[Block]:
     """The gains with their verdicts, and the odds of them over the unknown inputs or the command that computes these."""
     text = gains_statement(summary)
-    sentences = part(summary, "robust", "sentences") or []
-    odds = part(summary, "robust", "all") or [0.0]
+    robust = summary.robust
+    sentences = robust.sentences if robust else []
     # Only the first two sentences are verdicts: the odds of the gains, and what decides.
-    first: Role = "statement" if odds[0] >= NEARLY_ALL else "warning"
-    second: Role = "warning" if part(summary, "robust", "undecided") else ""
+    first: Role = "statement" if robust and robust.better.all.value >= NEARLY_ALL else "warning"
+    second: Role = "warning" if robust and robust.undecided else ""
     further: list[Role] = [""] * len(sentences)
     return [
         _gains(summary),
@@ -226,14 +226,15 @@ def _plain(figure: Record | None) -> str:
 def _robust_points(summary: Record) -> Table:
     """Pick and points of the robust front: the gain that holds over the unknown inputs, and in how many cases there is one."""
     names = [response["name"] for response in responses(summary)]
+    front = summary.robust and summary.robust.front
     rows = [
         [
-            point["name"].removeprefix("robust "),
-            *(factor.text(part(point, "factors", factor.name), 1) for factor in factors(summary)),
-            *(_gain_and_share(part(point, "gains", name), part(point, "better", name)) for name in names),
-            _gain_and_share(None, point["all"]),
+            point.name.removeprefix("robust "),
+            *(factor.text(point.factors[factor.name], 1) for factor in factors(summary)),
+            *(_gain_and_share(point.gains.get(name), point.better.gains.get(name)) for name in names),
+            _gain_and_share(None, point.better.all),
         ]
-        for point in part(summary, "robust", "front", "confirmed") or []
+        for point in (front.confirmed if front else ())
     ]
     header = ("", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names), "all")
     note = "Gain over the baseline that holds over the unknown inputs, and in how many of 100 cases there is a gain."

@@ -1,157 +1,103 @@
 """The chapter on unknown inputs of ``doe study --robust``: inputs with ranges and sources, odds, what decides; and its tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from doe.report.sections.record import SENSES, Record, of_hundred, part
+from doe.report.sections.record import SENSES, of_hundred, part
+from doe.report.sections.unknown import input_sheet
+from doe.report.summary import Summary
+from doe.unknown.propagation import Share
+from doe.workflow.judgement import Decider, Robust
 from rbdyn.base.blocks import Block, Bullets, Paragraph, Section, Table
-from rbdyn.base.words import counted, quantity, shown, with_error
+from rbdyn.base.table import Column, Sheet
+from rbdyn.base.words import counted, quantity, shown
+from rbdyn.scene.unknown import UnknownInput
 
-INPUTS, DECIDES = "unknown_inputs.csv", "decides.csv"
-# Words of the laws of inputs.
-LAWS = {
-    "uniform": "evenly",
-    "log_uniform": "evenly by ratio",
-    "triangular": "most likely near the middle",
-    "normal": "normal",
-    "choices": "one of these",
-    "sample": "by a sample of measurements",
-}
+DECIDERS: tuple[Column[Decider], ...] = (
+    Column("input", at="key", meaning="key of the input"),
+    Column(
+        "worth",
+        words="points of chance gained by measuring it",
+        cell=lambda decider: Share(decider.worth, *decider.worth_interval).of_hundred,
+        meaning="gain in the chance of the right choice by measuring it, with its interval",
+    ),
+    Column("worth_low", at=lambda decider: decider.worth_interval[0], screen=False),
+    Column("worth_high", at=lambda decider: decider.worth_interval[1], screen=False),
+    Column("flip", 3, "flips at", meaning="value at which the choice changes, with its interval"),
+    Column("flip_low", at=lambda decider: (decider.flip_interval or (None, None))[0], screen=False),
+    Column("flip_high", at=lambda decider: (decider.flip_interval or (None, None))[1], screen=False),
+    Column(
+        "",
+        words="95 % interval",
+        cell=lambda decider: " to ".join(shown(end, 3) for end in decider.flip_interval or ()),
+        text=True,
+    ),
+    Column(
+        "pick_above",
+        words="pick is better",
+        cell=lambda decider: "above" if decider.pick_above else "below",
+        text=True,
+        meaning="whether the pick is better above the flip",
+    ),
+)
 
 
-def unknown(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def unknown(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
     """Odds that the pick is better, the inputs that decide it, and every unknown input with its range and source."""
-    robust = part(summary, "robust")
-    if not robust:
+    robust = summary.robust
+    if robust is None:
         return None
+    inputs, sets, runs = len(robust.inputs), counted(robust.pairs, "input set"), counted(robust.runs, "run")
     blocks: list[Block] = [
-        Bullets(robust.get("sentences") or []),
+        Bullets(robust.sentences),
         _odds(robust),
         _limits(summary),
-        _decides(robust),
-        Paragraph(robust.get("undecided") or ""),
-        Paragraph(_effort(robust), "small"),
-        _inputs(robust),
+        decider_sheet(robust).block,
+        Paragraph(robust.undecided or ""),
+        Paragraph(f"{counted(inputs, 'input')} varied together in {sets}, {runs}.", "small"),
+        robust_input_sheet(robust).block,
     ]
     return Section("unknown", "Unknown inputs", blocks)
 
 
-def _odds(robust: Record) -> Table:
+def _odds(robust: Robust) -> Table:
     """Probability of each gain, and the share of its variance over the inputs that the emulators explain."""
-    explained = robust.get("foretold") or {}
     rows = [
-        (quantity(name)[0], of_hundred(share), _percent(explained.get(name)))
-        for name, share in (robust.get("better") or {}).items()
+        (quantity(name)[0], share.of_hundred, _percent(robust.explained[name]))
+        for name, share in robust.better.gains.items()
     ]
-    if robust.get("all"):
-        rows.append(("all of these", of_hundred(robust["all"]), ""))
     header = ("response", "pick better in 100 cases", "explained by the inputs")
-    return Table("Odds that the pick is better than the original", header, rows)
+    every = ("all of these", robust.better.all.of_hundred, "")
+    return Table("Odds that the pick is better than the original", header, [*rows, every])
 
 
-def _limits(summary: Record) -> Table:
+def _limits(summary: Summary) -> Table:
     """Odds that each limit is kept over the unknown inputs."""
-    limits = part(summary, "limits") or {}
     rows = [
         (
             quantity(name)[0],
-            f"{SENSES.get(str(limit.get('sense')), '')} {shown(limit.get('bound'))}",
-            of_hundred(limit["odds"]),
+            f"{SENSES[part(limit, 'sense')]} {shown(part(limit, 'bound'))}",
+            of_hundred(part(limit, "odds")),
         )
-        for name, limit in limits.items()
-        if isinstance(limit, Mapping) and limit.get("odds")
+        for name, limit in summary.limits.items()
+        if part(limit, "odds")
     ]
     return Table("Limits over the unknown inputs", ("response", "limit", "kept in 100 cases"), rows, text_columns=(1,))
 
 
-def _decides(robust: Record) -> Table:
+def decider_sheet(robust: Robust) -> Sheet[Decider]:
     """By input: what measuring it is worth, and the value at which the choice flips."""
-    rows = [
-        (
-            decider["key"],
-            of_hundred((decider["worth"], *decider["worth_interval"])),
-            shown(decider.get("flip"), 3),
-            _interval(decider.get("flip_interval")),
-            "above" if decider.get("pick_above") else "below",
-        )
-        for decider in robust.get("decides") or []
-        if decider.get("worth_interval")
-    ]
-    header = ("input", "points of chance gained by measuring it", "flips at", "95 % interval", "pick is better")
     note = "Points: by how much of 100 the chance of the right choice rises."
-    return Table("Inputs that decide", header, rows, note, text_columns=(3, 4))
+    content = "The inputs that decide between the pick and the original, by worth."
+    return Sheet("Inputs that decide", DECIDERS, robust.decides, note, file="decides.csv", content=content)
 
 
-def _inputs(robust: Record) -> Table:
+def robust_input_sheet(robust: Robust) -> Sheet[UnknownInput]:
     """Each input with its range and the source of that; a screened one with its largest share of a variance."""
-    screened = robust.get("screened") or {}
-    rows = [
-        (
-            entry["key"],
-            law_words(entry["law"]),
-            str(entry.get("reason") or "stated in the file"),
-            _percent(screened.get(entry["key"])),
-        )
-        for entry in robust.get("inputs") or []
-    ]
-    header = ("input", "range", "source of the range", "screened, share of a variance")
-    return Table("Inputs, ranges and sources", header, rows, text_columns=(1, 2))
-
-
-def _effort(robust: Record) -> str:
-    """How many inputs varied in how many runs."""
-    inputs, pairs, runs = (robust.get(key) for key in ("inputs", "pairs", "runs"))
-    if not inputs or pairs is None:
-        return ""
-    return f"{counted(len(inputs), 'input')} varied together in {counted(pairs, 'input set')}, {counted(runs or 0, 'run')}."
-
-
-def law_words(law: Mapping[str, Any]) -> str:
-    """'0.3 to 3 (evenly by ratio)', of a law as JSON."""
-    times = f" times {law['times']}" if law.get("times") else ""
-    kind = LAWS.get(str(law.get("law")), str(law.get("law") or ""))
-    if law.get("mean") is not None:
-        return f"{with_error(law['mean'], law.get('sd'))} (1 sd){times} ({kind})"
-    if law.get("low") is not None and law.get("high") is not None:
-        return f"{shown(law['low'])} to {shown(law['high'])}{times} ({kind})"
-    if law.get("law") == "choices":
-        return f"{', '.join(map(str, law.get('values') or ()))} ({kind})"
-    return kind
-
-
-def robust_tables(robust: Record) -> dict[str, list[dict[str, Any]]]:
-    """Rows of the inputs and of what decides."""
-    return {
-        INPUTS: [
-            {
-                "input": entry["key"],
-                **{key: entry["law"].get(key) for key in ("law", "low", "high", "times")},
-                "range": law_words(entry["law"]),
-                "source": entry.get("reason"),
-            }
-            for entry in robust["inputs"]
-        ],
-        DECIDES: [
-            {
-                "input": decider["key"],
-                "worth": decider["worth"],
-                **_ends("worth", decider["worth_interval"]),
-                "flip": decider["flip"],
-                **_ends("flip", decider["flip_interval"]),
-                "pick_above": decider["pick_above"],
-            }
-            for decider in robust["decides"]
-        ],
-    }
-
-
-def _ends(name: str, interval: Sequence[float] | None) -> dict[str, float | None]:
-    low, high = interval or (None, None)
-    return {f"{name}_low": low, f"{name}_high": high}
-
-
-def _interval(interval: Sequence[float] | None) -> str:
-    return " to ".join(shown(end, 3) for end in interval) if interval else ""
+    screened = Column[UnknownInput](
+        "", words="screened, share of a variance", cell=lambda entry: _percent(robust.screened.get(entry.key))
+    )
+    return input_sheet(robust.inputs, screened)
 
 
 def _percent(share: float | None) -> str:
