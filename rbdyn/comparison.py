@@ -17,8 +17,8 @@ from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
-from rbdyn.base.records import Record, finite, shown
-from rbdyn.base.table import Column, Sheet, columns_of
+from rbdyn.base.records import Record, finite, shown, written
+from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, label, quantity, signed_with_error, value_alone
 from rbdyn.base.words import shown as value_text
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, full_status
@@ -50,8 +50,8 @@ class Input(Record):
     a: Any = shown("A", cell=lambda entry: value_words(entry.a, entry.a_default), text=True, unit="of the key",
                    meaning="its values; empty where the scene has no such key")  # fmt: skip
     b: Any = shown("B", cell=lambda entry: value_words(entry.b, entry.b_default), text=True)
-    a_default: bool = shown("", screen=False, meaning="whether the value is the default")
-    b_default: bool = shown("", screen=False)
+    a_default: bool = written("whether the value is the default")
+    b_default: bool = written("")
 
     @property
     def is_left_out(self) -> bool:
@@ -79,12 +79,21 @@ class Difference(Record):
     ``error_together``), "equal", "error unknown", "only in A" or "only in B".
     """
 
-    a: float | None
-    b: float | None
-    difference: float | None
-    error: float | None
-    error_together: float | None
-    verdict: str
+    a: float | None = shown(
+        "A", value_alone, error="error_together", unit="of the figure", meaning="its values, and B less A"
+    )
+    b: float | None = shown("B", value_alone, error="error_together")
+    difference: float | None = shown("B - A", cell=lambda figure: figure.words)
+    error: float | None = written("half width of the 95 % interval of this difference alone", unit="of the figure")
+    error_together: float | None = written(
+        "half width that holds together with those of the other figures of the bearing, or of the parts",
+        unit="of the figure",
+    )
+    verdict: str = shown(
+        "difference",
+        text=True,
+        meaning="significant, within error (`error_together`), equal, error unknown, only in A or B",
+    )
 
     @property
     def percent(self) -> float | None:
@@ -100,19 +109,10 @@ class Difference(Record):
 
 
 DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
-    Column("figure", label, at=lambda row: row[0], meaning="name of the figure, its unit at the end"),
-    Column("a", value_alone, "A", at=lambda row: row[1].a, error=lambda row: row[1].error_together, unit="of the figure",
-           meaning="its values, and B less A"),
-    Column("b", value_alone, "B", at=lambda row: row[1].b, error=lambda row: row[1].error_together),
-    Column("difference", words="B - A", at=lambda row: row[1].difference, cell=lambda row: row[1].words),
-    Column("error", screen=False, at=lambda row: row[1].error, unit="of the figure",
-           meaning="half width of the 95 % interval of this difference alone"),
-    Column("error_together", screen=False, at=lambda row: row[1].error_together, unit="of the figure",
-           meaning="half width that holds together with those of the other figures of the bearing, or of the parts"),
-    Column("verdict", words="difference", text=True, at=lambda row: row[1].verdict,
-           meaning="significant, within error (`error_together`), equal, error unknown, only in A, only in B"),
-    Column("percent", screen=False, unit="%", at=lambda row: row[1].percent, meaning="difference over the size of A"),
-)  # fmt: skip
+    Column("figure", label, at=0, meaning="name of the figure, its unit at the end"),
+    *within(1, columns_of(Difference)),
+    Column("percent", screen=False, unit="%", at=(1, "percent"), meaning="difference over the size of A"),
+)
 
 
 def difference_sheet(figures: Mapping[str, Difference]) -> Sheet[tuple[str, Difference]]:

@@ -7,14 +7,15 @@ import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
 from rbdyn.base.notes import Notes
-from rbdyn.base.records import Record, derived, json_fields
-from rbdyn.base.table import Column, Sheet, each
+from rbdyn.base.records import Record, derived, json_fields, shown, written
+from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
@@ -25,6 +26,10 @@ Saved = TypeVar("Saved")
 version_of = functools.cache(version)
 
 
+# What tables say of figures and of their errors.
+OF_FIGURE, HALF_WIDTHS = "of the figure", "half widths of the 95 % intervals"
+
+
 class Quantity(Record):
     """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
 
@@ -32,11 +37,17 @@ class Quantity(Record):
     ``degrees_of_freedom``: of Student's t in the statistical error, None without one.
     """
 
-    value: float
-    statistical_error: float | None
-    numerical_error: float | None
-    effective_samples: float
-    degrees_of_freedom: int | None = None
+    value: float = shown(
+        "value", cell=lambda figure: figure.value_text, unit=OF_FIGURE, meaning="mean over all turns and replicates"
+    )
+    statistical_error: float | None = shown(
+        "statistical error (95 %)", error_alone, missing="not estimated", unit=OF_FIGURE, meaning=HALF_WIDTHS
+    )
+    numerical_error: float | None = shown(
+        "numerical error (95 %)", error_alone, missing="not estimated", unit=OF_FIGURE, meaning=HALF_WIDTHS
+    )
+    effective_samples: float = written("independent samples behind the statistical error")
+    degrees_of_freedom: int | None = written("those of Student's t in the statistical error", default=None)
 
     @property
     def error(self) -> float | None:
@@ -72,66 +83,22 @@ def full_status(result: Any) -> str:
     return f"{result.status}: {reason}" if reason and result.status != "ok" else str(result.status)
 
 
-# What the manual says of columns of figures.
-OF_FIGURE: dict[str, Any] = {"unit": "of the figure", "screen": False}
-HALF_WIDTHS = "half widths of the 95 % intervals"
+def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]:
+    """A row a figure by its name, or its words."""
+    name: Column[tuple[str, Quantity]] = Column("figure", at=0, meaning="name of the figure, its unit at the end")
+    columns = (name, *within(1, columns_of(Quantity)))
+    return Sheet("", columns, tuple(figures.items()), file="figures.csv", content="A row a figure of `rbdyn simulate`.")
 
 
 def figure_columns(names: Iterable[str]) -> tuple[Column[Any], ...]:
     """Columns of files with each figure and its two errors, of rows that have ``figures`` by name."""
-    value = Column[Any](
-        "{}",
-        at=("figures", "{}", "value"),
-        meaning="each figure of the bearing, and of its parts: power terms, operating "
-        "clearances, contact pressures and films",
-        **OF_FIGURE,
-    )
-    errors = (
-        Column[Any](f"{{}}_{kind}", at=("figures", "{}", kind), meaning=HALF_WIDTHS, **OF_FIGURE)
-        for kind in ("statistical_error", "numerical_error")
-    )
-    return each(names, value, *errors)
+    quantity_columns = columns_of(Quantity)[:3]
 
+    def column(name: str, of_quantity: Column[Quantity]) -> Column[Any]:
+        key = name if of_quantity.key == "value" else f"{name}_{of_quantity.key}"
+        return replace(within(("figures", name), [of_quantity])[0], key=key, screen=False)
 
-def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]:
-    """A row a figure by its name, or its words."""
-
-    def error(kind: str) -> Column[tuple[str, Quantity]]:
-        return Column(
-            f"{kind}_error",
-            error_alone,
-            f"{kind} error (95 %)",
-            "of the figure",
-            HALF_WIDTHS,
-            at=lambda row: getattr(row[1], f"{kind}_error"),
-            missing="not estimated",
-        )
-
-    columns: tuple[Column[tuple[str, Quantity]], ...] = (
-        Column("figure", at=lambda row: row[0], meaning="name of the figure, its unit at the end"),
-        Column(
-            "value",
-            unit="of the figure",
-            at=lambda row: row[1].value,
-            cell=lambda row: row[1].value_text,
-            meaning="mean over all turns and replicates",
-        ),
-        error("statistical"),
-        error("numerical"),
-        Column(
-            "effective_samples",
-            screen=False,
-            at=lambda row: row[1].effective_samples,
-            meaning="independent samples behind the statistical error",
-        ),
-        Column(
-            "degrees_of_freedom",
-            screen=False,
-            at=lambda row: row[1].degrees_of_freedom,
-            meaning="those of Student's t in the statistical error",
-        ),
-    )
-    return Sheet("", columns, tuple(figures.items()), file="figures.csv", content="A row a figure of `rbdyn simulate`.")
+    return tuple(column(name, of_quantity) for name in names for of_quantity in quantity_columns)
 
 
 class SavedRecord(Record):

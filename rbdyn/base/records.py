@@ -52,12 +52,19 @@ def shown(heading: str, form: Any = 4, **options: Any) -> Any:
     return field(metadata={"column": {"words": heading, "form": form, **column}}, **options)
 
 
+def written(meaning: str, **options: Any) -> Any:
+    """A field with a column in files alone, and its meaning in the manual."""
+    return shown("", screen=False, meaning=meaning, **options)
+
+
 def outside_json(**options: Any) -> Any:
     """A field that JSON leaves out."""
     return field(metadata={"path": None}, **options)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, outside_json))
+@dataclass_transform(
+    frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, written, outside_json)
+)
 @dataclass(frozen=True)
 class Record:
     """Base of all records, which makes them frozen dataclasses; ``kw_only``: with named arguments only.

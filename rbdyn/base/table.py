@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 # Significant digits, a format (one that ends in " %" takes a share), or a function of a value, and of its error if it has one.
 Form = int | str | Callable[..., str]
-# Where a value is in a row: a name, names one within the other, or a function of the row.
-Place = str | tuple[str, ...] | Callable[[R], Any]
+# Where a value is in a row: a name or a number, several one within the other, or a function of the row.
+Place = str | int | tuple[str | int, ...] | Callable[[R], Any]
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,16 @@ class Column(Generic[R]):
 def value_at(row: Any, place: Place[Any]) -> Any:
     """The value of a row at a place; None where a name on the way is missing from a mapping or leads to None."""
     if callable(place):
-        return place(row)
-    for name in (place,) if isinstance(place, str) else place:
+        return None if row is None else place(row)
+    for name in place if isinstance(place, tuple) else (place,):
         if row is not None:
-            row = row.get(name) if isinstance(row, Mapping) else getattr(row, name)
+            row = (
+                row[name]
+                if isinstance(name, int)
+                else row.get(name)
+                if isinstance(row, Mapping)
+                else getattr(row, name)
+            )
     return row
 
 
@@ -118,6 +124,23 @@ def columns_of(kind: type[R]) -> tuple[Column[R], ...]:
         Column(item.name, **item.metadata.get("column", {"screen": False}))
         for item in fields(kind)  # type: ignore[arg-type]
         if item.metadata.get("path", "") is not None
+    )
+
+
+def within(place: Place[R], columns: Iterable[Column[Any]]) -> tuple[Column[R], ...]:
+    """Columns of what stands at a place of a row."""
+
+    def moved(inner: Place[Any]) -> Callable[[R], Any]:
+        return lambda row: value_at(value_at(row, place), inner)
+
+    return tuple(
+        replace(
+            column,
+            at=moved(column.key if column.at is None else column.at),
+            error=None if column.error is None else moved(column.error),
+            cell=None if column.cell is None else moved(column.cell),
+        )
+        for column in columns
     )
 
 
