@@ -19,6 +19,7 @@ from rbdyn.base.words import counted, quantity, with_error
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
+    from doe.response_surface.statistics import Fit
     from doe.workflow.asked import Asked
     from doe.workflow.problem import Problem
 
@@ -90,54 +91,28 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
 class FitAnswer(Answer):
     """Response surfaces. Tables: "quality" (a row a response), "anova", "coefficients" (in coded units), "runs" (residuals).
 
-    ``factors``: names in the order of the letters of the terms; ``columns``: those of a table fitted without a study.
+    ``fits``: of each response; ``factors``: names in the order of the letters of the terms; ``columns``: those of a table
+    fitted without a study.
     """
 
+    fits: "Sequence[Fit]" = ()
     factors: tuple[str, ...] = ()
     columns: str = ""
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.fit import fit_blocks
-        from doe.report.sections.record import drop_undefined, readable
+        from doe.report.sections.record import readable
 
-        fits = [
-            block
-            for name, fitted in drop_undefined(self.record["responses"]).items()
-            for block in fit_blocks(name, fitted, self.factors)
-        ]
-        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *readable(fits)], judged=False)
+        fits = readable(fit_blocks(self.fits, self.factors))
+        return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *fits], judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
-        return fit_rows(self.record["responses"])
+        from doe.report.sections.fit import fit_rows
+
+        return fit_rows(self.fits)
 
     def brief(self) -> str:
-        fits = self.record["responses"].items()
-        return ", ".join(f"{quantity(name)[0]} {fit['model']} R² {fit['r2']:.3f}" for name, fit in fits)
-
-
-QUALITY = ("model", "r2", "adjusted_r2", "predicted_r2", "press", "cv_percent", "adequate_precision")
-
-
-def fit_rows(fits: Mapping[str, Any]) -> dict[str, Rows]:
-    """Tables of the fits of ``doe fit --json`` by response."""
-    return {
-        "quality": [{"response": name, **{key: fit[key] for key in QUALITY}} for name, fit in fits.items()],
-        "anova": [{"response": name, **row} for name, fit in fits.items() for row in fit["anova"]],
-        "coefficients": [
-            {
-                "response": name,
-                "term": term,
-                "coefficient": value,
-                "standard_error": fit["standard_errors"][term],
-                **fit["tests"][term],
-                "vif": fit["vif"].get(term),
-                "actual_units": fit["actual_coefficients"][term],
-            }
-            for name, fit in fits.items()
-            for term, value in fit["coefficients"].items()
-        ],
-        "runs": [{"response": name, **run} for name, fit in fits.items() for run in fit["diagnostics"]["runs"]],
-    }
+        return ", ".join(f"{quantity(fit.name)[0]} {fit.model} R² {fit.r2:.3f}" for fit in self.fits)
 
 
 def fit(
@@ -168,7 +143,8 @@ def fit(
     Raises InputError with all faults of study, table or arguments, RunError where runs fail.
     """
     from doe.report.identity import study_identity
-    from doe.report.sections.fit import fit_record, fit_tables
+    from doe.report.sections.fit import fit_files
+    from doe.response_surface.statistics import fits_of
     from doe.workflow.surfaces import unrivalled, with_rivals
 
     table, folder = (
@@ -181,7 +157,7 @@ def fit(
         stack.enter_context(registered(study.path, folder))
         study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
         surfaces = with_rivals(surfaces)
-        record = fit_record(surfaces) | notes_record((*reading, *notes, *unrivalled(surfaces)))
+        record = fits_of(surfaces).as_dict() | notes_record((*reading, *notes, *unrivalled(surfaces)))
         columns = (
             f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
             "of a factor's range"
@@ -189,11 +165,12 @@ def fit(
         answer = FitAnswer(
             record,
             folder,
+            fits=surfaces,
             factors=tuple(study.factors),
             columns=columns if path is None else "",
             identity=study_identity("doe fit", study, table),
         )
-        return replace(answer, files=saved(output, "fit.json", answer, partial(fit_tables, surfaces)))
+        return replace(answer, files=saved(output, "fit.json", answer, partial(fit_files, surfaces)))
 
 
 def _study_or_table(

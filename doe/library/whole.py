@@ -8,7 +8,7 @@ from typing import Any
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered
-from doe.library.steps import fit_rows, part_rows, point_row
+from doe.library.steps import part_rows, point_row
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
 from rbdyn.base.pace import Notice
@@ -48,10 +48,12 @@ class StudyAnswer(Answer):
 
     def rows(self) -> Mapping[str, Rows]:
         from doe.report.sections.duty import duty_rows
+        from doe.report.sections.fit import fit_rows
         from doe.report.summary import restored
+        from doe.response_surface.statistics import Fits
 
         record = self.record
-        fits = fit_rows(record["fit"]["responses"])
+        fits = fit_rows([*Fits.from_dict(record["fit"]).responses.values()])
         return {
             "gains": self._gains(),
             "pick": self._factors(),

@@ -8,6 +8,7 @@ from typer.main import get_command
 from doe.cli import app
 from doe.commands.keys import kinds
 from doe.manual.drawings import drawings
+from doe.report.sections.fit import ANOVA, RUNS, TERMS
 from rbdyn.base.table import Sheet
 from rbdyn.scene.keys import Part
 
@@ -19,4 +20,4 @@ def part() -> Part:
 
 def tables() -> dict[str, list[Sheet[Any]]]:
     """The files of tables that the commands write."""
-    return {}
+    return {"Tables of a study": [ANOVA, TERMS, RUNS]}

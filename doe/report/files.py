@@ -14,7 +14,7 @@ from doe.report.sections.answer import changes, confirmation_record, first_scree
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
 from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
-from doe.report.sections.fit import diagnostics, fit_record, fit_tables
+from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import notes_of, readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
@@ -27,6 +27,7 @@ from doe.report.sections.search import (
     search_sentences,
 )
 from doe.report.summary import restored
+from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.asked import Settings
@@ -61,7 +62,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     study, record = outcome.study, summary(outcome)
     tables = {
         RUNS_TABLE: _runs_table(record),
-        **fit_tables(outcome.surfaces),
+        **fit_files(outcome.surfaces),
         "front.csv": front_tables(record["front"])["front.csv"]
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
@@ -147,7 +148,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "edge": outcome.edge.as_dict(),
         "asked": Settings.of_runs(study).as_dict(),
         "design": study_design_record(outcome),
-        "fit": fit_record(outcome.surfaces),
+        "fit": fits_of(outcome.surfaces).as_dict(),
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
         "pick": study.by_factor(outcome.pick.point),

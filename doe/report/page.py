@@ -17,9 +17,9 @@ from typing import Any
 from doe.report.sections import answer, bearing, chain, design, duty, fit, front, robust
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
-from doe.report.sections.front import bounds, complete, fronts, picks
-from doe.report.sections.record import Record, drop_undefined, factors, fits, notes_of, part, readable, record_table
-from doe.report.summary import restored
+from doe.report.sections.front import complete, fronts, picks
+from doe.report.sections.record import Record, drop_undefined, factors, notes_of, part, readable, record_table
+from doe.report.summary import Summary, restored
 from doe.workflow.asked import Factor, Response
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
@@ -182,30 +182,24 @@ def packed(numbers: Sequence[float]) -> dict[str, Any]:
     return {"step": step, "first": first, "letters": "".join(LETTERS[k // 64] + LETTERS[k % 64] for k in counts)}
 
 
-def _surfaces(summary: Record) -> list[dict[str, Any]]:
-    """Terms and coefficients; with the covariance also what a 95 % confidence interval needs."""
+def _surfaces(summary: Summary) -> list[dict[str, Any]]:
+    """Terms and coefficients with their covariance, and what a 95 % confidence interval needs besides."""
     from scipy.stats import t
 
-    surfaces, limits = [], bounds(summary)
-    for name, fitted in fits(summary).items():
-        coefficients = fitted["coefficients"]
-        covariance, model_error = fitted.get("covariance"), fitted.get("model_error") or {}
-        residual = next((row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None)
-        freedom = model_error.get("dof") or residual
-        surfaces.append(
-            {
-                "name": name,
-                "bounds": limits.get(name, []),
-                **_named(summary.asked.response(name)),
-                "terms": list(coefficients),
-                "coefficients": list(coefficients.values()),
-                "covariance": covariance,
-                "student": float(t.ppf(0.975, freedom)) if covariance and residual else None,
-                "missed": model_error.get("variance"),
-                "power": fitted.get("transform"),
-            }
-        )
-    return surfaces
+    return [
+        {
+            "name": name,
+            "bounds": summary.asked.response(name).bounds,
+            **_named(summary.asked.response(name)),
+            "terms": list(fitted.by_term),
+            "coefficients": list(fitted.by_term.values()),
+            "covariance": fitted.covariance.tolist(),
+            "student": float(t.ppf(0.975, fitted.interval_dof)),
+            "missed": None if fitted.model_error is None else fitted.model_error.variance,
+            "power": fitted.transform,
+        }
+        for name, fitted in summary.fit.responses.items()
+    ]
 
 
 def reference(summary: Record, motion: Mapping[str, Any]) -> Section:

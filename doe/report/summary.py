@@ -5,6 +5,7 @@ from dataclasses import fields
 from typing import Any
 
 from doe.report.sections.record import drop_undefined
+from doe.response_surface.statistics import Fits
 from doe.workflow.asked import Settings
 from doe.workflow.judgement import Robust
 from rbdyn.base.identity import Identity
@@ -28,7 +29,7 @@ class Summary(Record, kw_only=True):
     edge: Any
     asked: Settings
     design: Any
-    fit: Any
+    fit: Fits
     front: Any
     pick_on_surfaces: Any
     pick: dict[str, Any]

@@ -1,10 +1,13 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
-- ``surface``: fit, prediction, canonical analysis, and sentences on the statistics
+- ``surface``: fit and prediction
+- ``statistics``: what is known of a fit, and sentences on it
+- ``canonical``: stationary point and axes of curvature
 - ``least_squares``: runs of a response, their checks, the solution, and power transforms of Box and Cox
 - ``adequacy``: analysis of variance, elimination, residual diagnostics, known variances, model error
 - ``comparison``: cross-validation with a Gaussian process
 """
 
 from doe.designs.model import model_matrix
-from doe.response_surface.surface import Surface, describe, fit
+from doe.response_surface.statistics import describe
+from doe.response_surface.surface import Surface, fit

@@ -30,7 +30,8 @@ variance components (1946); Welch (1951).
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal, TypedDict, cast
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 from scipy import special, stats
@@ -39,7 +40,7 @@ from doe.designs.design import replicate_groups
 from doe.designs.model import Terms, needed
 from doe.response_surface.least_squares import LeastSquares
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.records import Record, derived, finite, keyed, outside_json
+from rbdyn.base.records import Record, derived, finite, keyed
 
 KEEP_BELOW = 0.05  # p-value up to which a term stays in a reduced model
 EXACT = 1e-12  # 1 - leverage below which the fit passes through a run, whatever its value
@@ -50,7 +51,7 @@ REACH = 1.0  # correlation length of the model error in coded units, half the ed
 Source = Literal["repeats", "known variance", "residual"]
 
 
-class AnovaRow(TypedDict):
+class AnovaRow(Record):
     """One row of an analysis of variance; ``ss`` of a term is partial (type III).
 
     ``df`` is None for a variance that is known exactly.
@@ -64,7 +65,7 @@ class AnovaRow(TypedDict):
     p: float | None
 
 
-class Removal(TypedDict):
+class Removal(Record):
     """A removed term, with its F and p among the terms at that time."""
 
     term: str
@@ -85,7 +86,7 @@ def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, 
     about_mean = sum_within(response, np.zeros_like(block))
     return [
         row("model", max(within - residual, 0.0), model_df, *error),
-        *(entry for entry in term_rows(terms, solution) if entry["source"] != "1"),
+        *(entry for entry in term_rows(terms, solution) if entry.source != "1"),
         *([row("block", solution.partial_sum(block_columns), len(block_columns), *error)] * bool(block_columns)),
         row("residual", residual, solution.dof),
         *_lack_of_fit(response, solution, groups),
@@ -110,7 +111,7 @@ def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
 
 def find(rows: list[AnovaRow], source: str) -> AnovaRow:
     """The row of a source."""
-    return next(entry for entry in rows if entry["source"] == source)
+    return next(entry for entry in rows if entry.source == source)
 
 
 def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tuple[AnovaRow, AnovaRow]:
@@ -122,7 +123,7 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tupl
     tested = row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df)
     if pure == 0.0 < lack:
         # Any miss is lack of fit where repeated runs agree exactly.
-        tested["p"] = 0.0
+        tested = replace(tested, p=0.0)
     return tested, row("pure_error", pure, pure_df)
 
 
@@ -180,18 +181,18 @@ def eliminate(terms: Terms, solve_for: Callable[[Terms], LeastSquares]) -> tuple
     removed: list[Removal] = []
     while True:
         removable = [
-            Removal(term=entry["source"], f=entry["f"], p=entry["p"])
+            Removal(term=entry.source, f=entry.f, p=entry.p)
             for entry in term_rows(terms, solve_for(terms))
-            if entry["f"] is not None and entry["p"] is not None and entry["p"] > KEEP_BELOW
-            if not needed(entry["source"], terms)
+            if entry.f is not None and entry.p is not None and entry.p > KEEP_BELOW
+            if not needed(entry.source, terms)
         ]
         if not removable:
             return terms, removed
-        removed.append(max(removable, key=lambda removal: (removal["p"], removal["term"])))
-        terms = tuple(term for term in terms if term != removed[-1]["term"])
+        removed.append(max(removable, key=lambda removal: (removal.p, removal.term)))
+        terms = tuple(term for term in terms if term != removed[-1].term)
 
 
-class RunDiagnostics(TypedDict):
+class RunDiagnostics(Record):
     """One run, on the scale of the fit. ``run`` counts from 1.
 
     ``standardized`` is the internally studentized residual r / (s sqrt(1 - h)), ``studentized`` the
@@ -208,15 +209,32 @@ class RunDiagnostics(TypedDict):
     cook: float | None
 
 
-class Diagnostics(TypedDict):
+class Normality(Record):
+    """Test of Shapiro and Wilk on the standardized residuals; None where it is undefined."""
+
+    test: str
+    w: float | None
+    p: float | None
+
+
+class Outlier(Record):
+    """Test of Bonferroni on the largest externally studentized residual, that of a ``run``; None where it is undefined."""
+
+    test: str
+    run: int | None
+    studentized: float | None
+    p: float | None
+
+
+class Diagnostics(Record):
     """Runs and tests: Shapiro-Wilk on the standardized residuals, the largest studentized one by Bonferroni.
 
     ``high_leverage`` and ``influential`` list runs (from 1).
     """
 
     runs: list[RunDiagnostics]
-    normality: dict[str, float | str | None]
-    outlier: dict[str, float | int | str | None]
+    normality: Normality
+    outlier: Outlier
     high_leverage: list[int]
     influential: list[int]
 
@@ -238,7 +256,7 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     rows = zip(runs, *([finite(value) for value in column.tolist()] for column in figures), strict=True)
     high = solution.leverage > HIGH_LEVERAGE * len(solution.coefficients) / len(response)
     return Diagnostics(
-        runs=[cast(RunDiagnostics, dict(zip(RunDiagnostics.__annotations__, row, strict=True))) for row in rows],
+        runs=[RunDiagnostics(*row) for row in rows],
         normality=_normality(standardized[tested]),
         outlier=_outlier(studentized, solution.dof - 1),
         high_leverage=(np.flatnonzero(high) + 1).tolist(),
@@ -246,31 +264,31 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     )
 
 
-def _normality(standardized: Array) -> dict[str, float | str | None]:
+def _normality(standardized: Array) -> Normality:
     if len(standardized) < 3 or np.ptp(standardized) == 0:
-        return {"test": "Shapiro-Wilk", "w": None, "p": None}
+        return Normality("Shapiro-Wilk", None, None)
     test = stats.shapiro(standardized)
-    return {"test": "Shapiro-Wilk", "w": float(test.statistic), "p": float(test.pvalue)}
+    return Normality("Shapiro-Wilk", float(test.statistic), float(test.pvalue))
 
 
-def _outlier(studentized: Array, dof: int) -> dict[str, float | int | str | None]:
+def _outlier(studentized: Array, dof: int) -> Outlier:
     defined = np.flatnonzero(np.isfinite(studentized))
     test = "Bonferroni on the largest externally studentized residual"
     if not defined.size:
-        return {"test": test, "run": None, "studentized": None, "p": None}
+        return Outlier(test, None, None, None)
     run = int(defined[np.abs(studentized[defined]).argmax()])
     p = min(1.0, defined.size * 2 * float(stats.t.sf(abs(studentized[run]), dof)))
-    return {"test": test, "run": run + 1, "studentized": float(studentized[run]), "p": p}
+    return Outlier(test, run + 1, float(studentized[run]), p)
 
 
 def describe_diagnostics(diagnostics: Diagnostics, alpha: float) -> list[str]:
     """Residual tests in sentences."""
-    tests = _say_normality(diagnostics["normality"]["p"], alpha), _say_outlier(diagnostics["outlier"], alpha)
+    tests = _say_normality(diagnostics.normality.p, alpha), _say_outlier(diagnostics.outlier, alpha)
     return [*filter(None, tests), _say_runs(diagnostics)]
 
 
-def _say_normality(p: float | str | None, alpha: float) -> str:
-    if not isinstance(p, float):
+def _say_normality(p: float | None, alpha: float) -> str:
+    if p is None:
         return ""
     if p > alpha:
         return f"the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
@@ -280,11 +298,11 @@ def _say_normality(p: float | str | None, alpha: float) -> str:
     )
 
 
-def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> str:
-    p = outlier["p"]
-    if not isinstance(p, float):
+def _say_outlier(outlier: Outlier, alpha: float) -> str:
+    p = outlier.p
+    if p is None:
         return ""
-    run = f"run {outlier['run']} (studentized residual {outlier['studentized']:+.2f}, Bonferroni {p_text(p)})"
+    run = f"run {outlier.run} (studentized residual {outlier.studentized:+.2f}, Bonferroni {p_text(p)})"
     if p > alpha:
         return f"no run is an outlier; the most extreme is {run}."
     return f"{run} is an outlier: check this run before you trust or remove it."
@@ -292,11 +310,11 @@ def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> 
 
 def _say_runs(diagnostics: Diagnostics) -> str:
     parts = []
-    if diagnostics["influential"]:
-        listed = _list(diagnostics["influential"])
+    if diagnostics.influential:
+        listed = _list(diagnostics.influential)
         parts.append(f"{listed} alone would move the surface beyond its own error (Cook's distance above 1)")
-    if diagnostics["high_leverage"]:
-        parts.append(f"{_list(diagnostics['high_leverage'])}: high leverage (above twice the mean)")
+    if diagnostics.high_leverage:
+        parts.append(f"{_list(diagnostics.high_leverage)}: high leverage (above twice the mean)")
     return f"{'; '.join(parts)}." if parts else "no run has undue leverage or influence."
 
 
@@ -312,22 +330,21 @@ def _list(runs: list[int]) -> str:
 class KnownVariance(Record):
     """Comparison of a fit with known variances.
 
-    ``chi_square``: of the residual over the known variance, with ``df``, its mean for a true model, and ``p``. ``pure_error``: ANOVA row of the replicate variance at the repeated points. Its
-    ``f`` is pure error over this variance and its ``p`` two-sided, both None without repeats. ``covariance``: of the surface's
-    coefficients by the known variances alone, with ``standard_errors``. ``dof``: of the variance of one run, None where it is
-    known exactly.
+    ``chi_square``: of the residual over the known variance, with ``df``, its mean for a true model, and ``p``.
+    ``pure_error_ratio``: pure error over the replicate variance at the repeated points, with a two-sided ``pure_error_p``, both
+    None without repeats. ``covariance``: of the surface's coefficients by the known variances alone, with ``standard_errors``.
+    ``dof``: of the variance of one run, None where it is known exactly.
     """
 
     chi_square: float
     df: int
     p: float
     mean_square_ratio: float = derived(lambda self: self.chi_square / self.df)
-    pure_error_ratio: float | None = derived(lambda self: self.pure_error["f"])
-    pure_error_p: float | None = derived(lambda self: self.pure_error["p"])
+    pure_error_ratio: float | None
+    pure_error_p: float | None
     dof: float | None = keyed("variance_dof")
     standard_errors: Array = derived(lambda self: np.sqrt(np.diag(self.covariance)))
     covariance: Array
-    pure_error: AnovaRow = outside_json()
 
     @property
     def refuted(self) -> bool:
@@ -337,8 +354,8 @@ class KnownVariance(Record):
 
 def compare(
     fit: LeastSquares, matrix: Array, response: Array, variances: Array, replicates: Whole, groups: Whole, count: int
-) -> KnownVariance:
-    """Compare the residual and the pure error of a fit with the ``variances`` (n,) of the runs.
+) -> tuple[KnownVariance, AnovaRow]:
+    """Compare the residual and the pure error of a fit with the ``variances`` (n,) of the runs; also the row of the latter.
 
     ``matrix`` (n, p): of the fit, with the surface in its first ``count`` columns. ``groups`` (n,): repeated points.
     ``replicates`` (n,): number behind each variance, 0 for variances taken as exact. The residual sum over the mean variance
@@ -349,14 +366,17 @@ def compare(
     df = fit.dof
     chi_square = fit.residual_sum / float(variances.mean())
     project = fit.inverse[:count] @ matrix.T
-    return KnownVariance(
+    pure_error = _pure_error_row(response, variances, groups, dof)
+    known = KnownVariance(
         chi_square=chi_square,
         df=df,
         p=_upper_tail(variances, dof, chi_square, df),
-        pure_error=_pure_error_row(response, variances, groups, dof),
+        pure_error_ratio=pure_error.f,
+        pure_error_p=pure_error.p,
         covariance=(project * variances) @ project.T,
         dof=dof,
     )
+    return known, pure_error
 
 
 def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
@@ -429,8 +449,8 @@ def model_error(
     if known_variance is not None and not known_variance.refuted:
         beyond *= 1.0 - known_variance.df / known_variance.chi_square if known_variance.chi_square else 0.0
         source = "known variance"
-    elif pure["df"]:
-        beyond, dof, source = (lack["ss"] or 0.0) - (lack["df"] or 0) * (pure["ms"] or 0.0), lack["df"] or 0, "repeats"
+    elif pure.df:
+        beyond, dof, source = (lack.ss or 0.0) - (lack.df or 0) * (pure.ms or 0.0), lack.df or 0, "repeats"
     return ModelError(beyond / share, dof, source) if share > 0.0 and dof > 0 and beyond > 0.0 else None
 
 

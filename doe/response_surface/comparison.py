@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from string import ascii_uppercase
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +11,7 @@ from scipy import stats
 
 from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
+from doe.response_surface.statistics import Comparison, Difference, ProcessScore, Score
 from doe.response_surface.surface import Surface
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Rows, Whole
@@ -30,7 +30,7 @@ Rival = Callable[[Rows, Array], Array]
 
 def compare(
     coded: ArrayLike, values: ArrayLike, refit: Callable[[Rows], Surface], *, name: str, matrix: ArrayLike | None = None
-) -> dict[str, Any]:
+) -> Comparison:
     """Leave out each point in turn with all its replicates, refit both rivals, and compare their errors there.
 
     Both rivals see the same runs. Each fit without the point estimates the hyperparameters of the process and selects the
@@ -43,16 +43,6 @@ def compare(
     refit : the polynomial fitted to the runs of some rows; it raises MethodError where they do not suffice.
     matrix : model matrix of the polynomial (n, p), to find the points that it needs (leverage of all replicates together
         above 0.95); by default only those without which ``refit`` fails.
-
-    Returns a record:
-
-    - ``polynomial`` and ``gaussian_process``: ``loo_rmse`` and ``loo_r2`` (None where all points have one mean)
-    - of the process also ``length_scales`` in coded units by letter, ``deviation`` of the random function and
-      ``log_likelihood``; ``noise`` of a run
-    - ``difference`` of the squared errors, polynomial less process: ``mean``, ``standard_error`` and 95 % ``interval`` by
-      Student's t over the points, which are taken as independent
-    - ``points``: number compared; ``folds``: number of fits; ``sentence``
-    - ``recommended``: "gaussian_process" only where the interval is above zero, else "polynomial"
 
     Raises MethodError when fewer than three points can be left out.
 
@@ -82,15 +72,15 @@ def compare(
     extent = f"{len(truths)} of {len(firsts)} points{'' if singly else f' (in {len(folds)} groups)'}"
     difference = _difference(squares[:, 0] - squares[:, 1])
     scores = [_score(score, truths) for score in squares.T]
-    return {
-        "polynomial": scores[0],
-        "gaussian_process": {**scores[1], **_hyperparameters(whole)},
-        "difference": difference,
-        "points": len(truths),
-        "folds": len(folds),
-        "recommended": "gaussian_process" if difference["interval"][0] > 0.0 else "polynomial",
-        "sentence": _sentence(name, extent, *(score["loo_rmse"] for score in scores), *difference["interval"]),
-    }
+    return Comparison(
+        polynomial=Score(*scores[0]),
+        gaussian_process=_process_score(*scores[1], whole),
+        difference=difference,
+        points=len(truths),
+        folds=len(folds),
+        recommended="gaussian_process" if difference.interval[0] > 0.0 else "polynomial",
+        sentence=_sentence(name, extent, *(rmse for rmse, _ in scores), *difference.interval),
+    )
 
 
 def _folds(firsts: Whole, singly: bool) -> list[Whole]:
@@ -100,15 +90,17 @@ def _folds(firsts: Whole, singly: bool) -> list[Whole]:
     return np.array_split(np.random.default_rng(1).permutation(firsts), FOLDS)
 
 
-def _hyperparameters(process: Emulator) -> dict[str, Any]:
+def _process_score(rmse: float, r2: float | None, process: Emulator) -> ProcessScore:
     parameters = process.hyperparameters
-    return {
-        "kernel": "Matern 5/2",
-        "length_scales": dict(zip(ascii_uppercase, parameters.lengths.tolist(), strict=False)),
-        "deviation": math.sqrt(parameters.variance),
-        "noise": math.sqrt(parameters.nugget),
-        "log_likelihood": process.likelihood,
-    }
+    return ProcessScore(
+        rmse,
+        r2,
+        kernel="Matern 5/2",
+        length_scales=dict(zip(ascii_uppercase, parameters.lengths.tolist(), strict=False)),
+        deviation=math.sqrt(parameters.variance),
+        noise=math.sqrt(parameters.nugget),
+        log_likelihood=process.likelihood,
+    )
 
 
 @one_thread
@@ -133,16 +125,16 @@ def _leave_out(
     return np.concatenate(truths), np.vstack(predictions)
 
 
-def _difference(paired: Array) -> dict[str, Any]:
+def _difference(paired: Array) -> Difference:
     mean, error = float(paired.mean()), float(paired.std(ddof=1) / math.sqrt(paired.size))
     reach = float(stats.t.ppf(0.975, paired.size - 1)) * error
-    return {"mean": mean, "standard_error": error, "interval": [mean - reach, mean + reach]}
+    return Difference(mean, error, [mean - reach, mean + reach])
 
 
-def _score(squares: Array, means: Array) -> dict[str, Any]:
+def _score(squares: Array, means: Array) -> tuple[float, float | None]:
+    """Root mean square of the errors, and the share of the scatter of the means that the predictions explain."""
     total = float(((means - means.mean()) ** 2).sum())
-    r2 = 1.0 - float(squares.sum()) / total if total > 0.0 else None
-    return {"loo_rmse": math.sqrt(squares.mean()), "loo_r2": r2}
+    return math.sqrt(squares.mean()), 1.0 - float(squares.sum()) / total if total > 0.0 else None
 
 
 def _sentence(name: str, extent: str, polynomial: float, process: float, low: float, high: float) -> str:

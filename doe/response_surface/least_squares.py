@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +23,7 @@ from scipy import linalg, optimize, special, stats
 from doe.designs.model import Terms, block_contrasts
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record, keyed
 from rbdyn.base.words import are, counted
 
 DEPENDENT = 1e-9  # share of a column's length outside the span of the others below which it depends on them
@@ -235,9 +235,15 @@ SEARCHED = (-5.0, 5.0)
 LEVEL = 0.95  # of the interval
 NAMES = {-2.0: "1/y^2", -1.0: "1/y", -0.5: "1/sqrt(y)", 0.0: "ln y", 0.5: "sqrt(y)", 2.0: "y^2"}
 
-BoxCox = TypedDict(
-    "BoxCox", {"lambda": float, "interval": list[float], "searched": list[float], "recommended": float, "sentence": str}
-)
+
+class BoxCox(Record):
+    """Advice on the exponent of a transform, as `box_cox` gives it."""
+
+    exponent: float = keyed("lambda")
+    interval: list[float]
+    searched: list[float]
+    recommended: float
+    sentence: str
 
 
 def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> BoxCox:
@@ -247,9 +253,9 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     values : response of each run, shape (n,), all positive.
     name : name of the response, for the sentences.
 
-    Returns ``lambda`` of the largest likelihood and its ``interval``, cut at the range ``searched``. In the interval the
+    Returns the ``exponent`` of the largest likelihood and its ``interval``, cut at the range ``searched``. In the interval the
     likelihood-ratio statistic is below the chi-squared quantile of `LEVEL`. ``recommended`` is 1 (no transform) if that is in the
-    interval, else the usual exponent in it nearest to ``lambda``, else ``lambda``. An interval beyond all usual exponents
+    interval, else the usual exponent in it nearest to ``exponent``, else ``exponent``. An interval beyond all usual exponents
     indicates outliers or missing terms, and 1 is recommended.
 
     Raises MethodError when a value is not positive, the values are all equal, or no more runs than columns are given.
@@ -286,9 +292,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     beyond = interval[1] < USUAL[0] or interval[0] > USUAL[-1]
     nearest = min(inside, key=lambda exponent: abs(exponent - best), default=best)
     recommended = 1.0 if beyond or 1.0 in inside else nearest
-    sentence = _sentence(name, best, interval, recommended)
-    profile = {"lambda": best, "interval": interval, "searched": list(SEARCHED), "recommended": recommended}
-    return cast(BoxCox, profile | {"sentence": sentence})
+    return BoxCox(best, interval, list(SEARCHED), recommended, _sentence(name, best, interval, recommended))
 
 
 def _log_likelihood(columns: Array, response: Array) -> Callable[[float], float]:

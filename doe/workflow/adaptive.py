@@ -202,7 +202,7 @@ def border_of(study: Problem) -> Border | None:
 
 def advice(study: Problem, surfaces: list[Surface]) -> list[str]:
     """Advice to search adaptively, for surfaces with significant lack of fit; else none."""
-    lacking = [surface.name for surface in surfaces if (p := surface.lack_of_fit["p"]) is not None and p < SIGNIFICANT]
+    lacking = [surface.name for surface in surfaces if (p := surface.lack_of_fit.p) is not None and p < SIGNIFICANT]
     if not lacking:
         return []
     design = len(study.design.coded)

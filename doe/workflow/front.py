@@ -338,7 +338,7 @@ def _at_design(surface: Surface) -> Misses:
     if data.standard_errors is not None:
         errors = data.standard_errors
     else:
-        pure = surface.pure_error["ms"] if surface.model_error is not None else None
+        pure = surface.pure_error.ms if surface.model_error is not None else None
         variance = surface.residual_mean_square if pure is None else pure
         errors = np.full(len(data.values), np.sqrt(variance if surface.transform is None else 0.0))
     points, misses = data.points[rows], data.values[rows] - surface.predict(data.points[rows])

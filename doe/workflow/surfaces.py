@@ -61,22 +61,21 @@ def fit_surfaces(study: Problem, runs: Runs) -> list[Surface]:
 
 def _numbered(surface: Surface, rows: Whole) -> Surface:
     """The surface with its runs numbered by their ``rows`` of the table, which has more."""
-    old = surface.diagnostics
-    numbers = dict(enumerate((rows + 1).tolist(), 1))
-    outlier = old["outlier"]["run"]
-    diagnostics: Diagnostics = {
-        **old,
-        "runs": [{**run, "run": numbers[run["run"]]} for run in old["runs"]],
-        "outlier": old["outlier"] | {"run": numbers[outlier] if isinstance(outlier, int) else None},
-        "high_leverage": [numbers[run] for run in old["high_leverage"]],
-        "influential": [numbers[run] for run in old["influential"]],
-    }
+    old, numbers = surface.diagnostics, dict(enumerate((rows + 1).tolist(), 1))
+    outlier = old.outlier.run
+    diagnostics = Diagnostics(
+        runs=[replace(run, run=numbers[run.run]) for run in old.runs],
+        normality=old.normality,
+        outlier=replace(old.outlier, run=None if outlier is None else numbers[outlier]),
+        high_leverage=[numbers[run] for run in old.high_leverage],
+        influential=[numbers[run] for run in old.influential],
+    )
     return replace(surface, diagnostics=diagnostics)
 
 
 def _places(surfaces: Sequence[Surface]) -> list[list[int]]:
     """Places of each surface's runs among all runs, from 0."""
-    return [[run["run"] - 1 for run in surface.diagnostics["runs"]] for surface in surfaces]
+    return [[run.run - 1 for run in surface.diagnostics.runs] for surface in surfaces]
 
 
 @one_thread
@@ -224,7 +223,7 @@ def _of_columns(runs: Runs, columns: Rows) -> Runs:
 
 def _effect(ours: Surface, theirs: Surface, letter: str) -> Effect:
     values = [surface.by_term.get(letter, 0.0) for surface in (ours, theirs)]
-    p_value = {row["source"]: row["p"] for row in theirs.anova}.get(letter)
+    p_value = {row.source: row.p for row in theirs.anova}.get(letter)
     return Effect(values[0], values[1], p_value is not None and p_value < 0.05)
 
 
@@ -334,7 +333,7 @@ def residual_correlation(surfaces: Sequence[Surface]) -> Array:
     places = _places(surfaces)
     residuals = np.zeros((len(surfaces), 1 + max(map(max, places))))
     for row, surface, columns in zip(residuals, surfaces, places, strict=True):
-        row[columns] = [run["residual"] for run in surface.diagnostics["runs"]]
+        row[columns] = [run.residual for run in surface.diagnostics.runs]
     size = np.sqrt((residuals**2).sum(axis=1))
     unit = np.divide(residuals, size[:, None], out=np.zeros_like(residuals), where=size[:, None] > 0.0)
     matrix = unit @ unit.T
@@ -498,10 +497,10 @@ def predicted_gains(study: Problem, surfaces: Sequence[Surface], point: Array) -
             shared, _model_error_of_difference(surface, coded, rows)
         )
         pure, scatter = surface.pure_error, None
-        if pure["ms"] is not None and surface.residual_mean_square > 0.0:
+        if pure.ms is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
-            single = math.sqrt(pure["ms"] * sum(float(row[constant]) ** 2 for row in rows))
-            scatter = float(stats.t.ppf(0.975, pure["df"])) * single
+            single = math.sqrt(pure.ms * sum(float(row[constant]) ** 2 for row in rows))
+            scatter = float(stats.t.ppf(0.975, pure.df)) * single
         gains.append(
             PredictedGain(
                 response=surface.name,

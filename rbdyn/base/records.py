@@ -144,6 +144,12 @@ def restore(kind: Any, value: Any) -> Any:
         return {key: restore(kinds[1], item) for key, item in value.items()}
     elif origin in (list, tuple) and isinstance(value, list):
         return origin(restore(kinds[0], item) for item in value)
+    elif origin is Literal and value in kinds:
+        return value
+    elif getattr(origin, "__name__", "") == "ndarray":
+        import numpy as np
+
+        return np.asarray(value)
     elif kind is Note:
         return Note.of(value)
     elif isinstance(kind, type) and issubclass(kind, tuple) and isinstance(value, list):

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from doe.cli import app
-from doe.report.sections.fit import fit_blocks, fit_record
+from doe.report.sections.fit import fit_blocks
 from doe.running.store import StoppedError
 from doe.study_file.table import read_table
 from doe.workflow.problem import Problem
@@ -107,12 +107,11 @@ def test_equations_are_in_coded_and_in_actual_units(tmp_path):
     TABLE.to_csv(tmp_path / "table.csv", index=False)
     loaded = Problem.load(study(tmp_path))
     surfaces = fit_surfaces(loaded, read_runs(loaded, tmp_path / "table.csv"))
-    name, fitted = next(iter(fit_record(surfaces)["responses"].items()))
-    printed = text(fit_blocks(name, fitted, loaded.factors))
+    printed = text(fit_blocks(surfaces[:1], loaded.factors))
     assert "impact force = +203.7 +22.979 A +17.186 B +32.248 C (coded)" in printed
     assert "impact force = -133.26 +4595.7 A +343.72 B +644.96 C (actual units)" in printed
-    quiet = text(fit_blocks(name, fitted, loaded.factors), Detail.LEAST).splitlines()
-    said = [sentence.partition(": ")[2] for sentence in fitted["sentences"]]
+    quiet = text(fit_blocks(surfaces[:1], loaded.factors), Detail.LEAST).splitlines()
+    said = [sentence.partition(": ")[2] for sentence in surfaces[0].sentences]
     assert quiet == ["impact force [N]", *(sentence[:1].upper() + sentence[1:] for sentence in said)]
 
 

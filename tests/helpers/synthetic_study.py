@@ -39,16 +39,26 @@ def point(coded: list[float], error: float = 0.01) -> dict[str, Any]:
 def fitted(name: str, runs: list[list[float]]) -> dict[str, Any]:
     """R of ``doe fit`` for a made-up surface."""
     terms = list(COEFFICIENTS[name])
-    rows = [("model", 3), *((term, 1) for term in terms[1:]), ("residual", 16)]
+    rows = [
+        ("model", 3, 0.01),
+        *((term, 1, 0.01) for term in terms[1:]),
+        ("residual", 16, None),
+        ("lack_of_fit", 5, 0.2),
+    ]
+    rows += [("pure_error", 11, None), ("total", 19, None)]
     return {
         "model": "quadratic",
         "coefficients": COEFFICIENTS[name],
         "terms": terms,
         "covariance": (0.01 * np.eye(len(terms))).tolist(),
-        "standard_errors": dict.fromkeys(terms, 0.1),
-        "anova": [{"source": source, "ss": 1.5, "df": df, "ms": 1.5, "f": 4.0, "p": 0.01} for source, df in rows],
-        "lack_of_fit": {"ss": 1.0, "df": 5, "f": 2.0, "p": 0.2},
-        "pure_error": {"ss": 1.0, "df": 5, "ms": 0.2},
+        "vif": dict.fromkeys(terms[1:], 1.0),
+        "residual_dof": 16,
+        "observation_variance": 1.5,
+        "actual_coefficients": COEFFICIENTS[name],
+        "blocks": {},
+        "elimination": [],
+        **dict.fromkeys(("box_cox", "canonical", "known_variance", "model_error", "rival")),
+        "anova": [{"source": source, "ss": 1.5, "df": df, "ms": 1.5, "f": 4.0, "p": p} for source, df, p in rows],
         **{"r2": 0.98, "adjusted_r2": 0.97, "predicted_r2": 0.9, "press": 3.0},
         **{"cv_percent": 1.2, "adequate_precision": 20.0},
         "stationary_point": {"coded": [0.0] * 3, "actual": CENTRE, "eigenvalues": [1.0] * 3, "nature": "minimum"},
@@ -65,9 +75,12 @@ def fitted(name: str, runs: list[list[float]]) -> dict[str, Any]:
                     "cook": 0.1,
                 }
                 for run, coded in enumerate(runs)
-            ]
+            ],
+            "normality": {"test": "Shapiro-Wilk", "w": 0.95, "p": 0.4},
+            "outlier": {"test": "Bonferroni", "run": 3, "studentized": 0.9, "p": 1.0},
+            "high_leverage": [],
+            "influential": [],
         },
-        "sentences": [f"{name}: lack of fit is not significant (p = 0.2000)."],
         "transform": None,
     }
 

@@ -53,12 +53,12 @@ def pair(request):
 
 
 def rows(surface):
-    return {row["source"]: row for row in surface.anova}
+    return {row.source: row for row in surface.anova}
 
 
 def test_coefficients_with_their_tests_and_intervals(pair):
     ours, oracle = pair
-    table, size = pd.DataFrame(ours.coefficient_table()), np.abs(oracle.params).max()
+    table, size = pd.DataFrame(ours.coefficient_table), np.abs(oracle.params).max()
     assert table["coefficient"].to_numpy() == close(oracle.params, size)
     assert table["standard_error"].to_numpy() == close(oracle.bse)
     assert table["t"].to_numpy() == close(oracle.tvalues, 100)
@@ -73,13 +73,13 @@ def test_analysis_of_variance(pair):
     total = oracle.centered_tss
     for term, source in zip(ours.terms[1:], oracle.params.index[1:], strict=True):
         theirs = partial.loc[source]
-        assert found[term]["ss"] == close(theirs["sum_sq"], total)
-        assert found[term]["f"] == close(theirs["F"], 100)
-        assert found[term]["p"] == close(theirs["PR(>F)"], 1e3)
-    assert found["residual"]["ss"] == close(oracle.ssr)
-    assert found["residual"]["df"] == oracle.df_resid
-    assert found["total"]["ss"] == close(total)
-    assert (found["model"]["f"], found["model"]["p"]) == (close(oracle.fvalue), close(oracle.f_pvalue))
+        assert found[term].ss == close(theirs["sum_sq"], total)
+        assert found[term].f == close(theirs["F"], 100)
+        assert found[term].p == close(theirs["PR(>F)"], 1e3)
+    assert found["residual"].ss == close(oracle.ssr)
+    assert found["residual"].df == oracle.df_resid
+    assert found["total"].ss == close(total)
+    assert (found["model"].f, found["model"].p) == (close(oracle.fvalue), close(oracle.f_pvalue))
 
 
 def test_summary_figures(pair):
@@ -93,13 +93,13 @@ def test_summary_figures(pair):
 
 
 def ours_leverage(surface):
-    return np.array([run["leverage"] for run in surface.diagnostics["runs"]])
+    return np.array([run.leverage for run in surface.diagnostics.runs])
 
 
 def test_influence(pair):
     ours, oracle = pair
     influence = oracle.get_influence()
-    found = pd.DataFrame(ours.diagnostics["runs"])
+    found = pd.DataFrame(ours.diagnostics.runs)
     assert found["leverage"].to_numpy() == close(influence.hat_matrix_diag)
     assert found["standardized"].to_numpy() == close(influence.resid_studentized_internal, 10)
     assert found["studentized"].to_numpy() == close(influence.resid_studentized_external, 10)
@@ -107,10 +107,10 @@ def test_influence(pair):
     assert found["residual"].to_numpy() == close(oracle.resid, float(np.abs(oracle.fittedvalues).max()))
     assert found["predicted"].to_numpy() == close(oracle.fittedvalues)
     worst = int(np.abs(influence.resid_studentized_external).argmax())
-    assert ours.diagnostics["outlier"]["run"] == worst + 1
+    assert ours.diagnostics.outlier.run == worst + 1
     bonferroni = float(oracle.outlier_test(method="bonferroni").iloc[worst, 2])
-    assert ours.diagnostics["outlier"]["p"] == close(bonferroni)
-    assert ours.diagnostics["normality"]["p"] == close(stats.shapiro(influence.resid_studentized_internal).pvalue)
+    assert ours.diagnostics.outlier.p == close(bonferroni)
+    assert ours.diagnostics.normality.p == close(stats.shapiro(influence.resid_studentized_internal).pvalue)
 
 
 def test_intervals_of_predictions(pair):
@@ -130,7 +130,7 @@ def test_variance_inflation(pair):
     ours, oracle = pair
     exog = oracle.model.exog
     for column in range(1, exog.shape[1]):
-        assert ours.vif[column] == close(variance_inflation_factor(exog, column))
+        assert ours.inflation[ours.terms[column]] == close(variance_inflation_factor(exog, column))
 
 
 def test_covariance_from_known_variances(pair):
@@ -149,11 +149,11 @@ def test_blocks_are_a_source_of_their_own():
     frame = pd.DataFrame(points, columns=list("abc")).assign(y=values[:, 1], block=block)
     oracle = smf.ols(f"y ~ {TERMS.lower().replace('i(', 'I(')} + C(block, Sum)", frame).fit()
     found, partial = rows(ours), anova_lm(oracle, typ=3)
-    assert found["block"]["ss"] == close(partial.loc["C(block, Sum)", "sum_sq"])
-    assert found["block"]["p"] == close(partial.loc["C(block, Sum)", "PR(>F)"])
-    assert found["block"]["df"] == 2
-    assert found["B"]["f"] == close(partial.loc["b", "F"])
-    assert found["residual"]["ss"] == close(oracle.ssr)
+    assert found["block"].ss == close(partial.loc["C(block, Sum)", "sum_sq"])
+    assert found["block"].p == close(partial.loc["C(block, Sum)", "PR(>F)"])
+    assert found["block"].df == 2
+    assert found["B"].f == close(partial.loc["b", "F"])
+    assert found["residual"].ss == close(oracle.ssr)
     effects = oracle.params[["C(block, Sum)[S.0]", "C(block, Sum)[S.1]"]].to_numpy()
     # The oracle's effects sum to zero over the blocks, ours over the runs.
     by_block = np.array([*effects, -effects.sum()])
@@ -166,8 +166,8 @@ def test_blocks_are_a_source_of_their_own():
     alone = smf.ols("y ~ C(block, Sum)", frame).fit()
     assert ours.r2 == close(1 - oracle.ssr / alone.ssr)
     model = anova_lm(alone, oracle)
-    assert found["model"]["f"] == close(model.loc[1, "F"])
-    assert found["model"]["p"] == close(model.loc[1, "Pr(>F)"])
+    assert found["model"].f == close(model.loc[1, "F"])
+    assert found["model"].p == close(model.loc[1, "Pr(>F)"])
 
 
 def test_pure_error_counts_within_blocks():
@@ -176,8 +176,8 @@ def test_pure_error_counts_within_blocks():
     ours = fit(points, values[:, 1], name="y", centre=CENTRE, step=STEP, block=block)
     frame = pd.DataFrame(points).round(9).assign(y=values[:, 1], block=block)
     saturated = smf.ols("y ~ C(cell)", frame.assign(cell=frame.groupby([0, 1, 2, "block"]).ngroup())).fit()
-    assert ours.pure_error["ss"] == close(saturated.ssr)
-    assert ours.pure_error["df"] == saturated.df_resid == 4
+    assert ours.pure_error.ss == close(saturated.ssr)
+    assert ours.pure_error.df == saturated.df_resid == 4
 
 
 def test_orthogonal_blocks_leave_the_surface_as_it_is():

@@ -21,4 +21,4 @@ def interval(surface: Surface, coded, level: float = 0.95, extra: float = 0.0):
 
 def new_run_interval(surface: Surface, coded, level: float = 0.95):
     """The same of a single new run."""
-    return interval(surface, coded, level, surface.observation_variance)
+    return interval(surface, coded, level, surface.residual_mean_square)

@@ -41,8 +41,14 @@ def test_two_factors_of_awkward_names_draw_as_they_are(browser):
     record["asked"]["factors"][0] |= {"name": "</script><b>x</b>"}
     del record["asked"]["factors"][2]
     for fitted in record["fit"]["responses"].values():
-        fitted["coefficients"] = {"1": 1.0, "A": 2.0, "B": 0.5}
-        del fitted["covariance"]
+        terms = {"1": 1.0, "A": 2.0, "B": 0.5}
+        fitted |= {
+            "coefficients": terms,
+            "terms": list(terms),
+            "covariance": np.diag([0.01] * 3).tolist(),
+            "vif": {"A": 1.0, "B": 1.0},
+        }
+        fitted |= {"actual_coefficients": terms, "stationary_point": None}
     (folder / "awkward.html").write_text(html_report(record), encoding="utf-8")
     page = opened(browser, name="awkward.html")
     assert "</script><b>x</b>" in page.find_element("id", "surface_x").text

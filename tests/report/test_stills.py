@@ -21,6 +21,7 @@ from doe.report.sections.bearing import power_bars
 from doe.report.sections.chain import FILLS, contributions
 from doe.report.sections.fit import diagnostic_plots
 from doe.report.still import COLOURS, Still, name_marks, save
+from doe.report.summary import restored
 from rbdyn.base.blocks import Figures
 
 POINTS = [(0.0, 10.0), (1.0, 30.0), (4.0, 20.0)]
@@ -99,7 +100,7 @@ def test_every_picture_is_coloured_by_its_page_and_refers_to_nothing_outside(sti
 
 
 def test_dollars_and_quotes_of_a_name_stay_as_they_are():
-    runs = summary()["fit"]["responses"][RESPONSES[0]]["diagnostics"]["runs"]
+    runs = restored(summary()).fit.responses[RESPONSES[0]].diagnostics.runs
     name = 'a$b$ <i> "c" & d_mm'
     text = diagnostic_plots(name, runs)[0].svg()
     words = [each.text for each in ElementTree.fromstring(text).iter("text")]

@@ -7,8 +7,8 @@ import pytest
 import statsmodels.api as sm
 from surface_intervals import interval
 
-from doe.report.sections.fit import fit_record
 from doe.response_surface import Surface, describe, fit, model_matrix
+from doe.response_surface.statistics import fits_of
 from rbdyn.base.faults import MethodError
 
 
@@ -55,17 +55,17 @@ def random_table(seed: int) -> tuple[Surface, dict[str, object]]:
 
 def check(surface: Surface, near: object) -> None:
     """Finite JSON, one sentence on lack of fit, nearly equal columns named, and the numbers of statsmodels."""
-    json.dumps(fit_record([surface]), allow_nan=False)
+    json.dumps(fits_of([surface]).as_dict(), allow_nan=False)
     sentences = describe(surface)
     assert sum("y: lack of fit" in line for line in sentences) == 1
     named = any("variance inflation factor" in line for line in sentences)
-    assert named == bool(np.nanmax(surface.vif, initial=0.0) > 10.0)
+    assert named == bool(max(filter(None, surface.inflation.values()), default=0.0) > 10.0)
     assert named or not near or surface.model == "reduced"
     assert not any("explains the residual" in line for line in sentences)
     if surface.model_error is not None:
         assert surface.model_error.variance > 0.0 and surface.interval_dof > 0
     oracle = sm.OLS(surface.data.values, model_matrix(surface.data.points, surface.terms)).fit()
-    if np.nanmax(surface.vif, initial=0.0) < 1e3 and surface.residual_mean_square > 1e-20:
+    if max(filter(None, surface.inflation.values()), default=0.0) < 1e3 and surface.residual_mean_square > 1e-20:
         assert surface.coefficients == pytest.approx(oracle.params, rel=1e-8, abs=1e-9)
         assert np.sqrt(np.diag(surface.covariance)) == pytest.approx(oracle.bse, rel=1e-6)
 

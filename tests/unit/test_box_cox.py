@@ -30,24 +30,24 @@ def additive_model() -> tuple[np.ndarray, np.ndarray]:
 def test_literature_survival_times_call_for_the_reciprocal():
     """Literature: Box and Cox (1964): lambda = -0.75, 95 % interval -1.13 to -0.37; they take -1."""
     found = box_cox(*additive_model(), name="survival")
-    assert found["lambda"] == pytest.approx(-0.75, abs=0.005)
-    assert found["interval"] == pytest.approx([-1.13, -0.37], abs=0.02)
-    assert found["recommended"] == -1.0
-    assert "1/y" in found["sentence"]
+    assert found.exponent == pytest.approx(-0.75, abs=0.005)
+    assert found.interval == pytest.approx([-1.13, -0.37], abs=0.02)
+    assert found.recommended == -1.0
+    assert "1/y" in found.sentence
 
 
 def test_oracle_scipy_without_factors():
     values = np.random.default_rng(3).lognormal(1.0, 0.4, 40) + 1.0
     exponent, interval = stats.boxcox(values, alpha=0.05)[1:]
     found = box_cox(np.ones((40, 1)), values)
-    assert found["lambda"] == pytest.approx(exponent, abs=1e-5)
-    assert found["interval"] == pytest.approx(interval, abs=1e-5)
+    assert found.exponent == pytest.approx(exponent, abs=1e-5)
+    assert found.interval == pytest.approx(interval, abs=1e-5)
 
 
 def test_scale_of_the_response_does_not_matter():
     matrix, values = additive_model()
     here, there = box_cox(matrix, values), box_cox(matrix, 3600.0 * values)
-    assert there["interval"] == pytest.approx(here["interval"], abs=1e-6)
+    assert there.interval == pytest.approx(here.interval, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -64,14 +64,14 @@ def test_a_response_made_by_a_power_is_found(power, recommended, words):
     x = np.linspace(-1.0, 1.0, 30)
     z = 3.0 + 2.0 * x + np.random.default_rng(1).normal(0.0, 0.02, x.size)
     found = box_cox(np.column_stack([np.ones(30), x]), z**power)
-    assert found["lambda"] == pytest.approx(1.0 / power, rel=0.01)
-    assert found["recommended"] == recommended
-    assert words in found["sentence"]
+    assert found.exponent == pytest.approx(1.0 / power, rel=0.01)
+    assert found.recommended == recommended
+    assert words in found.sentence
 
 
 def test_an_exact_fit_keeps_the_response():
     x = np.linspace(-1.0, 1.0, 9)
-    assert box_cox(np.column_stack([np.ones(9), x]), 5.0 + x)["recommended"] == 1.0
+    assert box_cox(np.column_stack([np.ones(9), x]), 5.0 + x).recommended == 1.0
 
 
 @given(st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=5), st.sampled_from([-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0]))

@@ -82,9 +82,9 @@ def test_left_out_polynomial_misses_agree_with_press():
     values = bent(points)
     found = compare(points, values, refit_of(points, values), name="y")
     surface = refit_of(points, values)(np.arange(len(points)))
-    assert found["points"] == len(points)
-    assert found["polynomial"]["loo_rmse"] ** 2 * len(points) == pytest.approx(surface.press, rel=1e-9)
-    assert found["polynomial"]["loo_r2"] == pytest.approx(surface.predicted_r2, rel=1e-9)
+    assert found.points == len(points)
+    assert found.polynomial.loo_rmse**2 * len(points) == pytest.approx(surface.press, rel=1e-9)
+    assert found.polynomial.loo_r2 == pytest.approx(surface.predicted_r2, rel=1e-9)
 
 
 def test_points_that_the_polynomial_cannot_do_without_are_not_compared():
@@ -92,8 +92,8 @@ def test_points_that_the_polynomial_cannot_do_without_are_not_compared():
     values = bent(POINTS)
     matrix = model_matrix(POINTS, ("1", "A", "B", "AB", "A^2", "B^2"))
     found = compare(POINTS, values, refit_of(POINTS, values), name="y", matrix=matrix)
-    assert found["points"] == 8
-    assert "8 of 9 points" in found["sentence"]
+    assert found.points == 8
+    assert "8 of 9 points" in found.sentence
 
 
 def test_replicates_leave_together():
@@ -113,12 +113,12 @@ def test_the_process_is_preferred_only_where_it_is_clearly_better():
     grid = np.array([[a, b] for a in np.linspace(-2, 2, 6) for b in np.linspace(-2, 2, 3)])
     curved = np.sin(2.5 * grid[:, 0]) + 0.3 * grid[:, 1]
     clear = compare(grid, curved, refit_of(grid, curved), name="y")
-    assert clear["recommended"] == "gaussian_process"
-    assert clear["difference"]["interval"][0] > 0.0
+    assert clear.recommended == "gaussian_process"
+    assert clear.difference.interval[0] > 0.0
     straight = grid @ [1.0, -2.0] + np.random.default_rng(1).normal(0.0, 0.3, len(grid))
     level = compare(grid, straight, refit_of(grid, straight, "linear"), name="y")
-    assert level["recommended"] == "polynomial"
-    assert "keep" in level["sentence"]
+    assert level.recommended == "polynomial"
+    assert "keep" in level.sentence
 
 
 @pytest.mark.parametrize("values", [np.zeros(3), np.full(12, np.nan)])
@@ -138,5 +138,5 @@ def test_many_points_are_left_out_in_groups():
     points = np.random.default_rng(2).uniform(-1.5, 1.5, (160, 2))
     values = bent(points)
     groups = compare(points, values, refit_of(points, values), name="y")
-    assert (groups["points"], groups["folds"]) == (160, 20)
-    assert groups["recommended"] == "gaussian_process"
+    assert (groups.points, groups.folds) == (160, 20)
+    assert groups.recommended == "gaussian_process"

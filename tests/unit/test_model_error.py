@@ -58,7 +58,7 @@ def test_interval_of_a_true_model_covers_it_and_is_that_of_the_textbook_without_
     assert 0.3 < told < 0.7 and 0.9 < before <= after < 0.995
     surface = fit(POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(4).normal(size=20), **KEYWORDS)
     lack, pure = surface.lack_of_fit, surface.pure_error
-    assert lack["ss"] / lack["df"] < pure["ms"]
+    assert lack.ss / lack.df < pure.ms
     assert surface.model_error is None and surface.interval_dof == surface.residual_dof == 10
     low, high = interval(surface, [0.5, 0.5, 0.5])
     half = special.stdtrit(10, 0.975) * surface.prediction_standard_error([0.5, 0.5, 0.5])
@@ -69,7 +69,7 @@ def test_without_noise_the_whole_residual_is_model_error():
     """Repeated runs that agree exactly, and single runs: nothing of the residual is scatter."""
     truth = wavy(3, 1.0, 0.7)
     exact = fit(POINTS, truth(POINTS), **KEYWORDS)
-    assert exact.lack_of_fit["p"] == 0.0 and exact.lack_of_fit["f"] is None
+    assert exact.lack_of_fit.p == 0.0 and exact.lack_of_fit.f is None
     assert exact.model_error.source == "repeats" and exact.model_error.dof == 5
     assert sum("lack of fit is certain" in line for line in describe(exact)) == 1
     single = fit(POINTS[:15], truth(POINTS[:15]), **KEYWORDS)
@@ -97,8 +97,8 @@ def test_words_and_figures_of_it():
     surface = fit(POINTS, wavy(2, 3.0, 0.7)(POINTS) + NOISE * np.random.default_rng(2).normal(size=20), **KEYWORDS)
     lack, pure = surface.lack_of_fit, surface.pure_error
     # With the repeats at the centre, which the model meets by a term of its own, the share is one a run of the rest.
-    assert surface.model_error.variance == pytest.approx(lack["ss"] / lack["df"] - pure["ms"], rel=0.05)
-    assert surface.as_dict()["model_error"]["dof"] == lack["df"] == surface.interval_dof
+    assert surface.model_error.variance == pytest.approx(lack.ss / lack.df - pure.ms, rel=0.05)
+    assert surface.as_dict()["model_error"]["dof"] == lack.df == surface.interval_dof
     assert sum("shown by repeats" in line for line in describe(surface)) == 1
 
 

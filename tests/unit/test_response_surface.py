@@ -11,8 +11,8 @@ import statsmodels.formula.api as smf
 from statsmodels.stats.anova import anova_lm
 
 from doe.designs import central_composite, to_coded
-from doe.report.sections.fit import fit_record
 from doe.response_surface import describe, fit
+from doe.response_surface.statistics import PureError, fits_of
 
 TABLE = Path(__file__).parents[2] / "examples" / "ccd_table4.csv"
 CENTRE, STEP = [0.02, 0.15, 0.3], [0.005, 0.05, 0.05]
@@ -46,7 +46,7 @@ def fitted(data, column, model):
 
 
 def row(surface, source):
-    return next(row for row in surface.anova if row["source"] == source)
+    return next(row for row in surface.anova if row.source == source)
 
 
 @pytest.mark.parametrize("column", range(3))
@@ -55,12 +55,12 @@ def test_lack_of_fit_agrees_with_the_comparison_of_models(printed, column):
     frame = pd.DataFrame(printed[0], columns=list("ABC")).assign(y=printed[1][:, column])
     frame["point"] = [str(np.round(point, 6) + 0.0) for point in printed[0]]
     table = anova_lm(smf.ols(QUADRATIC, frame).fit(), smf.ols("y ~ point", frame).fit())
-    assert surface.lack_of_fit["ss"] == pytest.approx(table.loc[1, "ss_diff"], rel=1e-9)
-    assert surface.lack_of_fit["df"] == table.loc[1, "df_diff"] == 5
-    assert surface.lack_of_fit["f"] == pytest.approx(table.loc[1, "F"], rel=1e-9)
-    assert surface.lack_of_fit["p"] == pytest.approx(table.loc[1, "Pr(>F)"], rel=1e-9)
-    assert surface.pure_error["ss"] == pytest.approx(table.loc[1, "ssr"], rel=1e-9)
-    assert surface.pure_error["df"] == 5
+    assert surface.lack_of_fit.ss == pytest.approx(table.loc[1, "ss_diff"], rel=1e-9)
+    assert surface.lack_of_fit.df == table.loc[1, "df_diff"] == 5
+    assert surface.lack_of_fit.f == pytest.approx(table.loc[1, "F"], rel=1e-9)
+    assert surface.lack_of_fit.p == pytest.approx(table.loc[1, "Pr(>F)"], rel=1e-9)
+    assert surface.pure_error.ss == pytest.approx(table.loc[1, "ssr"], rel=1e-9)
+    assert surface.pure_error.df == 5
 
 
 # The coefficients of equation (22), then source, sum of squares, mean square, F and P of Tables 5-7, as printed.
@@ -126,7 +126,7 @@ def test_reproduces_equation_22_and_tables_5_to_7(behind_the_paper, column):
     for line in TABLES_5_TO_7[column].strip().splitlines():
         source, *texts = line.split()
         for key, text in zip(("ss", "ms", "f", "p"), texts, strict=False):
-            number = row(surface, source)[key]
+            number = getattr(row(surface, source), key)
             assert number < 1e-4 if text == "<0.0001" else number == as_printed(text), (source, key)
     assert surface.r2 == pytest.approx(R2[column], abs=5.1e-5)
 
@@ -137,7 +137,7 @@ def test_few_of_the_printed_numbers_follow_from_table_4_itself(printed):
         surface = fitted(printed, column, model)
         for line in TABLES_5_TO_7[column].strip().splitlines():
             source, *texts = line.split()
-            met += row(surface, source)["ss"] == as_printed(texts[0])
+            met += row(surface, source).ss == as_printed(texts[0])
             total += 1
     # Terms of the ratio and of the loss that the changed cells do not touch, or hardly.
     assert (met, total) == (12, 33)
@@ -146,17 +146,17 @@ def test_few_of_the_printed_numbers_follow_from_table_4_itself(printed):
 def test_loss_of_run_16_makes_nearly_all_pure_error_behind_the_paper(behind_the_paper):
     # An outlier among the centre runs; in the fit it is the most extreme run but swells the residual itself.
     surface = fitted(behind_the_paper, 2, "quadratic")
-    outlier = surface.diagnostics["outlier"]
-    assert outlier["run"] == 16 and outlier["studentized"] < -2.5 and outlier["p"] > 0.05
+    outlier = surface.diagnostics.outlier
+    assert outlier.run == 16 and outlier.studentized < -2.5 and outlier.p > 0.05
     centre = [2.7, 0.1, 0.2, 0.8, 0.2]
     without = float(np.var(centre) * 5)
-    assert surface.pure_error["ss"] > 20 * without
+    assert surface.pure_error.ss > 20 * without
 
 
 @pytest.mark.parametrize(("column", "model"), [(0, "linear"), (1, "quadratic"), (2, "quadratic")])
 def test_table_4_as_printed_has_significant_lack_of_fit(printed, column, model):
     surface = fitted(printed, column, model)
-    assert surface.lack_of_fit["p"] < 0.05
+    assert surface.lack_of_fit.p < 0.05
     assert any("lack of fit is significant" in line for line in describe(surface))
 
 
@@ -169,7 +169,7 @@ def test_published_picture_of_the_data_behind_the_paper(behind_the_paper):
 
 def test_json_has_the_contract_keys_and_no_nan(printed):
     surface = fitted(printed, 1, "quadratic")
-    result = fit_record([surface])["responses"][surface.name]
+    result = fits_of([surface]).as_dict()["responses"][surface.name]
     assert list(result) == [
         *("model", "coefficients", "anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2"),
         *("press", "cv_percent", "adequate_precision", "stationary_point", "terms", "standard_errors", "vif"),
@@ -207,15 +207,15 @@ def test_stationary_point_of_a_known_quadratic(curvature, nature):
     place = np.array([0.3, -0.5, 0.8])
     surface = exact(lambda x: 7 + (x - place) ** 2 @ np.array(curvature))
     found = surface.stationary_point
-    assert found["coded"] == pytest.approx(place, abs=1e-9)
-    assert found["actual"] == pytest.approx(np.array(CENTRE) + place * STEP, abs=1e-9)
-    assert found["eigenvalues"] == pytest.approx(sorted(curvature), abs=1e-9)
-    assert found["nature"] == nature
+    assert found.coded == pytest.approx(place, abs=1e-9)
+    assert found.actual == pytest.approx(np.array(CENTRE) + place * STEP, abs=1e-9)
+    assert found.eigenvalues == pytest.approx(sorted(curvature), abs=1e-9)
+    assert found.nature == nature
 
 
 def test_coupled_factors_rotate_the_stationary_axes():
     surface = exact(lambda x: x[:, 0] * x[:, 1] + x[:, 2] ** 2)
-    assert surface.stationary_point["eigenvalues"] == pytest.approx([-0.5, 0.5, 1], abs=1e-9)
+    assert surface.stationary_point.eigenvalues == pytest.approx([-0.5, 0.5, 1], abs=1e-9)
 
 
 def test_no_stationary_point_without_curvature_in_each_direction():
@@ -227,8 +227,8 @@ def test_reduction_keeps_what_counts_and_its_hierarchy():
     noise = 0.05 * np.random.default_rng(1).normal(size=20)
     surface = exact(lambda x: 5 + x[:, 0] * x[:, 1] + 2 * x[:, 2] + noise, model="reduced")
     assert surface.terms == ("1", "A", "B", "C", "AB")
-    assert row(surface, "AB")["p"] < 0.05
-    assert row(surface, "A")["p"] > 0.05  # kept for the sake of AB
+    assert row(surface, "AB").p < 0.05
+    assert row(surface, "A").p > 0.05  # kept for the sake of AB
 
 
 def test_reduction_of_pure_noise_leaves_little():
@@ -236,9 +236,9 @@ def test_reduction_of_pure_noise_leaves_little():
     surface = exact(lambda x: values, model="reduced")
     for term in surface.terms[1:]:
         needed = any(term in other for other in surface.terms if other != term)
-        assert needed or row(surface, term)["p"] <= 0.05
+        assert needed or row(surface, term).p <= 0.05
     json.dumps(surface.as_dict(), allow_nan=False)
-    left = set(surface.terms) | {each["term"] for each in surface.elimination}
+    left = set(surface.terms) | {each.term for each in surface.elimination}
     assert left == {"1", "A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2"}
     assert any("removed in this order" in line for line in describe(surface))
 
@@ -247,16 +247,16 @@ def test_without_replicates_there_is_no_pure_error():
     points = central_composite(3, centre_replicates=1).coded
     values = np.random.default_rng(2).normal(size=len(points))
     surface = fit(points, values, name="y", centre=CENTRE, step=STEP)
-    assert surface.pure_error == {"ss": None, "df": 0, "ms": None}
-    assert surface.lack_of_fit["p"] is None
+    assert surface.pure_error == PureError(ss=None, df=0, ms=None)
+    assert surface.lack_of_fit.p is None
     assert "no run is replicated" in describe(surface)[1]
     json.dumps(surface.as_dict(), allow_nan=False)
 
 
 def test_equal_replicates_leave_lack_of_fit_undefined():
     surface = exact(lambda x: 0.1 + np.sin(x[:, 0]))
-    assert surface.pure_error["ss"] == 0
-    assert surface.lack_of_fit["f"] is None
+    assert surface.pure_error.ss == 0
+    assert surface.lack_of_fit.f is None
     assert "agree exactly" in describe(surface)[1]
 
 
@@ -264,8 +264,8 @@ def test_replicates_away_from_the_centre_count():
     points = np.vstack([central_composite(2, centre_replicates=1).coded] * 2)
     values = np.random.default_rng(4).normal(size=18)
     surface = fit(points + 1e-12, values, name="y", centre=[0, 0], step=[1, 1])
-    assert surface.pure_error["df"] == 9
-    assert surface.pure_error["ss"] == pytest.approx(((values[:9] - values[9:]) ** 2).sum() / 2)
+    assert surface.pure_error.df == 9
+    assert surface.pure_error.ss == pytest.approx(((values[:9] - values[9:]) ** 2).sum() / 2)
 
 
 def test_prediction_keeps_the_shape_of_its_points(printed):

@@ -9,9 +9,9 @@ from surface_intervals import new_run_interval
 
 from doe.designs import central_composite
 from doe.designs.model import model_terms
-from doe.report.sections.fit import fit_record
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
+from doe.response_surface.statistics import fits_of
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import independent_values, standard_errors, with_rivals
 
@@ -74,9 +74,9 @@ def test_elimination_is_the_order_of_the_largest_p_each_time():
         t = fitted.coefficients / np.sqrt(fitted.mean_square * np.diag(fitted.inverse))
         p = dict(zip(terms, 2 * stats.t.sf(np.abs(t), fitted.dof), strict=True))
         free = [term for term in terms if term != "1" and not any(term in other for other in terms if other != term)]
-        assert removal["term"] == max(free, key=p.get)
-        assert removal["p"] == pytest.approx(p[removal["term"]]) and removal["p"] > 0.05
-        terms = tuple(term for term in terms if term != removal["term"])
+        assert removal.term == max(free, key=p.get)
+        assert removal.p == pytest.approx(p[removal.term]) and removal.p > 0.05
+        terms = tuple(term for term in terms if term != removal.term)
     assert terms == surface.terms and "removed in this order" in sentence(surface, "removed")
 
 
@@ -86,14 +86,14 @@ def test_eigenvalue_errors_are_those_of_a_fit_in_rotated_axes():
     curved = POINTS[:, 0] ** 2 + 3 * POINTS[:, 1] ** 2 - 2 * POINTS[:, 2] ** 2 + 1.5 * POINTS[:, 0] * POINTS[:, 1]
     surface = surface_of(curved + noise(5, deviation=0.1))
     found = surface.canonical
-    turn = np.array(found["eigenvectors"]).T
+    turn = np.array(found.eigenvectors).T
     turned = surface_of(surface.data.values, POINTS @ turn)
     squares = dict(zip(turned.terms, turned.coefficients, strict=True))
-    assert found["eigenvalues"] == pytest.approx([squares[f"{letter}^2"] for letter in "ABC"])
-    rows = {row["term"]: row["high"] - row["coefficient"] for row in turned.coefficient_table()}
-    assert found["eigenvalue_errors"] == pytest.approx([rows[f"{letter}^2"] for letter in "ABC"])
+    assert found.eigenvalues == pytest.approx([squares[f"{letter}^2"] for letter in "ABC"])
+    rows = {row.term: row.high - row.coefficient for row in turned.coefficient_table}
+    assert found.eigenvalue_errors == pytest.approx([rows[f"{letter}^2"] for letter in "ABC"])
     assert turn.T @ turn == pytest.approx(np.eye(3))
-    assert found["nature"] == "saddle"
+    assert found.nature == "saddle"
 
 
 @pytest.mark.parametrize(
@@ -103,16 +103,16 @@ def test_a_direction_without_certain_curvature_is_a_ridge(place, nature, words):
     shape = 5 * (POINTS[:, 0] - 0.2) ** 2 + 4 * POINTS[:, 1] ** 2 + 0.06 * (POINTS[:, 2] - place) ** 2
     # Scatter that the terms cannot take up leaves the coefficients as they are.
     surface = surface_of(shape + solve(model_matrix(POINTS, model_terms(3, "quadratic")), noise(6)).residuals)
-    assert surface.canonical["nature"] == nature
-    assert surface.stationary_point["nature"] == "minimum"
-    assert surface.stationary_point["coded"] == pytest.approx([0.2, 0.0, place], abs=1e-9)
+    assert surface.canonical.nature == nature
+    assert surface.stationary_point.nature == "minimum"
+    assert surface.stationary_point.coded == pytest.approx([0.2, 0.0, place], abs=1e-9)
     assert words in sentence(surface, "stationary point") and "ridge" in sentence(surface, "stationary point")
 
 
 def test_minimum_outside_the_runs_is_said_to_be_there():
     surface = surface_of(((POINTS - [4.0, 0.0, 0.0]) ** 2).sum(axis=1) + noise(7, deviation=0.01))
-    assert surface.canonical["inside"] is False
-    assert surface.canonical["distance"] == pytest.approx(4.0, abs=0.1)
+    assert surface.canonical.inside is False
+    assert surface.canonical.distance == pytest.approx(4.0, abs=0.1)
     assert "outside the region of the runs, is a minimum" in sentence(surface, "stationary point")
 
 
@@ -140,7 +140,7 @@ def test_one_sentence_judges_lack_of_fit_where_two_tests_disagree():
     values = 10 + POINTS @ [1.0, 2.0, -1.0] + noise(8)
     values[-6:] = 10 + 0.5 * (values[-6:] - 10)
     surface = surface_of(values, standard_errors=np.full(20, 1.0), model="linear")
-    assert surface.lack_of_fit["p"] < 0.05 < surface.known_variance.p and not surface.known_variance.refuted
+    assert surface.lack_of_fit.p < 0.05 < surface.known_variance.p and not surface.known_variance.refuted
     assert "is in doubt, for the tests disagree" in sentence(surface, "lack of fit")
     assert not any("explains the residual" in line for line in describe(surface))
 
@@ -162,10 +162,10 @@ def test_columns_that_repeat_each_other_are_named():
 )
 def test_scatter_of_repeated_runs_is_set_beside_their_replicates(told, words):
     surface = surface_of(100 + noise(10), standard_errors=np.full(20, told))
-    row = next(row for row in surface.anova if row["source"] == "replicate_variance")
-    assert row["ms"] == pytest.approx(told**2)
-    assert row["f"] == pytest.approx(surface.pure_error["ms"] / told**2)
-    assert row["p"] == pytest.approx(2 * min(stats.chi2.cdf(5 * row["f"], 5), stats.chi2.sf(5 * row["f"], 5)))
+    row = next(row for row in surface.anova if row.source == "replicate_variance")
+    assert row.ms == pytest.approx(told**2)
+    assert row.f == pytest.approx(surface.pure_error.ms / told**2)
+    assert row.p == pytest.approx(2 * min(stats.chi2.cdf(5 * row.f, 5), stats.chi2.sf(5 * row.f, 5)))
     assert words in sentence(surface, "repeated runs")
 
 
@@ -173,7 +173,7 @@ def test_unknown_errors_leave_no_comparison():
     for errors in (None, np.full(20, np.nan), np.where(np.arange(20) == 3, np.nan, 1.0), np.zeros(20)):
         surface = surface_of(noise(11), standard_errors=errors)
         assert surface.known_variance is None
-        assert all(row["source"] != "replicate_variance" for row in surface.anova)
+        assert all(row.source != "replicate_variance" for row in surface.anova)
 
 
 def test_half_widths_become_standard_errors_by_students_t():
@@ -215,7 +215,7 @@ def test_the_recommended_transform_is_taken_or_advised():
 def test_rival_is_compared_and_told():
     values = 5 + POINTS @ [1.0, 2.0, 3.0] + noise(16, deviation=0.1)
     (surface,) = with_rivals([surface_of(values, model="linear")])
-    record = fit_record([surface])["responses"][surface.name]
+    record = fits_of([surface]).as_dict()["responses"][surface.name]
     assert record["rival"]["recommended"] == "polynomial"
     assert record["rival"]["sentence"] in record["sentences"]
     assert json.loads(json.dumps(record, allow_nan=False)) == record
@@ -236,9 +236,9 @@ def test_a_run_met_exactly_leaves_its_figures_undefined():
     points = np.column_stack([points, np.zeros(len(points))])
     points[-1, 2] = 1.0
     surface = fit(points, noise(18, len(points)), name="y", model="linear", centre=np.zeros(3), step=np.ones(3))
-    last = surface.diagnostics["runs"][-1]
-    assert last["leverage"] == pytest.approx(1.0)
-    assert last["standardized"] is None and last["cook"] is None
+    last = surface.diagnostics.runs[-1]
+    assert last.leverage == pytest.approx(1.0)
+    assert last.standardized is None and last.cook is None
     assert surface.press is None and "cannot be computed" in sentence(surface, "predicted R2")
     json.dumps(surface.as_dict(), allow_nan=False)
 

@@ -244,9 +244,9 @@ def test_draws_of_surfaces_on_different_rows_pair_the_errors_of_common_runs(tmp_
     table.loc[4, "power_loss_W"] = None
     table.to_csv(tmp_path / "gap.csv", index=False)
     whole, gap = (fit_surfaces(study, read_runs(study, tmp_path / name)) for name in ("whole.csv", "gap.csv"))
-    residuals = np.array([[run["residual"] for run in surface.diagnostics["runs"]] for surface in gap[:2]])
+    residuals = np.array([[run.residual for run in surface.diagnostics.runs] for surface in gap[:2]])
     assert residual_correlation(gap)[0, 1] == pytest.approx(np.corrcoef(residuals)[0, 1], abs=0.02)
-    other = np.insert([run["residual"] for run in gap[2].diagnostics["runs"]], 4, 0.0)
+    other = np.insert([run.residual for run in gap[2].diagnostics.runs], 4, 0.0)
     sizes = np.linalg.norm(residuals[0]) * np.linalg.norm(other)
     assert residual_correlation(gap)[0, 2] == pytest.approx(residuals[0] @ other / sizes)
     draws = [

@@ -8,7 +8,7 @@ from conftest import ROOT
 from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
-from doe.report.sections.fit import fit_record
+from doe.response_surface.statistics import fits_of
 from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
 from doe.unknown.propagation import Runs, emulated, sobol, spread_of
@@ -92,5 +92,5 @@ def test_invariant_a_fit_has_the_same_bits_on_any_number_of_threads():
     """Invariant: surfaces, their analysis of variance and their rivals."""
     study = Problem.load(ROOT / "examples" / "clearance_study.toml")
     runs = read_runs(study, ROOT / "examples" / "ccd_table4.csv")
-    one, *others = with_threads(lambda: repr(fit_record(with_rivals(fit_surfaces(study, runs)))))
+    one, *others = with_threads(lambda: repr(fits_of(with_rivals(fit_surfaces(study, runs))).as_dict()))
     assert all(other == one for other in others)

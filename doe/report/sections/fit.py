@@ -1,58 +1,131 @@
-"""The fits: response surfaces, their statistics and pictures, and the record of ``doe fit``."""
+"""The fits: response surfaces, their statistics and pictures, and their tables."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from statistics import NormalDist
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from doe.report.sections.record import Record, factors, fits, part, probability, record_table
+from doe.report.sections.record import probability, record_table
 from doe.report.still import GUIDE, Point, Still, name_marks
-from doe.response_surface import Surface, describe
+from doe.report.summary import Summary
+from doe.response_surface.adequacy import AnovaRow, RunDiagnostics
+from doe.response_surface.statistics import Fit, Term
+from doe.workflow.asked import Factor
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
+from rbdyn.base.records import plain
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, label, quantity, shown, with_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+Row = TypeVar("Row")
 Draw = Callable[[str, Sequence[Point], Sequence[str], "Axes"], None]
 # Studentized residuals beyond this are suspect; runs with a larger Cook's distance are influential.
 SUSPECT, INFLUENTIAL = 3.0, 1.0
-STATISTICS = (
-    ("r2", "R²"), ("adjusted_r2", "adjusted R²"), ("predicted_r2", "predicted R²"), ("press", "PRESS"),
-    ("cv_percent", "CV [%]"), ("adequate_precision", "adequate precision"),
+STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+LEGEND = "*** p <= 0.001, ** p <= 0.01, * p <= 0.05; sums of squares of terms are partial (type III)"
+
+
+def stars(row: AnovaRow | Term) -> str:
+    """Stars of a p value."""
+    return "" if row.p is None else next((stars for limit, stars in STARS if row.p <= limit), "")
+
+
+SIGNIFICANCE = Column[Any]("", words="", cell=stars, text=True)
+RESPONSE = Column[Any]("response", screen=False, meaning="response, and its term, source of scatter or run")
+QUALITY: tuple[Column[Fit], ...] = (
+    Column("response", label, at="name"),
+    Column("model", screen=False),
+    Column("r2", words="R²"),
+    Column("adjusted_r2", words="adjusted R²"),
+    Column("predicted_r2", words="predicted R²"),
+    Column("press", words="PRESS"),
+    Column("cv_percent", words="CV [%]"),
+    Column("adequate_precision", words="adequate precision"),
+    Column("", probability, "p of lack of fit", at=("lack_of_fit", "p")),
+)
+STATISTICS = QUALITY[2:-1]
+ANOVA_COLUMNS: tuple[Column[AnovaRow], ...] = (
+    RESPONSE,
+    Column("source", lambda source: source.replace("_", " ")),
+    Column("ss", 5, "sum of squares", unit="response squared", meaning="sum of squares"),
+    Column("df", meaning="degrees of freedom; sum of squares over them (mean square)"),
+    Column("ms", 5, "mean square"),
+    Column("f", words="F", meaning="F ratio, and the probability of one as large by chance"),
+    Column("p", probability),
+    SIGNIFICANCE,
+)
+TERM_COLUMNS: tuple[Column[Term], ...] = (
+    RESPONSE,
+    Column("term"),
+    Column("coefficient", words="coefficient ± standard error", error="standard_error", unit="of the response",
+           meaning="in coded factors"),
+    Column("t", screen=False, meaning="t value, and its probability by chance"),
+    Column("p", screen=False),
+    Column("low", 5, "95 % from", unit="of the response", meaning="95 % interval of the coefficient"),
+    Column("high", 5, "to"),
+    Column("", 5, "t", at="t"),
+    Column("", probability, "p", at="p"),
+    SIGNIFICANCE,
+    Column("vif", 5, "VIF", meaning="by how much other terms inflate its variance"),
+    Column("actual_units", screen=False, meaning="the same coefficient for factors in their own units"),
+)  # fmt: skip
+RUN_COLUMNS: tuple[Column[RunDiagnostics], ...] = (
+    RESPONSE,
+    Column("run"),
+    Column("observed", 5, unit="of the response", meaning="simulated, by the surface, and their difference"),
+    Column("predicted", 5),
+    Column("residual", 5),
+    Column("standardized", 5, meaning="residual over its standard deviation, with the run and without it"),
+    Column("studentized", 5),
+    Column("leverage", 5, meaning="weight of the run in its own prediction, 0 to 1"),
+    Column("cook", 5, meaning="by how much the run moves all predictions (Cook's distance)"),
+)
+
+
+ANOVA = Sheet(
+    "Analysis of variance", ANOVA_COLUMNS, note=LEGEND, detail=Detail.USUAL, file="anova.csv",
+    content="Analysis of variance, a row a source of each response.",
+)  # fmt: skip
+TERMS = Sheet(
+    "Coefficients", TERM_COLUMNS, detail=Detail.USUAL, file="coefficients.csv", content="A row a term of each surface."
+)
+RUNS = Sheet(
+    "Runs and residuals", RUN_COLUMNS, folded=True, detail=Detail.ALL, file="runs.csv",
+    content="Diagnostics, a row a run of each response.",
 )  # fmt: skip
 
 
-STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
-LEGEND = "*** p <= 0.001, ** p <= 0.01, * p <= 0.05; sums of squares of terms are partial (type III)"
-RUN_COLUMNS = ("observed", "predicted", "residual", "standardized", "studentized", "leverage", "cook")
-# Parts of a fit without a table of their own.
-FURTHER = ("box_cox", "blocks", "canonical", "known_variance", "rival")
-
-
-def surfaces(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def surfaces(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """The interactive surfaces, and their coefficients."""
-    fitted = fits(summary)
-    if not fitted:
-        return None
-    terms = list(dict.fromkeys(term for surface in fitted.values() for term in surface["coefficients"]))
-    errors = {name: surface.get("standard_errors") or {} for name, surface in fitted.items()}
+    fitted, factors = summary.fit.responses, summary.asked.factors
+    terms = list(dict.fromkeys(term for surface in fitted.values() for term in surface.by_term))
     rows = [
-        [_term(term, summary), *(_coefficient(surface["coefficients"].get(term), errors[name].get(term)) for name, surface in fitted.items())]
+        [_term(term, factors), *(_coefficient(surface.by_term.get(term), surface.standard_errors.get(term)) for surface in fitted.values())]
         for term in terms
     ]  # fmt: skip
-    note = "± are standard errors." if any(errors.values()) else ""
-    header = ["term", *(f"{label(name)}, {surface.get('model', '')}" for name, surface in fitted.items())]
-    blocks: list[Block] = [Widget("surface")] if part(summary, "asked", "factors") else []
-    blocks += [Table("Coefficients in coded units", header, rows, note), _stationary(summary, fitted)]
+    header = ["term", *(f"{label(name)}, {surface.model}" for name, surface in fitted.items())]
+    places = [
+        [label(name), *(factor.text(x) for factor, x in zip(factors, surface.stationary_point.actual, strict=True)), surface.stationary_point.nature]
+        for name, surface in fitted.items()
+        if surface.stationary_point is not None
+    ]  # fmt: skip
+    columns = ["response", *(label(factor.name) for factor in factors), "nature"]
+    note = "A point outside the region is an extrapolation."
+    blocks: list[Block] = [
+        Widget("surface"),
+        Table("Coefficients in coded units", header, rows, "± are standard errors."),
+        Table("Stationary points", columns, places, note, text_columns=(len(factors) + 1,)),
+    ]
     return Section("surfaces", "Response surfaces", blocks)
 
 
-def _term(term: str, summary: Record) -> str:
-    names = {factor.letter: factor.words for factor in factors(summary)}
+def _term(term: str, factors: Sequence[Factor]) -> str:
+    names = {factor.letter: factor.words for factor in factors}
     return f"{term}, {names[term]}" if term in names else term.replace("^2", "²")
 
 
@@ -60,145 +133,102 @@ def _coefficient(value: float | None, error: float | None) -> str:
     return "–" if value is None else with_error(value, error)
 
 
-def _stationary(summary: Record, fitted: Record) -> Table:
-    columns = factors(summary)
-    rows = []
-    for name, surface in fitted.items():
-        actual = part(surface, "stationary_point", "actual") or []
-        if len(actual) == len(columns):
-            places = [factor.text(x) for factor, x in zip(columns, actual, strict=True)]
-            rows.append([label(name), *places, str(part(surface, "stationary_point", "nature") or "")])
-    header = ["response", *(label(factor.name) for factor in columns), "nature"]
-    return Table("Stationary points", header, rows, "A point outside the region is an extrapolation.", text_columns=(len(columns) + 1,))  # fmt: skip
-
-
-def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section:
+def diagnostics(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Analysis of variance with its sentences, and pictures of the residuals, response by response."""
-    fitted = fits(summary)
-    rows = [
-        [
-            label(name),
-            *(shown(surface.get(key)) for key, _ in STATISTICS),
-            probability(part(surface, "lack_of_fit", "p")),
-        ]
-        for name, surface in fitted.items()
-    ]
-    header = ["response", *(words for _, words in STATISTICS), "p of lack of fit"]
-    blocks: list[Block] = [Table("Quality of the fits", header, rows)]
-    names = [factor.name for factor in factors(summary)]
-    for name, surface in fitted.items():
-        blocks += fit_blocks(name, surface, names)
-    return Section("diagnostics", "Diagnostics", blocks)
+    fits = list(summary.fit.responses.values())
+    blocks: list[Block] = [Sheet("Quality of the fits", QUALITY, fits).block]
+    return Section("diagnostics", "Diagnostics", blocks + fit_blocks(fits, summary.asked.columns))
 
 
-def fit_blocks(name: str, fitted: Record, names: Sequence[str] = ()) -> list[Block]:
-    """One fit: analysis of variance, coefficients, equations and sentences on them; at full detail also every run.
+def fit_blocks(fits: Iterable[Fit], factors: Sequence[str] = ()) -> list[Block]:
+    """Of each fit analysis of variance, coefficients, equations and sentences on them; at full detail also every run.
 
-    names : the factors behind the letters of the terms.
+    factors : names of those behind the letters of the terms.
     """
+    return [block for fit in fits for block in _fit_blocks(fit, factors)]
+
+
+def _fit_blocks(fit: Fit, factors: Sequence[str]) -> list[Block]:
     # The heading already names the response.
-    sentences = [sentence.removeprefix(f"{name}: ") for sentence in fitted.get("sentences") or []]
-    runs = part(fitted, "diagnostics", "runs") or []
+    sentences = [sentence.removeprefix(f"{fit.name}: ") for sentence in fit.sentences]
+    runs = fit.diagnostics.runs
     caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
     further = {
-        key: {name: value for name, value in fitted[key].items() if name != "sentence"}
-        for key in FURTHER
-        if isinstance(fitted.get(key), Mapping)
-    }
+        key: {name: value for name, value in plain(part).items() if name != "sentence"}
+        for key, part in (("box_cox", fit.box_cox), ("blocks", fit.blocks), ("canonical", fit.canonical),
+                          ("known_variance", fit.known_variance), ("rival", fit.rival))
+        if part is not None
+    }  # fmt: skip
+    anova, terms, residuals = _sheets(fit)
     return [
-        Heading(label(name)),
-        _anova(name, fitted),
-        _coefficients(name, fitted),
-        *(Paragraph(text, detail=Detail.USUAL) for text in (*_equations(name, fitted, names), _quality(fitted))),
+        Heading(label(fit.name)),
+        anova.block,
+        terms.block,
+        *(Paragraph(text, detail=Detail.USUAL) for text in (*_equations(fit, factors), _quality(fit))),
         Bullets([text[:1].upper() + text[1:] for text in sentences]),
-        Figures([still.svg for still in diagnostic_plots(name, runs)], caption),
-        _runs(name, runs),
-        replace(record_table(f"Further figures of {label(name)}", further, folded=True), detail=Detail.ALL),
+        Figures([still.svg for still in diagnostic_plots(fit.name, runs)], caption),
+        residuals.block,
+        replace(record_table(f"Further figures of {label(fit.name)}", further, folded=True), detail=Detail.ALL),
     ]
 
 
-def _anova(name: str, fitted: Record) -> Table:
-    rows = [
-        (row["source"].replace("_", " "), shown(row.get("ss"), 5), shown(row.get("df")), shown(row.get("ms"), 5),
-         shown(row.get("f")), *_significance(row.get("p")))
-        for row in fitted.get("anova") or []
-        if "source" in row
-    ]  # fmt: skip
-    power = "" if fitted.get("transform") is None else f", Box-Cox exponent {fitted['transform']:.3g}"
-    model = f"{fitted['model'].replace('_', ' ')} model, coded units{power}" if fitted.get("model") else ""
-    caption = f"Analysis of variance of {label(name)}: {model}".rstrip(": ")
-    header = ("source", "sum of squares", "df", "mean square", "F", "p", "")
-    return Table(caption, header, rows, LEGEND, text_columns=(6,), detail=Detail.USUAL)
+def _sheets(fit: Fit) -> tuple[Sheet[AnovaRow], Sheet[Term], Sheet[RunDiagnostics]]:
+    """Analysis of variance, coefficients, and runs with their residuals."""
+    power = "" if fit.transform is None else f", Box-Cox exponent {fit.transform:.3g}"
+    model = f"{fit.model.replace('_', ' ')} model, coded units{power}"
+    return (
+        _of(fit, ANOVA, fit.anova, f": {model}"),
+        _of(fit, TERMS, fit.coefficient_table),
+        _of(fit, RUNS, fit.diagnostics.runs),
+    )
 
 
-def _coefficients(name: str, fitted: Record) -> Table:
-    rows = []
-    for term, value in fitted["coefficients"].items():
-        tested = part(fitted, "tests", term) or {}
-        error = part(fitted, "standard_errors", term)
-        numbers = (shown(tested.get(key), 5) for key in ("low", "high", "t"))
-        inflation = shown(part(fitted, "vif", term), 5)
-        rows.append((term, _coefficient(value, error), *numbers, *_significance(tested.get("p")), inflation))
-    header = ("term", "coefficient ± standard error", "95 % from", "to", "t", "p", "", "VIF")
-    return Table(f"Coefficients of {label(name)}", header, rows, text_columns=(6,), detail=Detail.USUAL)
+def _of(fit: Fit, sheet: Sheet[Row], rows: Sequence[Row], further: str = "") -> Sheet[Row]:
+    """A sheet of one fit, whose name is in files alone."""
+    columns = (replace(RESPONSE, at=lambda _: fit.name), *sheet.columns[1:])
+    return replace(sheet, caption=f"{sheet.caption} of {label(fit.name)}{further}", columns=columns, rows=rows)
 
 
-def _significance(p: float | None) -> tuple[str, str]:
-    """A p value and its stars."""
-    return probability(p), "" if p is None else next((stars for limit, stars in STARS if p <= limit), "")
+def fit_files(fits: Sequence[Fit]) -> dict[str, list[dict[str, Any]]]:
+    """Rows of each CSV file: the analysis of variance, the coefficients, the runs with their diagnostics."""
+    return {
+        sheets[0].file: [row for sheet in sheets for row in sheet.records]
+        for sheets in zip(*map(_sheets, fits), strict=True)
+    }
 
 
-def _equations(name: str, fitted: Record, names: Sequence[str]) -> list[str]:
+def fit_rows(fits: Sequence[Fit]) -> dict[str, list[dict[str, Any]]]:
+    """Rows of each table of fits by its name: their quality, then those of the files."""
+    files = {name.removesuffix(".csv"): rows for name, rows in fit_files(fits).items()}
+    return {"quality": Sheet("Quality of the fits", QUALITY, fits).records, **files}
+
+
+def _equations(fit: Fit, factors: Sequence[str]) -> list[str]:
     """The surface in coded and in actual units, and which factor each letter is."""
-    power, symbol = fitted.get("transform"), quantity(name)[0]
+    power, symbol = fit.transform, quantity(fit.name)[0]
     if power is not None:
         symbol = f"ln {symbol}" if power == 0 else f"({symbol}^{power:.3g} - 1)/{power:.3g}"
-    sides = ("coefficients", "coded"), ("actual_coefficients", "actual units")
-    equations = [f"{symbol} = {_sum(fitted[key])} ({words})" for key, words in sides if fitted.get(key)]
-    letters = zip(ascii_uppercase, names, strict=False)
-    return [*equations, ", ".join(f"{letter} = {label(factor)}" for letter, factor in letters)]
+    sides = (fit.by_term, "coded"), (fit.actual_coefficients, "actual units")
+    letters = zip(ascii_uppercase, factors, strict=False)
+    return [
+        *(f"{symbol} = {_sum(terms)} ({words})" for terms, words in sides),
+        ", ".join(f"{letter} = {label(factor)}" for letter, factor in letters),
+    ]
 
 
-def _sum(terms: Record) -> str:
+def _sum(terms: Mapping[str, float]) -> str:
     return " ".join(f"{c:+.5g}{'' if term == '1' else ' ' + term}" for term, c in terms.items())
 
 
-def _quality(fitted: Record) -> str:
+def _quality(fit: Fit) -> str:
     """Every figure of how well the surface fits, in one sentence."""
-    figures = [f"{words} {shown(fitted[key], 5)}" for key, words in STATISTICS if fitted.get(key) is not None]
-    residual: Record = next((row for row in fitted.get("anova") or [] if row.get("source") == "residual"), {})
-    if residual.get("ms") is not None:
-        freedom = counted(residual["df"], "degree") + " of freedom"
-        figures.append(f"residual standard deviation {shown(float(residual['ms']) ** 0.5, 5)} on {freedom}")
-    return ", ".join(figures)
+    figures = [(column.heading, column.value(fit)) for column in STATISTICS]
+    freedom = counted(fit.residual_dof, "degree") + " of freedom"
+    deviation = f"residual standard deviation {shown(fit.residual_mean_square**0.5, 5)} on {freedom}"
+    return ", ".join([*(f"{words} {shown(value, 5)}" for words, value in figures if value is not None), deviation])
 
 
-def _runs(name: str, runs: Sequence[Record]) -> Table:
-    """Residual of each run, and its leverage on the surface."""
-    rows = [(shown(run.get("run")), *(shown(run.get(key), 5) for key in RUN_COLUMNS)) for run in runs]
-    header = ("run", *RUN_COLUMNS)
-    return Table(f"Runs and residuals of {label(name)}", header, rows, folded=True, detail=Detail.ALL)
-
-
-def fit_record(surfaces: Sequence[Surface]) -> dict[str, Any]:
-    """JSON of ``doe fit``."""
-    return {"responses": {surface.name: surface.as_dict() | {"sentences": describe(surface)} for surface in surfaces}}
-
-
-def fit_tables(surfaces: Sequence[Surface]) -> dict[str, list[dict[str, Any]]]:
-    """Rows of each CSV file: the analysis of variance, the coefficients, the runs with their diagnostics."""
-    return {
-        "anova.csv": [{"response": s.name, **row} for s in surfaces for row in s.anova],
-        "coefficients.csv": [
-            {"response": s.name, **row, "actual_units": s.actual_coefficients[row["term"]]}
-            for s in surfaces
-            for row in s.coefficient_table()
-        ],
-        "runs.csv": [{"response": s.name, **run} for s in surfaces for run in s.diagnostics["runs"]],
-    }
-
-
-def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[Still]:
+def diagnostic_plots(name: str, runs: Sequence[RunDiagnostics]) -> list[Still]:
     """Four pictures; a picture whose numbers are undefined is left out."""
     pictures = [
         _plotted(_predicted_on_observed, f"Predicted on observed {label(name)}", name, runs, "observed", "predicted"),
@@ -209,10 +239,11 @@ def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[Still]:
     return [still for still in pictures if still]
 
 
-def _plotted(draw: Draw, words: str, name: str, runs: Sequence[Record], across: str, up: str) -> Still | None:
-    defined = [run for run in runs if run.get(across) is not None and run.get(up) is not None]
-    points = [(float(run[across]), float(run[up])) for run in defined]
-    titles = [f"run {run.get('run')}: {shown(x)}, {shown(y)}" for run, (x, y) in zip(defined, points, strict=True)]
+def _plotted(draw: Draw, words: str, name: str, runs: Sequence[RunDiagnostics], across: str, up: str) -> Still | None:
+    places = ((run.run, getattr(run, across), getattr(run, up)) for run in runs)
+    defined = [(run, x, y) for run, x, y in places if x is not None and y is not None]
+    points = [(x, y) for _, x, y in defined]
+    titles = [f"run {run}: {shown(x)}, {shown(y)}" for run, x, y in defined]
     return Still(f"{words}, {len(points)} runs", partial(draw, name, points, titles)) if points else None
 
 
@@ -235,8 +266,8 @@ def _residuals(name: str, points: Sequence[Point], titles: Sequence[str], axis: 
     axis.set(ylim=(-reach, reach), xlabel=f"predicted {label(name)}", ylabel="studentized residual")
 
 
-def _normal_plot(name: str, runs: Sequence[Record]) -> Still | None:
-    defined = sorted((float(run["studentized"]), run.get("run")) for run in runs if run.get("studentized") is not None)
+def _normal_plot(name: str, runs: Sequence[RunDiagnostics]) -> Still | None:
+    defined = sorted((run.studentized, run.run) for run in runs if run.studentized is not None)
     if len(defined) < 3:
         return None
     # Blom's plotting positions.

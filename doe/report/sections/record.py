@@ -53,11 +53,10 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
         name = prefix + label(key)
         if isinstance(value, Mapping):
             yield from scalars(value, f"{name}, ")
-        elif value is not None and not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
-            yield (
-                EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name),
-                probability(value) if key == "p" else shown(value),
-            )
+        elif not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
+            text = probability(value) if key == "p" else shown(value)
+            if text or value in ("", []):
+                yield EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name), text
 
 
 def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
@@ -90,12 +89,6 @@ def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Reco
     names = {factor.name for factor in factors(summary)}
     whole = [name for name, point in candidates.items() if names <= set(point.get("factors") or {})]
     return min(whole, key=distance) if place and names <= set(place) and whole else None
-
-
-def fits(summary: Record) -> dict[str, Any]:
-    """Fitted surfaces by response."""
-    surfaces = part(summary, "fit", "responses") or {}
-    return {name: surface for name, surface in surfaces.items() if surface.get("coefficients")}
 
 
 def drop_undefined(value: Any) -> Any:
