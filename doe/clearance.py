@@ -24,7 +24,7 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import verdict
 from rbdyn.base.storage import code_version, run_key
-from rbdyn.dynamics.figure_names import NAMES
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 # Receiver of the key of a run under way, its finished share and the time [s] of that; None without a receiver.
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
-WHOLE = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Offsets of seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
 INPUT_SEEDS = 3_000_000
@@ -51,7 +50,7 @@ ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 def responses_of(heats: bool) -> tuple[str, ...]:
     """Names of all figures that may be responses; ``heats``: whether a heat balance gives temperatures."""
-    return (*WHOLE, *(TEMPERATURES if heats else ()), *NAMES)
+    return tuple(figure.key for figure in FIGURES if figure.response and (heats or figure.kind != "temperature"))
 
 
 def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:

@@ -19,12 +19,16 @@ from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError, key_path
 from rbdyn.base.notes import Note, Notes
-from rbdyn.dynamics.figure_names import HARMONIC
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
     from doe.aggregation import Aggregated, Estimates
+
+
+# Figures whose mean over time is that of their inverse.
+HARMONIC = {figure.key for figure in FIGURES if figure.harmonic}
 
 
 class Rule(NamedTuple):

@@ -39,9 +39,10 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.tables.sheet import Limits, read_sheet
 from rbdyn.base.words import counted
+from rbdyn.dynamics.figures import WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.statistics.batch_means import estimate
-from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, WHIRL_DEVIATION_RATIO, filtered_speed, sums_until
+from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, filtered_speed, sums_until
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import SAMPLES_A_PERIOD
 

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 # Smaller differences of figures without scatter come from the accuracy of the solver: relative, and in the unit of the figure.
 SOLVER, ROUNDING = 1e-6, 1e-9
-# Forces on a pocket, of contact and film together and of the contact alone.
-WHOLE, CONTACT = "impact_force_N", "impact_contact_force_N"
 # Replicates from which Student's quantile for six figures together is small: 3.1 where both have eight, 4.9 where both have three.
 ENOUGH = 8
 SIGNIFICANT, WITHIN, EQUAL, UNKNOWN = "significant", "within error", "equal", "error unknown"
@@ -221,10 +219,10 @@ def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparis
         )
         for name, one in ((name_a, a), (name_b, b))
     ]
+    from rbdyn.dynamics.figures import repeated
+
     figures = [_figures(a), _figures(b)]
-    if all(one.get(CONTACT) == one.get(WHOLE) for one in figures):
-        # Without films in the pockets the force of the contact is the whole force.
-        figures = [{name: figure for name, figure in one.items() if name != CONTACT} for one in figures]
+    repeats = repeated(*figures)
     failed = [f"{place}: {full_status(one)}" for place, one in (("A", a), ("B", b)) if one.status != "ok"]
     return Comparison(
         status="; ".join(failed) or "ok",
@@ -232,7 +230,7 @@ def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparis
         a=sides[0],
         b=sides[1],
         inputs=different_inputs(a.scene, b.scene),
-        figures=differences(*figures),
+        figures=differences(*({key: one[key] for key in one if key not in repeats} for one in figures)),
         parts=differences(_parts(a), _parts(b)),
         notes=_notes(a, b),
     )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
 from rbdyn.base.notes import Notes
-from rbdyn.base.records import Record, derived, json_fields, shown, written
+from rbdyn.base.records import Record, derived, shown, spread, written
 from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
@@ -134,14 +134,23 @@ TEMPERATURES = {
 }
 
 
+class FigureOf:
+    """A figure of a result as an attribute of its key."""
+
+    def __set_name__(self, owner: type, key: str) -> None:
+        self.key = key
+
+    def __get__(self, result: Any, owner: type) -> Quantity:
+        figure: Quantity = result.figures[self.key]
+        return figure
+
+
 class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Its figures have the names of the keys of its JSON form, units included.
 
     - ``scene``: the resolved input
-    - ``impact_force_N``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force_N``: of
-      the contact alone
-    - ``power_loss_W``: mean friction power; ``power_terms_W``: its parts; ``rolling_resistance_W``: the part of that name by
-      race, "outer" and "inner"
+    - ``figures``: those of the whole bearing by key (``rbdyn.dynamics.figures``), which are attributes too
+    - ``power_terms_W``: parts of the power loss; ``rolling_resistance_W``: the part of that name by race, "outer" and "inner"
     - ``power_balance``: "relative_gap" between power supplied and lost; ``loads``: largest contact loads "max_inner_N",
       "max_outer_N" and "max_land_N"
     - ``races``: pressure, half-width and film at the largest load of "inner" and "outer"
@@ -152,8 +161,6 @@ class SimulationResult(Brief, SavedRecord):
     - ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not show it
     - ``counted_turns``: turns counted of each replicate, more than asked for where it was lengthened
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
-    - ``cage_orbit_radius_share``: root mean square distance of the cage's centre from its mean place over the cage's radial
-      play, None where nothing guides the cage
     - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
     - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
@@ -164,12 +171,7 @@ class SimulationResult(Brief, SavedRecord):
 
     FORMAT = "rbdyn.simulation/5"
     WHAT = "simulation result"
-    impact_force_N: Quantity  # noqa: N815
-    impact_contact_force_N: Quantity  # noqa: N815
-    whirl_deviation_ratio: Quantity
-    power_loss_W: Quantity  # noqa: N815
-    cage_speed_rpm: Quantity
-    cage_slip: Quantity
+    figures: dict[str, Quantity] = spread()
     power_balance: dict[str, float]
     loads: dict[str, float]
     notes: Notes
@@ -188,10 +190,18 @@ class SimulationResult(Brief, SavedRecord):
     seed: int
     versions: dict[str, str]
     scene: dict[str, Any]
-    cage_orbit_radius_share: Quantity | None = None
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
     part_figures: dict[str, Quantity] | None = None
+
+    impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
+    power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815
+    whirl_deviation_ratio = FigureOf()
+
+    @property
+    def cage_orbit_radius_share(self) -> Quantity | None:
+        """Radius of the cage's orbit over its radial play; None where nothing guides the cage."""
+        return self.figures.get("cage_orbit_radius_share")
 
     @property
     def responses(self) -> dict[str, Quantity]:
@@ -206,10 +216,9 @@ class SimulationResult(Brief, SavedRecord):
     @property
     def quantities(self) -> dict[str, Quantity]:
         """Figures with errors, by their key, which names the unit; temperatures of a heat balance by ``TEMPERATURES``."""
-        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
         nodes = self.temperatures_C
         temperatures = {} if nodes is None else {name: nodes[node] for name, node in TEMPERATURES.items()}
-        return {key: figure for key, figure in figures if isinstance(figure, Quantity)} | temperatures
+        return self.figures | temperatures
 
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""

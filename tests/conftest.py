@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from rbdyn.base.faults import read_toml
 from rbdyn.compiled.kernel import entry
-from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative
+from rbdyn.dynamics.forces.equations import derivative
+from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.scene import Scene

@@ -16,15 +16,12 @@ from rbdyn.base.faults import InputError, refuse
 from rbdyn.base.notes import Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.scene.key_columns import key_values, unknown_keys
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
-# Of each output the accuracy of its sensor in percent, where a table states none: a force sensor with its mounting, a torque
-# sensor, pulses of a wheel, eddy-current probes (API 670: 5 %), a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
-ACCURACIES = {
-    **dict.fromkeys(("impact_force_N", "impact_contact_force_N"), 10.0), "whirl_deviation_ratio": 5.0, "power_loss_W": 3.0,
-    "cage_speed_rpm": 0.1, **dict.fromkeys(TEMPERATURES, 1.5),
-}  # fmt: skip
+# Of each output the accuracy of its sensor in percent, where a table states none.
+ACCURACIES = {figure.key: figure.accuracy for figure in FIGURES if figure.accuracy}
 OUTPUTS = tuple(ACCURACIES)
 SD, ACCURACY, TURNS, HOLD, SPEED = "_sd", "_accuracy_percent", "turns", "hold", "cage_speed_rpm"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")

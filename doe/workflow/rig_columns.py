@@ -3,15 +3,16 @@
 A row of the table is an operating condition. Further columns are named by keys of the scene, such as operation.inner_speed_rpm.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from rbdyn.base.faults import Strict
+from rbdyn.base.words import quantity
+from rbdyn.dynamics.figures import FIGURES, Figure
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 Percent = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
@@ -24,66 +25,31 @@ class SceneTables(Strict):
     """Settings of doe calibrate, which estimates the unknown inputs; no run depends on them."""
 
 
-class RigTable(Strict):
-    """Columns of RIG.csv next to those named by keys of the scene.
+class Rows(Strict):
+    """Columns of RIG.csv next to those named by keys of the scene and by outputs.
 
     Of each output NAME_sd is the scatter of the single row, and NAME_accuracy_percent the offset that all rows share."""
 
-    impact_force_N: Positive | None = None  # noqa: N815
-    """Measured largest force between a roller and the cage, mean over windows of shaft turns."""
-    impact_force_N_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured impact force; or give turns."""
-    impact_force_N_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the impact force: standard deviation of one offset of all rows, 10 unless stated."""
-    impact_contact_force_N: Positive | None = None  # noqa: N815
-    """Measured impact force by contact alone, without the oil film of the pocket."""
-    impact_contact_force_N_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured impact force by contact; or give turns."""
-    impact_contact_force_N_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the impact contact force: standard deviation of one offset of all rows, 10 unless stated."""
-    whirl_deviation_ratio: Positive | None = None
-    """Measured whirl deviation ratio of the cage's centre."""
-    whirl_deviation_ratio_sd: Positive | None = None
-    """Standard deviation of the measured whirl deviation ratio; or give turns."""
-    whirl_deviation_ratio_accuracy_percent: Percent | None = None
-    """Accuracy of the sensor of the whirl deviation ratio: standard deviation of one offset of all rows, 5 unless stated."""
-    power_loss_W: Positive | None = None  # noqa: N815
-    """Measured power loss of the bearing."""
-    power_loss_W_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured power loss; or give turns."""
-    power_loss_W_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the power loss: standard deviation of one offset of all rows, 3 unless stated."""
-    cage_speed_rpm: Positive | None = None
-    """Measured mean speed of the cage."""
-    cage_speed_rpm_sd: Positive | None = None
-    """Standard deviation of the measured cage speed; or give turns."""
-    cage_speed_rpm_accuracy_percent: Percent | None = None
-    """Accuracy of the sensor of the cage speed: standard deviation of one offset of all rows, 0.1 unless stated."""
-    oil_temperature_C: Positive | None = None  # noqa: N815
-    """Measured temperature of the oil that leaves the bearing, of a scene with [thermal]."""
-    oil_temperature_C_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured temperature of the oil; turns do not replace it."""
-    oil_temperature_C_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the oil temperature: standard deviation of one offset of all rows, 1.5 unless stated."""
-    outer_temperature_C: Positive | None = None  # noqa: N815
-    """Measured temperature of the outer ring, of a scene with [thermal]."""
-    outer_temperature_C_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured temperature of the outer ring; turns do not replace it."""
-    outer_temperature_C_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the outer temperature: standard deviation of one offset of all rows, 1.5 unless stated."""
-    inner_temperature_C: Positive | None = None  # noqa: N815
-    """Measured temperature of the inner ring, of a scene with [thermal]."""
-    inner_temperature_C_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured temperature of the inner ring; turns do not replace it."""
-    inner_temperature_C_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the inner temperature: standard deviation of one offset of all rows, 1.5 unless stated."""
-    roller_temperature_C: Positive | None = None  # noqa: N815
-    """Measured temperature of the rollers, of a scene with [thermal]."""
-    roller_temperature_C_sd: Positive | None = None  # noqa: N815
-    """Standard deviation of the measured temperature of the rollers; turns do not replace it."""
-    roller_temperature_C_accuracy_percent: Percent | None = None  # noqa: N815
-    """Accuracy of the sensor of the roller temperature: standard deviation of one offset of all rows, 1.5 unless stated."""
     turns: Positive | None = None
     """Shaft turns of the measurement: its scatter is that of a run as long, where no standard deviation is stated."""
     hold: Literal["1", "yes", "true", "0", "no", "false"] | None = None
     """Whether the row is held out of the calibration to test it: 1 for a row that is held out, else 0."""
+
+
+def _columns(figure: Figure) -> dict[str, Any]:
+    """The measured output, its scatter and the accuracy of its sensor."""
+    words, heat = quantity(figure.key)[0], figure.kind == "temperature"
+    offset = f"standard deviation of one offset of all rows, {figure.accuracy:g} unless stated"
+    texts = {
+        "": f"Measured {figure.meaning}{', of a scene with [thermal]' if heat else ''}.",
+        "_sd": f"Standard deviation of the measured {words}; {'turns do not replace it' if heat else 'or give turns'}.",
+        "_accuracy_percent": f"Accuracy of the sensor of the {words}: {offset}.",
+    }
+    return {
+        figure.key + end: ((Percent if "percent" in end else Positive) | None, Field(None, description=text))
+        for end, text in texts.items()
+    }
+
+
+_OUTPUTS = {name: column for figure in FIGURES if figure.accuracy for name, column in _columns(figure).items()}
+RigTable = create_model("RigTable", __base__=Rows, __module__=__name__, **_OUTPUTS)

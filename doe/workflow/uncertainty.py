@@ -39,11 +39,12 @@ from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
 from rbdyn.base.words import are, counted
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import UnknownInput
 
 # Outputs of every scene; those with a heat balance also have their temperatures.
-OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
+OUTPUTS = tuple(figure.key for figure in FIGURES if figure.judged)
 # Fresh input sets of the emulator, and most input sets that run.
 FRESH, MOST = 8192, 512
 # Default of the standard error of a range's end, as a share of the range's width.

@@ -32,7 +32,7 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.run import Run, prepare
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 REFERENCE_RTOL = 1e-4

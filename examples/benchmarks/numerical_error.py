@@ -28,21 +28,21 @@ from statistics import median
 from typing import NamedTuple
 
 from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
+from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
-from rbdyn.dynamics.statistics.error_bars import FIGURES
 from rbdyn.dynamics.statistics.metrics import (
     LEAST_DAMPING,
     Companions,
-    Replicate,
     companions_of,
     longest_step,
     quantity,
     usual_companions,
 )
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -157,7 +157,11 @@ def true_plan(scene: Scene) -> Companions:
 
 def figures_of(runs: Sequence[Replicate], companions: Sequence[Replicate], share: float) -> dict[str, Quantity]:
     """Figures without what slow change may add, for runs and truths are of one length."""
-    return {name: quantity(FIGURES[name][0], runs, companions, share, 0.0, FIGURES[name][1]) for name in JUDGED}
+    return {
+        figure.key: quantity(figure.statistic, runs, companions, share, 0.0, figure.scale, figure.balanced)
+        for figure in BEARING
+        if figure.key in JUDGED
+    }
 
 
 def truth_of(scene: Scene, workers: int) -> dict[str, tuple[float, float]]:

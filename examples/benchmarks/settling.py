@@ -29,7 +29,7 @@ from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.run import Run, prepare, with_numerics
 from rbdyn.dynamics.settling import run_until_settled
 from rbdyn.dynamics.statistics.error_bars import quantities
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 

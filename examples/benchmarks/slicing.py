@@ -34,7 +34,7 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 COUNTS = (5, 9, 15, 21, 31, 61, 121, 241)

@@ -14,10 +14,10 @@ from rbdyn.base.records import Record, shown
 from rbdyn.base.table import Sheet, columns_of
 from rbdyn.base.words import error_alone, value_alone, with_error
 from rbdyn.dynamics.ensemble import in_turn
+from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.error_bars import FIGURES
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
 REPEATS = 200
@@ -53,7 +53,7 @@ def study(scene: Scene, progress: Reporter = None, repeats: int | None = None) -
     counted.step()
     seeds = (FIRST_SEED + SEED_STEP * k for k in range(repeats))
     results = [simulate(with_numerics(scene, seed=seed)) for seed in counted.over(seeds)]
-    rows = [row(name, truth, results) for name in FIGURES]
+    rows = [row(figure.key, truth, results) for figure in BEARING if figure.slow]
     turns = sum(result.cost["turns"] for result in results) / repeats
     turns_each = scene.numerics.turns + scene.numerics.warm_up_turns
     longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
@@ -101,9 +101,9 @@ def truth_of(scene: Scene) -> Scene:
 
 def row(name: str, truth: SimulationResult, results: list[SimulationResult]) -> Row:
     """Coverage of one figure."""
-    exact = figure_of(truth, name)
+    exact = truth.figures[name]
     doubt, size = exact.statistical_error or 0.0, abs(exact.value) or 1.0
-    figures = [figure_of(result, name) for result in results]
+    figures = [result.figures[name] for result in results]
     count = len(figures)
 
     def share(errors: list[float]) -> float:
@@ -119,11 +119,6 @@ def row(name: str, truth: SimulationResult, results: list[SimulationResult]) -> 
         half_width=sum(one.error or 0.0 for one in figures) / count / size,
         offset=sum(one.value - exact.value for one in figures) / count / size,
     )
-
-
-def figure_of(result: SimulationResult, name: str) -> Quantity:
-    """A figure of a result by its name in a record."""
-    return Quantity(**result.as_dict()[name])
 
 
 def pooled(rows: list[Row]) -> float:

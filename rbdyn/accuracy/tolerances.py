@@ -27,11 +27,12 @@ from rbdyn.base.records import Record, shown
 from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.base.words import signed_with_error
 from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 Verdict = Literal["within", "beyond", "undecided"]
@@ -114,9 +115,7 @@ def undecided(hidden: Iterable[Difference], scene: Scene, margin: float = MARGIN
 STEPS = 0.2
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
 OUTPUTS: dict[str, Callable[[Replicate], float]] = {
-    "impact_force_N": lambda run: run.impact_force,
-    "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
-    "power_loss_W": lambda run: run.power_loss,
+    figure.key: figure.statistic.of for figure in FIGURES if figure.judged == "target" and figure.statistic
 }
 # A gap of the power balance, or an error of a load, below this does not matter; neither of them scatters.
 NEGLIGIBLE = 0.005

@@ -23,6 +23,7 @@ from rbdyn.base.faults import InputError, RunError, read_toml, set_key
 from rbdyn.base.records import Record, finite, shown
 from rbdyn.base.table import Sheet, columns_of
 from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.figures import IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue, prepare
@@ -175,9 +176,9 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
     turns = varied.numerics.turns + varied.numerics.warm_up_turns
     figures = {
         "power_gap": run.power_gap,
-        "impact_force_N": run.impact_force,
-        "whirl_deviation_ratio": run.whirl_deviation_ratio,
-        "power_loss_W": run.power_loss,
+        "impact_force_N": IMPACT_FORCE.of(run),
+        "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO.of(run),
+        "power_loss_W": POWER_LOSS.of(run),
     }
     status, reason = _judge(figures, rtol, tightened)
     return Ending(

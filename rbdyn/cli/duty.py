@@ -13,6 +13,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, finite
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import quantity, shown, with_error
+from rbdyn.dynamics.figures import BEARING, of_kind
 from rbdyn.life.duty import PointLife, life_notes, life_sheet
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
@@ -22,13 +23,8 @@ if TYPE_CHECKING:
     from rbdyn.result import Quantity
 
 # Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
-SHOWN = {
-    "impact [N]": ("impact_force_N", 1.0),
-    "whirl": ("whirl_deviation_ratio", 1.0),
-    "loss [W]": ("power_loss_W", 1.0),
-    "slip [%]": ("cage_slip", 100.0),
-}
-CLEARANCES = {name: (f"{name}_operating_clearance_um", 1.0) for name in ("radial", "guide", "pocket")}
+SHOWN = {figure.panel[1]: (figure.key, figure.percent) for figure in BEARING if figure.panel}
+CLEARANCES = {figure.source[0]: (figure.key, 1.0) for figure in of_kind("clearance")}
 # Keys of the axes of a map.
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 

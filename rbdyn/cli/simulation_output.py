@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
-from rbdyn.dynamics.figure_names import POWERS
+from rbdyn.dynamics.figures import BEARING, of_kind, repeated
 from rbdyn.result import SimulationResult, figure_sheet
 from rbdyn.scene import Scene
 
@@ -64,17 +64,12 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":
-    """Figures of a run by their words; the contact force only where a film makes it another than the whole force."""
-    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force_N}
-    orbit = result.cage_orbit_radius_share
+    """Figures of a run by their words."""
+    window, repeats = counted(result.impact_window_turns, "shaft turn"), repeated(result.figures)
     return {
-        f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force_N,
-        **({} if result.impact_contact_force_N == result.impact_force_N else contact),
-        "whirl deviation ratio": result.whirl_deviation_ratio,
-        **({} if orbit is None else {"radius of the cage's orbit over its radial play": orbit}),
-        "power loss [W]": result.power_loss_W,
-        "cage speed [rpm]": result.cage_speed_rpm,
-        "cage slip": result.cage_slip,
+        figure.words.format(window=window) or label(figure.key): result.figures[figure.key]
+        for figure in BEARING
+        if figure.key in result.figures and figure.key not in repeats
     }
 
 
@@ -201,7 +196,7 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
 def _losses(result: SimulationResult) -> list[Block]:
     """Full detail: the transient, and the losses by size with their sum."""
     parts = result.part_figures or {}
-    errors = {loss: parts[name].stated_error for name, loss in POWERS.items() if name in parts}
+    errors = {power.source[0]: parts[power.key].stated_error for power in of_kind("power") if power.key in parts}
     terms = sorted(((power, term) for term, power in result.power_terms_W.items() if power), reverse=True)
     whole = sum(power for power, _ in terms) or 1.0
     losses = [

@@ -4,7 +4,7 @@ A point that cannot go on is a record with the reason, and the others go on.
 """
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
@@ -27,8 +28,9 @@ from rbdyn.scene.thermal import simulated_scene
 if TYPE_CHECKING:
     import pandas as pd
 
-# Figures of which neither end is bad, and ends of the names of those whose least value is the worst one.
-NEUTRAL, LEAST = ("cage_speed_rpm",), ("_clearance_um", "_film_um", "_lambda_ratio")
+# By figure, how much worse a larger value is; none of figures of which neither end is bad.
+BADNESS: dict[str, Callable[[float], float]] = {"largest": float, "least": lambda value: -value, "farthest from 0": abs}
+WORST = {figure.key: BADNESS[figure.worst] for figure in FIGURES if figure.worst in BADNESS}
 
 
 class SimulatedPoint(Record):
@@ -166,10 +168,9 @@ def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
     for name in next(iter(points.values()), {}):
         figures = {point: own[name] for point, own in points.items() if name in own}
         values = {figure.value for figure in figures.values()}
-        if name in NEUTRAL or len(figures) < len(points) or len(values) < 2:
+        if name not in WORST or len(figures) < len(points) or len(values) < 2:
             continue
-        sign = -1.0 if name.endswith(LEAST) else 1.0
-        badness = {point: sign * _size(name, figure.value) for point, figure in figures.items()}
+        badness = {point: WORST[name](figure.value) for point, figure in figures.items()}
         worst = max(badness, key=lambda point: badness[point])
         others = [point for point in figures if point != worst]
         error, _ = errors_of_differences([figures[worst]] * len(others), [figures[point] for point in others])
@@ -179,11 +180,6 @@ def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
         alike = tuple(point for point, is_apart in zip(others, apart, strict=True) if not is_apart)
         found[name] = Worst(worst, figures[worst].value, alike)
     return found
-
-
-def _size(name: str, value: float) -> float:
-    """What a larger one is worse of: a slip is as bad in either direction."""
-    return abs(value) if name == "cage_slip" else value
 
 
 def _hot(scene: Scene, result: SimulationResult | str) -> Scene | None:

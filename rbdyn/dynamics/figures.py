@@ -6,13 +6,14 @@ They stand apart from compiled code so that a command can check a name without i
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.dynamics.forces.places import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
-from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, largest, mean, timed, windowed
+from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.losses import POWER_TERMS
 from rbdyn.result import TEMPERATURES
 
@@ -24,49 +25,49 @@ SLOWEST_CAGE = 1e-6  # [rad/s]
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A figure by the key of its JSON, which ends with its unit.
+    """A figure by the key of its JSON, which ends with its unit; ``meaning``: in a sentence of the manual and of a rig's table.
 
-    - ``meaning``: in a sentence of the manual. ``kind``: of the whole "bearing", of a node ("temperature"), or of one of its parts
-    - ``source``: of a part, the loss, clearance, or race and key of its report, that it is; of a temperature, its node
     - ``statistic``: how it follows from batches; None for what follows from the scene, the largest loads or the heat balance.
       ``scale``: factor of its unit, or that of a scene, None where the scene has no such figure
-    - ``tested``: the statistic that shows whether a run has settled. ``slow``: whether slow change counts in its error.
-      ``balanced``: whether the gap of the power balance does
+    - ``kind``: of the whole "bearing", of a node ("temperature"), or of one of its parts. ``source``: of a part, the loss, clearance,
+      or race and key of its report, that it is; of a temperature, its node
+    - ``tested``: whether it must settle before a run ends. ``slow``: whether slow change counts in its error; ``balanced``: whether
+      the gap of the power balance does
+    - ``judged``: by "notes" on large errors and in ranges of doe uncertainty, by a "target" too, or not
     - ``words``: its row in the table of a run, where the key does not say it; ``window`` is that of impacts. ``repeats``: figure that
       it is left out beside where both are equal
-    - ``judged``: whether notes say that its errors are large, and doe uncertainty has its range; ``aimed``: whether a target limits it
-    - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse
-    - ``panel``: place on a map from 1, 0 for none; ``short``: its heading there and in tables of points; ``percent``: whether these
-      show it in percent
+    - ``panel``: place on a map from 1, and its heading in tables of points, "[%]" where these show it in percent
     - ``worst``: which value is the worst one over a duty
-    - ``measured``: what a rig measures, and ``accuracy`` of the sensor [%] where none is stated; empty where no rig does
+    - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse
+    - ``accuracy``: of a rig's sensor [%] where its table states none, 0 where no rig measures the figure
     """
 
     key: str
     meaning: str
-    kind: Literal["bearing", "temperature", "power", "clearance", "life", "contact"] = "bearing"
-    source: tuple[str, ...] = ()
     statistic: Statistic | None = None
     scale: "float | Callable[[Scene], float | None]" = 1.0
-    tested: Statistic | None = None
+    kind: Literal["bearing", "temperature", "power", "clearance", "life", "contact"] = "bearing"
+    source: tuple[str, ...] = ()
+    tested: bool = False
     slow: bool = True
     balanced: bool = False
+    judged: Literal["", "notes", "target"] = ""
     words: str = ""
     repeats: str = ""
-    judged: bool = False
-    aimed: bool = False
+    panel: tuple[int, str] | None = None
+    worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
     response: bool = True
     harmonic: bool = False
-    panel: int = 0
-    short: str = ""
-    percent: bool = False
-    worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
-    measured: str = ""
     accuracy: float = 0.0
 
     def scale_in(self, scene: "Scene") -> float | None:
         """Factor of the statistic in a scene; None where the scene has no such figure."""
         return self.scale(scene) if callable(self.scale) else self.scale
+
+    @property
+    def percent(self) -> float:
+        """100 where maps and tables of points show it in percent, else 1."""
+        return 100.0 if self.panel and "%" in self.panel[1] else 1.0
 
 
 def deviation_ratio(sums: Array) -> Array:
@@ -105,6 +106,10 @@ ORBIT_RADIUS = Statistic(orbit, lambda sums: np.sqrt(sums[..., 1] / np.maximum(s
 WHIRL_SPEED = Statistic(lambda run: run.whirl[run.first :, :2], mean)
 
 
+def _work(place: int, run: Replicate) -> Array:
+    return run.work[:, place]
+
+
 def _share_of_play(scene: "Scene") -> float | None:
     return None if scene.cage_play_m is None else 1.0 / scene.cage_play_m
 
@@ -112,101 +117,70 @@ def _share_of_play(scene: "Scene") -> float | None:
 BEARING = (
     Figure(
         "impact_force_N",
-        "largest force of a roller on a pocket wall, contact and film together, mean over impact windows",
-        statistic=IMPACT_FORCE,
-        tested=largest(POCKET_LOAD),
+        "largest force between a roller and the cage, mean over windows of shaft turns",
+        IMPACT_FORCE,
+        tested=True,
+        judged="target",
         words="largest roller/cage force in {window} [N]",
-        judged=True,
-        aimed=True,
-        panel=3,
-        short="impact [N]",
-        measured="largest force between a roller and the cage, mean over windows of shaft turns",
-        # A force sensor with its mounting.
-        accuracy=10.0,
+        panel=(3, "impact [N]"),
+        accuracy=10.0,  # of a force sensor with its mounting
     ),
     Figure(
         "impact_contact_force_N",
-        "the same of the contact alone, without the oil film of the pocket",
-        statistic=windowed(POCKET_CONTACT_LOAD),
-        tested=largest(POCKET_CONTACT_LOAD),
+        "impact force by contact alone, without the oil film of the pocket",
+        windowed(POCKET_CONTACT_LOAD),
+        tested=True,
         words="largest of it by contact alone, without the film [N]",
         repeats="impact_force_N",
         response=False,
-        measured="impact force by contact alone, without the oil film of the pocket",
         accuracy=10.0,
     ),
     Figure(
         "whirl_deviation_ratio",
-        "standard deviation over mean of the speed of the cage's centre",
-        statistic=WHIRL_DEVIATION_RATIO,
-        tested=WHIRL_DEVIATION_RATIO,
-        judged=True,
-        aimed=True,
-        panel=4,
-        short="whirl",
-        measured="whirl deviation ratio of the cage's centre",
-        # Eddy-current probes (API 670).
-        accuracy=5.0,
+        "whirl deviation ratio of the cage's centre",
+        WHIRL_DEVIATION_RATIO,
+        tested=True,
+        judged="target",
+        panel=(4, "whirl"),
+        accuracy=5.0,  # of eddy-current probes (API 670)
     ),
     Figure(
         "power_loss_W",
-        "mean power turned into heat",
-        statistic=POWER_LOSS,
-        tested=POWER_LOSS,
+        "power loss of the bearing",
+        POWER_LOSS,
+        tested=True,
         balanced=True,
-        judged=True,
-        aimed=True,
-        panel=2,
-        short="loss [W]",
-        measured="power loss of the bearing",
-        # A torque sensor.
-        accuracy=3.0,
+        judged="target",
+        panel=(2, "loss [W]"),
+        accuracy=3.0,  # of a torque sensor
     ),
     Figure(
         "cage_speed_rpm",
         "mean speed of the cage",
-        statistic=CAGE_SPEED,
-        scale=30.0 / math.pi,
-        tested=CAGE_SPEED,
-        judged=True,
+        CAGE_SPEED,
+        30.0 / math.pi,
+        tested=True,
+        judged="notes",
         worst="none",
-        measured="mean speed of the cage",
-        # Pulses of a wheel.
-        accuracy=0.1,
+        accuracy=0.1,  # of pulses of a wheel
     ),
     # A slip near zero has no useful relative error; the cage speed shows it.
-    Figure(
-        "cage_slip",
-        "1 less the speed of the cage over that of rolling without slip",
-        statistic=CAGE_SLIP,
-        panel=1,
-        short="slip [%]",
-        percent=True,
-        worst="farthest from 0",
-    ),
+    Figure("cage_slip", "share that the cage lags", CAGE_SLIP, panel=(1, "slip [%]"), worst="farthest from 0"),
     Figure(
         "cage_orbit_radius_share",
-        "root mean square distance of the cage's centre from its mean place, over the cage's radial play",
-        statistic=ORBIT_RADIUS,
-        scale=_share_of_play,
+        "root mean square distance of the cage's centre from its mean place over the cage's radial play",
+        ORBIT_RADIUS,
+        _share_of_play,
         slow=False,
         words="radius of the cage's orbit over its radial play",
         response=False,
     ),
 )
-_HEAT = tuple(
-    # A thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
-    Figure(key, f"steady temperature: {node}", "temperature", (node,), measured=measured, accuracy=1.5)
-    for (key, node), measured in zip(
-        TEMPERATURES.items(),
-        (
-            "temperature of the oil that leaves the bearing",
-            "temperature of the outer ring",
-            "temperature of the inner ring",
-            "temperature of the rollers",
-        ),
-        strict=True,
-    )
+_PLACES = {"oil": "oil that leaves the bearing", "outer": "outer ring", "inner": "inner ring", "rollers": "rollers"}
+HEAT = tuple(
+    # The accuracy is that of a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
+    Figure(key, f"temperature of the {_PLACES[node]}", kind="temperature", source=(node,), accuracy=1.5)
+    for key, node in TEMPERATURES.items()
 )
 _CONTACTS: dict[str, tuple[str, Literal["largest", "least"]]] = {
     "max_pressure_MPa": ("largest pressure", "largest"),
@@ -219,39 +193,39 @@ PARTS = (
         Figure(
             f"{loss}_power_W",
             f"mean power lost by {loss.replace('_', ' ')}",
-            "power",
-            (loss,),
-            statistic=timed(lambda run, place=place: run.work[:, place]),  # type: ignore[misc]
+            timed(partial(_work, place)),
+            kind="power",
+            source=(loss,),
         )
         for place, loss in enumerate(POWER_TERMS)
     ),
     *(
         Figure(
             f"{name}_operating_clearance_um",
-            f"{name} clearance in operation, diametral",
-            "clearance",
-            (name,),
+            f"{name} clearance in operation",
+            kind="clearance",
+            source=(name,),
             worst="least",
         )
         for name in ("radial", "guide", "pocket")
     ),
-    Figure(
-        "life_h",
-        "reference life L10r by the static loads at the operating clearance (ISO/TS 16281)",
-        "life",
-        # 1/L is damage an hour (Palmgren and Miner).
-        harmonic=True,
-        worst="least",
-    ),
+    # 1/L is damage an hour (Palmgren and Miner).
+    Figure("life_h", "life L10r by static loads (ISO/TS 16281)", kind="life", harmonic=True, worst="least"),
     *(
-        Figure(f"{race}_{key}", f"{words} of the {race} race at its largest load", "contact", (race, key), worst=worst)
+        Figure(
+            f"{race}_{key}",
+            f"{words}, {race} race at its largest load",
+            kind="contact",
+            source=(race, key),
+            worst=worst,
+        )
         for race in ("inner", "outer")
         for key, (words, worst) in _CONTACTS.items()
     ),
 )
-FIGURES = (*BEARING, *_HEAT, *PARTS)
+FIGURES = (*BEARING, *HEAT, *PARTS)
 # In the order of their places on a map.
-PANELS = sorted((figure for figure in FIGURES if figure.panel), key=lambda figure: figure.panel)
+PANELS = sorted((figure for figure in FIGURES if figure.panel), key=lambda figure: figure.panel or ())
 
 
 def of_kind(kind: str) -> list[Figure]:

@@ -1,6 +1,6 @@
 """Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, life, each with its errors.
 
-Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figure_names``.
+Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figures``.
 """
 
 import math
@@ -11,52 +11,38 @@ import numpy as np
 
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
-from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, POWERS
-from rbdyn.dynamics.forces.equations import INNER_LOAD, OUTER_LOAD
+from rbdyn.dynamics.figures import PARTS, of_kind
+from rbdyn.dynamics.forces.places import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
-from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
-from rbdyn.dynamics.statistics.metrics import Figure, Runs, mean, quantity
-from rbdyn.losses import POWER_TERMS
+from rbdyn.dynamics.statistics.metrics import Runs
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
-
-def _mean_power(column: int) -> Figure:
-    return Figure(lambda run: np.column_stack((run.durations, run.work[:, column]))[run.first :], mean)
+CLEARANCES, CONTACTS, (LIFE,) = of_kind("clearance"), of_kind("contact"), of_kind("life")
+EXACT = [figure.key for figure in (*CLEARANCES, LIFE)]
 
 
 def part_figures(
-    scene: Scene,
-    runs: Runs,
-    companions: Runs,
-    share: float,
-    since: int | None = None,
-    races: Mapping[str, Mapping[str, float]] | None = None,
+    scene: Scene, runs: Runs, figures: Mapping[str, Quantity], races: Mapping[str, Mapping[str, float]] | None = None
 ) -> dict[str, Quantity]:
-    """Every figure that the scene has, by its name; ``share`` and ``since`` as of `quantities`, ``races`` of `race_report`.
+    """Every figure of parts that the scene has, by its key; ``figures``: those that follow from batches, ``races`` of `race_report`.
 
     A clearance is exact for its scene, and so is the life; there is none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
     """
-    steady = scene.operation.schedule is None
-    since = runs[0].first if since is None else since
-    moving = steady and drifting(runs)
-    figures = dict[str, Quantity]()
-    for name, loss in POWERS.items():
-        power = _mean_power(POWER_TERMS.index(loss))
-        # Most scenes have no work at all of some losses.
-        slow = slow_change(power, power, runs, since, moving=moving) if steady and _works(power, runs) else 0.0
-        figures[name] = quantity(power, runs, companions, share, slow)
-    figures |= {name: Quantity(gap, 0.0, 0.0, float(len(runs))) for name, gap in _exact(scene).items()}
+    exact = {name: Quantity(value, 0.0, 0.0, float(len(runs))) for name, value in _exact(scene).items()}
     reports = [race_report(scene, *(run.largest_load(race) for race in (INNER_LOAD, OUTER_LOAD))) for run in runs]
     if races is None:
         races = race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
-    for name, (race, key) in CONTACTS.items():
+    contacts = {}
+    for contact in CONTACTS:
+        race, key = contact.source
         if key in races.get(race, {}):
             values = [report[race][key] for report in reports if key in report.get(race, {})]
-            figures[name] = _extreme(races[race][key], values)
-    return figures
+            contacts[contact.key] = _extreme(races[race][key], values)
+    found = {**figures, **exact, **contacts}
+    return {figure.key: found[figure.key] for figure in PARTS if figure.key in found}
 
 
 def at_temperatures_with_errors(
@@ -67,7 +53,7 @@ def at_temperatures_with_errors(
     These errors have one cause, the friction, so that their effects add; unknown where a temperature within them is impossible.
     """
     nodes = {node: figure.value for node, figure in temperatures.items()}
-    at = {name: figure.value for name, figure in figures.items() if name in (*CLEARANCES, LIFE)}
+    at = {name: figure.value for name, figure in figures.items() if name in EXACT}
     errors = dict[str, dict[str, float | None]]()
     for kind in ("statistical_error", "numerical_error"):
         shifts = {node: getattr(figure, kind) for node, figure in temperatures.items()}
@@ -96,15 +82,11 @@ def at_temperatures_with_errors(
 
 
 def _exact(scene: Scene) -> dict[str, float]:
-    """Operating clearances [um] of a scene and its life [h], by the name of their figure."""
+    """Operating clearances [um] of a scene and its life [h], by the key of their figure."""
     gaps = scene.clearances
-    figures = {name: 1e6 * gap.operating for name, of in CLEARANCES.items() if (gap := gaps[of]) is not None}
+    figures = {figure.key: 1e6 * gap.operating for figure in CLEARANCES if (gap := gaps[figure.source[0]]) is not None}
     hours = static_life(scene).hours(*scene.operation.speeds)
-    return figures | ({LIFE: hours} if math.isfinite(hours) else {})
-
-
-def _works(power: Figure, runs: Runs) -> bool:
-    return any(power.moments(run)[:, 1].any() for run in runs)
+    return figures | ({LIFE.key: hours} if math.isfinite(hours) else {})
 
 
 def _extreme(value: float, values: list[float]) -> Quantity:

@@ -27,7 +27,8 @@ from rbdyn.dynamics.integrators.advance import (
 )
 from rbdyn.dynamics.parameters.state import group_of, scales
 from rbdyn.dynamics.run import Run, with_numerics
-from rbdyn.dynamics.statistics.metrics import Companions, Replicate, filtered_speed, speed_sums
+from rbdyn.dynamics.statistics.metrics import Companions, filtered_speed, speed_sums
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 

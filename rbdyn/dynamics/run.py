@@ -42,7 +42,7 @@ from rbdyn.dynamics.integrators.advance import (
 )
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
-from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 # A run looks for interruptions between so many steps: some hundredths of a second, half a second by the implicit method.

@@ -17,7 +17,8 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all
 from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
-from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
+from rbdyn.dynamics.statistics.metrics import Companions, companions_of
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 

@@ -12,7 +12,9 @@ from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
-from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, OUTER_LOAD, RollerBearing
+from rbdyn.dynamics.figures import BEARING
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.places import INNER_LOAD, LAND_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
     friction_check,
@@ -29,7 +31,7 @@ from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import TIGHT, orbit_radius_share, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
@@ -126,14 +128,13 @@ def _ensemble(
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    figures: dict[str, Any] = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
+    figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
     races = race_report(scene, inner_load, outer_load)
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
-    orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
     maker = friction_check(scene, figures["power_loss_W"].value)
     # The first concern the input, the next the figures of this run, the last what the model leaves out.
     notes: Notes = (
@@ -145,7 +146,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         *error_notes(
             scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
         ),
-        *whirl_notes(scene, orbit),
+        *whirl_notes(scene, figures.get("cage_orbit_radius_share")),
         *heat_notes(scene, figures["power_loss_W"].value),
         *friction_notes(maker),
         *race_notes(scene, races),
@@ -158,7 +159,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     )
     return SimulationResult(
         status=status_of(notes),
-        **figures,
+        figures={figure.key: figures[figure.key] for figure in BEARING if figure.key in figures},
         power_balance={"relative_gap": power_gap},
         power_terms_W=terms,
         rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
@@ -185,8 +186,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         notes=notes,
         versions=versions(),
         scene=scene.model_dump(mode="json"),
-        cage_orbit_radius_share=orbit,
-        part_figures=part_figures(scene, runs, companions, ensemble.plan.share, ensemble.since, races),
+        part_figures=part_figures(scene, runs, figures, races),
     )
 
 

@@ -22,6 +22,7 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
+from rbdyn.dynamics.figures import PANELS
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
@@ -30,7 +31,8 @@ from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
-from rbdyn.dynamics.statistics.metrics import Companions, Replicate, companions_of
+from rbdyn.dynamics.statistics.metrics import Companions, companions_of
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity, figure_columns, versions
 from rbdyn.scene import Scene
 
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.map/1"
 RACES = ("inner", "outer")
-FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
 
 
 class Point(Record):
@@ -162,14 +163,14 @@ class Series:
         )
         figures = quantities(self.scene, runs, companions, share)
         power_gap = max(run.power_gap for run in runs)
-        parts = part_figures(self.scene, runs, companions, share)
+        parts = part_figures(self.scene, runs, figures)
         peaks = {race: figure.value for race in RACES if (figure := parts.get(f"{race}_max_pressure_MPa"))}
         notes = (
             *limit_notes(self.scene),
             *(note for race, peak in peaks.items() for note in pressure_notes(1e6 * peak, ROLLERS, race)),
             *heat_notes(self.scene, figures["power_loss_W"].value),
         )
-        shown = {name: figures[name] for name in FIGURES} | parts
+        shown = {panel.key: figures[panel.key] for panel in PANELS} | parts
         return Point(speed, load, status_of(notes), shown, power_gap, notes or None)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:

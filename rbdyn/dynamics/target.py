@@ -22,17 +22,20 @@ from rbdyn.base.notes import Note
 from rbdyn.base.pace import Notice
 from rbdyn.base.words import counted
 from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
+from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
-from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
-from rbdyn.dynamics.statistics.metrics import Replicate, bias_scale, companion_tolerance, mean_gap, work_done
+from rbdyn.dynamics.statistics.error_bars import after_transient
+from rbdyn.dynamics.statistics.metrics import bias_scale, companion_tolerance, mean_gap, work_done
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
-AIMED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
-SCATTERED = AIMED[:2]  # their bias is seen over the tolerance, that of the loss by the power balance
+AIMED = {figure.key: figure.statistic for figure in FIGURES if figure.judged == "target" and figure.statistic}
+# Their bias is seen over the tolerance, that of the loss by the power balance.
+SCATTERED = [figure.key for figure in FIGURES if figure.judged == "target" and not figure.balanced]
 LARGEST_TARGET = 0.5
 
 LADDER = (0.1, 0.03, 0.01, 0.003)
@@ -139,7 +142,7 @@ def reach(
             notice(f"chosen: {plan_of(planned, threads_of(workers))}")
         result = simulate(planned, workers, progress, stop)
         spent.update({key: result.cost[key] for key in ADDED})
-        errors = {name: total_error(quantities_of(result)[name]) for name in AIMED}
+        errors = {name: total_error(result.figures[name]) for name in AIMED}
         met = all(error is not None and error <= target for error in errors.values())
         model = learned(model, scene, choice, result)
         shortest, longest = (min(factor * choice.turns * choice.replicates, MOST_TURNS) for factor in GROWTH)
@@ -166,12 +169,6 @@ def total_error(figure: Quantity) -> float | None:
     if error == 0.0:
         return 0.0
     return error / abs(figure.value) if figure.value != 0.0 else None
-
-
-def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
-    """Figures that a target limits, by name."""
-    figures = (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W)
-    return dict(zip(AIMED, figures, strict=True))
 
 
 def measure(
@@ -250,7 +247,8 @@ def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult
     """The model after a run: scatter of the run instead of the pilots, and its bias where that exceeds the scatter."""
     turns = choice.turns * choice.replicates
     scatter, bias, gaps = dict(model.scatter), dict(model.bias), model.gaps
-    for name, figure in quantities_of(result).items():
+    for name in AIMED:
+        figure = result.figures[name]
         statistical, numerical = figure.statistical_error, figure.numerical_error
         if statistical is None or numerical is None or figure.value == 0.0:
             continue
@@ -289,7 +287,7 @@ def _companion_noise(scene: Scene, rtol: float) -> float:
 
 def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> float:
     """Relative standard error of one turn, from the error bars of all pilots."""
-    figure = FIGURES[name][0]
+    figure = AIMED[name]
     squares = []
     for runs in series:
         mean = estimate([figure.moments(run) for run in runs], figure.of_sums)
@@ -304,7 +302,7 @@ def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turn
 
     ``turns``: of all replicates of one pilot.
     """
-    figure = FIGURES[name][0]
+    figure = AIMED[name]
     values = [estimate([figure.moments(run) for run in runs], figure.of_sums).value for runs in series]
     if values[-1] == 0.0:
         return 0.0
@@ -333,7 +331,7 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
             "target", f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
         )
     worst = max(errors, key=lambda name: errors[name] or 0.0)
-    figure = quantities_of(result)[worst]
+    figure = result.figures[worst]
     statistical, numerical = figure.statistical_error or 0.0, figure.numerical_error or 0.0
     if numerical > statistical:
         limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"

@@ -37,7 +37,8 @@ from rbdyn.dynamics.part_figures import at_temperatures_with_errors
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.settling import Ensemble
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
-from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean, quantity, work_done
+from rbdyn.dynamics.statistics.metrics import quantity, work_done
+from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import heat_notes
@@ -78,8 +79,8 @@ class Trial(NamedTuple):
     clock: dict[str, float]
 
 
-def temperature_figures(state: Array, network: Network, slopes: Array) -> list[Figure]:
-    """Steady temperature of each node [C] as a figure of the replicates of a state (4,).
+def temperature_figures(state: Array, network: Network, slopes: Array) -> list[Statistic]:
+    """Steady temperature of each node [C] as a statistic of the replicates of a state (4,).
 
     T + (1 - dM/dT)^-1 (M - T), with M = offset + weights times the powers. With slopes of 0 it is M, which balances the heat.
     """
@@ -90,13 +91,13 @@ def temperature_figures(state: Array, network: Network, slopes: Array) -> list[F
     ]
 
 
-def _weighted(weights: Array, constant: float) -> Figure:
+def _weighted(weights: Array, constant: float) -> Statistic:
     """Constant plus weighted sum of the mean powers."""
 
     def moments(run: Replicate) -> Array:
         return np.column_stack((run.durations, run.work @ weights + constant * run.durations))[run.first :]
 
-    return Figure(moments, mean)
+    return Statistic(moments, mean)
 
 
 def powers_of(runs: Sequence[Replicate]) -> Array:

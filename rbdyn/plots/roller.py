@@ -3,6 +3,7 @@
 Also cage slip over speed and load, and a moving picture of the bearing with its forces (GIF, or MP4 with ffmpeg).
 """
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -12,7 +13,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
+from rbdyn.base.words import label
 from rbdyn.dynamics import motion
+from rbdyn.dynamics.figures import PANELS
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
 
@@ -210,10 +213,10 @@ def sliding(history: "History", path: Path) -> None:
         ("Hertz pressure ×\nsliding speed [MPa·m/s]", 1e-6, pressed[0], pressed[1]),
         ("heat of a contact [W]", 1.0, history.outer_heat, history.inner_heat),
     )
-    for axis, (label, factor, outer, inner) in zip(axes, panels, strict=True):
+    for axis, (words, factor, outer, inner) in zip(axes, panels, strict=True):
         _around(axis, history, outer, factor, OUTER, "outer race")
         _around(axis, history, inner, factor, INNER, "inner race")
-        axis.set_ylabel(label)
+        axis.set_ylabel(words)
     axes[0].legend(fontsize=9)
     axes[0].set_title("mean, and 5 % to 95 % of the samples", fontsize=10)
     axes[-1].set_xlabel("azimuth of the roller from the load [°]")
@@ -235,14 +238,6 @@ def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     save(figure, path)
 
 
-PANELS = (
-    ("cage_slip", "cage slip [%]", 100.0),
-    ("power_loss_W", "power loss [W]", 1.0),
-    ("impact_force_N", "largest roller/cage force [N]", 1.0),
-    ("whirl_deviation_ratio", "whirl deviation ratio", 1.0),
-)
-
-
 # Of a row.
 BELOW = 0.25
 
@@ -256,9 +251,12 @@ def draw_slip_map(
     """
     speeds, loads = slip_map.speeds_rpm, slip_map.loads_N
     width = max(4.2, 0.85 * len(speeds) + 2.0)
-    figure, axes = plt.subplots(2, 2, figsize=(2.0 * width, 2.0 * max(3.2, 0.5 * len(loads) + 1.8)))
-    for axis, (name, label, unit) in zip(axes.ravel(), PANELS, strict=True):
-        values = unit * slip_map.grid(name)
+    rows = math.ceil(len(PANELS) / 2)
+    figure, axes = plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(loads) + 1.8)))
+    for axis in axes.ravel()[len(PANELS) :]:
+        axis.set_axis_off()
+    for axis, panel in zip(axes.ravel(), PANELS, strict=False):
+        values = panel.percent * slip_map.grid(panel.key)
         image = axis.imshow(values, origin="lower", aspect="auto", cmap="cividis")
         middle = np.nanmean([np.nanmin(values), np.nanmax(values)]) if np.isfinite(values).any() else 0.0
         for (row, column), value in np.ndenumerate(values):
@@ -268,7 +266,11 @@ def draw_slip_map(
             axis.text(column, row - BELOW * bool(marks), text, ha="center", va="center", fontsize=8, color=colour)
         axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
         axis.set_yticks(range(len(loads)), [f"{load:g}" for load in loads])
-        axis.set(xlabel="inner speed [rpm]", ylabel="radial load [N]", title=label)
+        axis.set(
+            xlabel="inner speed [rpm]",
+            ylabel="radial load [N]",
+            title=f"{label(panel.key)} [%]" if panel.percent > 1.0 else label(panel.key),
+        )
         figure.colorbar(image, ax=axis)
         _mark_points(axis, slip_map, marks)
     save(figure, path)

@@ -130,12 +130,13 @@ def keys(kinds: Mapping[str, type[BaseModel]]) -> list[Key]:
 
 @functools.cache
 def descriptions(model: type[BaseModel]) -> dict[str, str]:
-    """Docstrings under the fields of a model and of its bases, each as one line."""
-    texts: dict[str, str] = {}
+    """Docstrings under the fields of a model and of its bases, each as one line; of a field made of a list, its description."""
+    texts = {name: str(field.description) for name, field in model.model_fields.items() if field.description}
     for base in reversed(model.__mro__):
         if base.__module__.partition(".")[0] == "pydantic" or not hasattr(base, "model_fields"):
             continue
-        body = _classes(base.__module__)[base.__name__].body
+        source = _classes(base.__module__).get(base.__name__)
+        body = [] if source is None else source.body
         for field, text in pairwise(body):
             if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
                 value = getattr(text, "value", None)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +35,16 @@ def instant_result(scene: Scene) -> SimulationResult:
         )
     }
     return SimulationResult(
-        status="ok", **figures, power_balance={"relative_gap": 0.0}, power_terms_W={}, rolling_resistance_W={},
+        status="ok", figures=figures, power_balance={"relative_gap": 0.0}, power_terms_W={}, rolling_resistance_W={},
         loads={"max_inner_N": 1.0, "max_outer_N": 1.0, "max_land_N": 1.0}, races={}, clearance_um={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
         replicates=scene.numerics.replicates, seed=seed, notes=(), versions=versions(),
         scene=scene.model_dump(mode="json"),
     )  # fmt: skip
+
+
+def with_figures(result: SimulationResult, **figures: Quantity) -> SimulationResult:
+    """The result with other figures of the bearing."""
+    return replace(result, figures=result.figures | figures)
 
 
 def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) -> list[int]:

@@ -29,7 +29,8 @@ from rbdyn.dynamics.forces.bodies import (
     outer_motion,
 )
 from rbdyn.dynamics.forces.cage import guide_forces
-from rbdyn.dynamics.forces.equations import LOAD, SHAFT, cage_motion, inner_motion, mechanical_energy
+from rbdyn.dynamics.forces.equations import cage_motion, inner_motion, mechanical_energy
+from rbdyn.dynamics.forces.places import LOAD, SHAFT
 from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, RoundRace, WavyRace, unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant

@@ -45,7 +45,7 @@ from rbdyn.dynamics.forces.cage import (
     NoPocket,
     OuterGuide,
 )
-from rbdyn.dynamics.forces.equations import LOAD
+from rbdyn.dynamics.forces.places import LOAD
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps
 from rbdyn.dynamics.parameters.model import roller_bearing
 

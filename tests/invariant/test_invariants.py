@@ -14,7 +14,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOAD, SHAFT, mechanical_energy
+from rbdyn.dynamics.forces.equations import mechanical_energy
+from rbdyn.dynamics.forces.places import LOAD, SHAFT
 from rbdyn.dynamics.forces.races import unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, SmoothRamps
 from rbdyn.dynamics.parameters.model import roller_bearing

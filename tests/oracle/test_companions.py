@@ -20,13 +20,13 @@ from rbdyn.dynamics.statistics.metrics import (
     LEAST_DAMPING,
     MOST_DAMPING,
     NOTABLE_DAMPING,
-    Replicate,
     companions_of,
     longest_step,
     numerical_damping,
     resolved_damping,
     usual_companions,
 )
+from rbdyn.dynamics.statistics.replicate import Replicate
 
 SLOW = ("operation.inner_speed_rpm=2000", "operation.radial_load_N=4000")
 

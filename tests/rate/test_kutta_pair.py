@@ -10,7 +10,8 @@ from smooth_runs import run_of, vibrating
 from test_runge_kutta import one_step, orders_of, slope_of
 
 from rbdyn.base.faults import RunError
-from rbdyn.dynamics.forces.equations import SHAFT, mechanical_energy
+from rbdyn.dynamics.forces.equations import mechanical_energy
+from rbdyn.dynamics.forces.places import SHAFT
 from rbdyn.dynamics.integrators import runge_kutta
 from rbdyn.dynamics.integrators.advance import DERIVATIVES, interpolate
 from rbdyn.dynamics.simulate import simulate

@@ -10,7 +10,9 @@ from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOADS, POWERS, SHAFT, mechanical_energy
+from rbdyn.dynamics.figures import CAGE_SLIP, IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
+from rbdyn.dynamics.forces.equations import mechanical_energy
+from rbdyn.dynamics.forces.places import LOADS, POWERS, SHAFT
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import PARTS, layout
 from rbdyn.dynamics.integrators import advance as at
@@ -312,7 +314,10 @@ def test_oracle_statistics_of_both_methods(make_scene):
         bearing = roller_bearing(scene)
         runs = [run_replicate(scene, bearing, index, 1e-2, Stop()) for index in range(16)]
         figures[method] = np.array(
-            [(run.impact_force, run.whirl_deviation_ratio, run.power_loss, run.cage_slip) for run in runs]
+            [
+                [statistic.of(run) for statistic in (IMPACT_FORCE, WHIRL_DEVIATION_RATIO, POWER_LOSS, CAGE_SLIP)]
+                for run in runs
+            ]
         )
     for explicit, implicit in zip(figures["rk45"].T, figures["rosenbrock"].T, strict=True):
         error = np.hypot(student_half_width(explicit), student_half_width(implicit))

@@ -12,7 +12,8 @@ from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import CancelledError
-from rbdyn.dynamics.forces.equations import POWERS, SHAFT, mechanical_energy
+from rbdyn.dynamics.forces.equations import mechanical_energy
+from rbdyn.dynamics.forces.places import POWERS, SHAFT
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import runge_kutta as dp
 from rbdyn.dynamics.integrators.advance import advance, interpolate, refine_peak

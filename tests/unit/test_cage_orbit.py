@@ -11,12 +11,14 @@ from short_studies import short_study
 
 from doe.workflow.confirmation import Choice, confirmed_from, whirl_sentence
 from doe.workflow.problem import Problem
-from rbdyn.dynamics.forces.equations import LOADS, POWERS
+from rbdyn.dynamics.figures import BEARING
+from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.integrators.advance import WHIRL, book_whirl
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.recording import PLACE_SUMS, SPEED_SUMS
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.metrics import Replicate, orbit_radius_share, whirl_notes
+from rbdyn.dynamics.statistics.metrics import quantity, whirl_notes
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import JITTER, Quantity
 
 # Radial guide clearance 150 um.
@@ -35,6 +37,13 @@ def run_at(places, batches=10):
     )  # fmt: skip
 
 
+def orbit_radius_share(scene, runs):
+    """Radius of the orbit over the play of the cage, with its errors."""
+    (figure,) = (one for one in BEARING if one.key == "cage_orbit_radius_share")
+    scale = figure.scale_in(scene)
+    return None if scale is None else quantity(figure.statistic, runs, [], 0.0, 0.0, scale)
+
+
 def circle(share, turns=100, samples=20_000, centre=(0.0, 0.0)):
     """Places of a centre that goes round ``centre`` at a share of the clearance."""
     angle = 2.0 * math.pi * turns * np.arange(samples) / samples
@@ -51,7 +60,7 @@ def test_unit_circle_is_a_whirl(make_scene):
     """Unit: a circle at 0.9 of the clearance has that radius, wherever its centre is, and no note."""
     scene = make_scene(WIDE)
     for centre in ((0.0, 0.0), (3e-6, -5e-6)):
-        share = orbit_radius_share(scene, [run_at(circle(0.9, centre=centre))], [], 0.0)
+        share = orbit_radius_share(scene, [run_at(circle(0.9, centre=centre))])
         assert share.value == pytest.approx(0.9, rel=1e-9)
         assert whirl_notes(scene, share) == ()
 
@@ -62,7 +71,7 @@ def test_unit_noise_at_a_resting_place_is_a_jitter(make_scene):
     places = [(-0.76 * RADIUS, 0.42 * RADIUS), (0.0, 0.0), (0.87 * RADIUS, 0.0)]
     runs = [run_at(noise(2e-6, place, seed)) for seed, place in enumerate(places)]
     for some in (runs[:1], runs):
-        share = orbit_radius_share(scene, some, [], 0.0)
+        share = orbit_radius_share(scene, some)
         # 20000 samples: half a per cent.
         assert share.value == pytest.approx(2e-6 / RADIUS, rel=0.01)
         assert share.statistical_error < 0.05 * share.value
@@ -74,7 +83,7 @@ def test_unit_threshold(make_scene):
     """Unit: the note ends where the radius reaches the threshold."""
     scene = make_scene(WIDE)
     for factor, noted in ((0.99, 1), (1.01, 0)):
-        share = orbit_radius_share(scene, [run_at(circle(factor * JITTER))], [], 0.0)
+        share = orbit_radius_share(scene, [run_at(circle(factor * JITTER))])
         assert len(whirl_notes(scene, share)) == noted
 
 
@@ -82,11 +91,11 @@ def test_unit_play_of_other_guidances(make_scene):
     """Unit: rollers guide a cage within half the play of their pocket lips, which counts both ways; without a land there is no play and no share."""
     lips = make_scene("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.30")
     assert lips.guide_clearance_m is None and lips.cage_play_m == pytest.approx(RADIUS)
-    share = orbit_radius_share(lips, [run_at(noise(2e-6, (0.0, 0.0)))], [], 0.0)
+    share = orbit_radius_share(lips, [run_at(noise(2e-6, (0.0, 0.0)))])
     assert share.value == pytest.approx(2e-6 / RADIUS, rel=0.01)
     assert "of the radial play in its pockets" in whirl_notes(lips, share)[0]
     loose = make_scene("model.guide_land=off")
-    assert loose.cage_play_m is None and orbit_radius_share(loose, [run_at(circle(0.5))], [], 0.0) is None
+    assert loose.cage_play_m is None and orbit_radius_share(loose, [run_at(circle(0.5))]) is None
     assert whirl_notes(loose, None) == ()
 
 
@@ -139,8 +148,9 @@ def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     idle = Problem.load(short_study(tmp_path, replace=('"quadratic"\ngoal = "min"', '"quadratic"\ngoal = "none"')))
 
     def point(share):
-        orbit = None if share is None else Quantity(share, 0.1 * share, None, 10.0, 9)
-        result = replace(outer_result, cage_orbit_radius_share=orbit)
+        orbit = {} if share is None else {"cage_orbit_radius_share": Quantity(share, 0.1 * share, None, 10.0, 9)}
+        others = {key: one for key, one in outer_result.figures.items() if key != "cage_orbit_radius_share"}
+        result = replace(outer_result, figures=others | orbit)
         return confirmed_from(study, Choice(study.baseline, "a test"), result)
 
     both = {"baseline": point(0.016), "pick": point(0.02)}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from instant_runs import instant_result, instantly, unillustrated
+from instant_runs import instant_result, instantly, unillustrated, with_figures
 from scipy import stats
 from short_studies import EXAMPLES, rows, short_study, silent
 
@@ -76,7 +76,7 @@ def figures_of(patch, figures):
     def simulate(scene, *rest, **more):
         ran.append(scene.numerics.seed)
         found = {name: Quantity(value, half, 0.0, 10.0, dof) for name, (value, half, dof) in figures(scene).items()}
-        return replace(instant_result(scene), **found)
+        return with_figures(instant_result(scene), **found)
 
     patch(simulate_module, "simulate", simulate)
     return ran
@@ -316,7 +316,10 @@ def result_of(rule, parts, shares, baseline=None, errors=True):
     """Result of one figure, impact force, over a duty of quantities by name of the point."""
     duty = Duty(shares, {name: [] for name in shares}, {"impact_force_N": rule})
     sides = [
-        {name: replace(ANY, impact_force_N=part, scene={"of": kind, "at": name}) for name, part in quantities.items()}
+        {
+            name: replace(with_figures(ANY, impact_force_N=part), scene={"of": kind, "at": name})
+            for name, part in quantities.items()
+        }
         for kind, quantities in (("run", parts), ("baseline", baseline or {}))
     ]
     return DutyResult(duty, sides[0], tuple((name,) for name in parts), sides[1], errors)
@@ -357,7 +360,7 @@ def test_the_cage_jitters_at_the_points_that_say_so():
     result = result_of(Rule("mean", "min", None), parts, {"a": 0.5, "b": 0.5})
     shares = {"a": 0.05, "b": 0.4}
     orbits = {name: Quantity(share, 0.01, 0.0, 10.0, 9) for name, share in shares.items()}
-    points = {name: replace(part, cage_orbit_radius_share=orbits[name]) for name, part in result.points.items()}
+    points = {name: with_figures(part, cage_orbit_radius_share=orbits[name]) for name, part in result.points.items()}
     moved = replace(result, points=points)
     assert moved.jitters
     assert moved.jitter_points == ("a",)

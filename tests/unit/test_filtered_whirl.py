@@ -14,11 +14,13 @@ from doe.workflow.input_sets import case_of
 from doe.workflow.rig import read_rig
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.figures import WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.statistics.metrics import Replicate, filtered_speed
+from rbdyn.dynamics.statistics.metrics import filtered_speed
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
@@ -144,11 +146,11 @@ def test_a_simulated_orbit_read_back_as_a_signal_is_the_statistic_of_the_run(tmp
     value, sd, _ = whirl(path, 800.0, (), None)
     # Batches of the run end at samples, so both integrate the same steps; the run has one sample more.
     assert kept.whirl[:, 0].sum() == 2801 == len(motion.time) + 1
-    assert value == pytest.approx(kept.whirl_deviation_ratio, rel=5e-3)
+    assert value == pytest.approx(WHIRL_DEVIATION_RATIO.of(kept), rel=5e-3)
     # The filter matters more than the error.
-    assert abs(value - _counted(plain).whirl_deviation_ratio) > 5.0 * sd
+    assert abs(value - WHIRL_DEVIATION_RATIO.of(_counted(plain))) > 5.0 * sd
     notched = _counted(filtered.changed({"numerics.whirl_notches_hz": [400.0]}))
-    assert notched.whirl_deviation_ratio == pytest.approx(whirl(path, 800.0, (400.0,), None)[0], rel=0.02)
+    assert WHIRL_DEVIATION_RATIO.of(notched) == pytest.approx(whirl(path, 800.0, (400.0,), None)[0], rel=0.02)
     assert (notched.work == kept.work).all()
 
 

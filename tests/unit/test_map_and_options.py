@@ -19,7 +19,7 @@ from rbdyn.accuracy.variants import OPTIONS, option_costs, study_options, with_o
 from rbdyn.base.faults import InputError, axis_values
 from rbdyn.cli.app import MAP_POINTS
 from rbdyn.cli.app import _write_map as write
-from rbdyn.dynamics.slip_map import FIGURES, slip_map
+from rbdyn.dynamics.slip_map import PANELS, slip_map
 from rbdyn.scene import Scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
@@ -74,7 +74,7 @@ def test_unit_map_saves_table_picture_and_json(found, tmp_path, drawn):
     assert not lacking(drawn["map.png"], [100.0 * found.grid("cage_slip"), found.grid("power_loss_W")])
     assert saved["format"] == "rbdyn.map/1" and saved["status"] == "ok" and len(saved["points"]) == 4
     table = found.table()
-    assert len(table) == 4 and {f"{name}_statistical_error" for name in FIGURES} <= set(table.columns)
+    assert len(table) == 4 and {f"{panel.key}_statistical_error" for panel in PANELS} <= set(table.columns)
 
 
 def test_unit_failed_points_are_records(make_scene):

@@ -14,7 +14,7 @@ from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.app import map_blocks
 from rbdyn.cli.duty import map_duty
 from rbdyn.dynamics.duty import static_life
-from rbdyn.dynamics.slip_map import FIGURES, Point, SlipMap
+from rbdyn.dynamics.slip_map import PANELS, Point, SlipMap
 from rbdyn.life.duty import life_notes
 from rbdyn.result import Quantity
 from rbdyn.scene.duty import duty_scenes, read_duty
@@ -47,7 +47,7 @@ def path(tmp_path) -> Path:
 @pytest.fixture(scope="module")
 def mapped() -> SlipMap:
     """A map of made-up figures."""
-    figures = {name: Quantity(0.5, 0.1, 0.0, 10.0) for name in FIGURES}
+    figures = {name: Quantity(0.5, 0.1, 0.0, 10.0) for name in (panel.key for panel in PANELS)}
     points = tuple(Point(speed, load, "ok", figures, 0.0) for load in LOADS for speed in SPEEDS)
     return SlipMap(SPEEDS, LOADS, points, 1.0, 1)
 

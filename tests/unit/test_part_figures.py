@@ -20,7 +20,7 @@ from doe.duty import Rule
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
-from rbdyn.dynamics.figure_names import CLEARANCES, CONTACTS, LIFE, NAMES, POWERS
+from rbdyn.dynamics.figures import PARTS, of_kind
 from rbdyn.dynamics.slip_map import slip_map
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -45,18 +45,22 @@ def test_the_figures_of_parts_are_those_of_the_report_with_errors():
     """Powers add up to the loss, clearances and contacts are those reported; all scatter but the clearances of the drawing."""
     run = result("cylindrical_roller.toml")
     figures = run.part_figures
-    assert tuple(figures) == NAMES and not set(figures) & set(run.quantities)
-    powers = {name: figures[name] for name in POWERS}
+    assert list(figures) == [part.key for part in PARTS] and not set(figures) & set(run.quantities)
+    powers = {power.key: figures[power.key] for power in of_kind("power")}
     assert [power.value for power in powers.values()] == pytest.approx(list(run.power_terms_W.values()))
     assert math.fsum(power.value for power in powers.values()) == pytest.approx(run.power_loss_W.value)
     # Terms that oppose each other scatter more than their sum, and none scatters by itself as much as their sum of errors.
     assert run.power_loss_W.statistical_error < math.fsum(power.statistical_error for power in powers.values())
-    for name, of in CLEARANCES.items():
-        assert figures[name].value == pytest.approx(run.clearance_um[of]["operating"]) and figures[name].error == 0.0
-    for name, (race, key) in CONTACTS.items():
-        assert figures[name].value == run.races[race][key] and figures[name].statistical_error > 0.0
+    for gap in of_kind("clearance"):
+        operating = run.clearance_um[gap.source[0]]["operating"]
+        assert figures[gap.key].value == pytest.approx(operating) and figures[gap.key].error == 0.0
+    for contact in of_kind("contact"):
+        race, key = contact.source
+        assert figures[contact.key].value == run.races[race][key] and figures[contact.key].statistical_error > 0.0
     scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml")
-    assert figures[LIFE].value == static_life(scene).hours(*scene.operation.speeds) and figures[LIFE].error == 0.0
+    assert (
+        figures["life_h"].value == static_life(scene).hours(*scene.operation.speeds) and figures["life_h"].error == 0.0
+    )
     assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).part_figures == figures
 
 
@@ -96,7 +100,7 @@ def test_a_limit_may_name_each_kind_and_a_wrong_name_lists_all():
     with pytest.raises(InputError) as refused:
         limits_of(["power<=9", "land_film_power_W<=0,9 kW", "inner_minimum_film_um>=0,1"])
     assert "choose one of impact_force_N," in refused.value.faults[0]
-    assert all(name in clearance.responses_of(True) for name in (*NAMES, "oil_temperature_C"))
+    assert all(name in clearance.responses_of(True) for name in [*(part.key for part in PARTS), "oil_temperature_C"])
     assert refused.value.faults[2].endswith("has a decimal comma; write 0.1")
 
 

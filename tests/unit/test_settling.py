@@ -8,11 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from instant_runs import with_figures
 
 from rbdyn.accuracy import coverage
 from rbdyn.base.faults import RunError
+from rbdyn.dynamics import figures
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
+from rbdyn.dynamics.figures import POWER_LOSS
+from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import (
@@ -28,7 +31,6 @@ from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run, explicit_method, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.error_bars import (
     FALSE_ALARMS,
     TESTED,
@@ -40,7 +42,7 @@ from rbdyn.dynamics.statistics.error_bars import (
     slow_change,
     unseen_regime,
 )
-from rbdyn.dynamics.statistics.metrics import POWER_LOSS, Replicate
+from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity
 
 
@@ -92,7 +94,7 @@ def test_oracle_false_alarms_of_all_figures_together():
     alarms = [bool(disagreements(independent_figures(draw), FALSE_ALARMS)) for _ in range(400)]
     assert np.mean(alarms) <= FALSE_ALARMS + 3.0 * math.sqrt(0.05 * 0.95 / 400)
     single = [each.chance < FALSE_ALARMS for _ in range(60) for runs in [independent_figures(draw)]
-              for figure in TESTED.values() for each in differences_of(figure, runs)]  # fmt: skip
+              for figure in TESTED for each in differences_of(figure, runs)]  # fmt: skip
     assert 0.02 < np.mean(single) < 0.09
     named = [disagreements(independent_figures(draw, 0.1), FALSE_ALARMS) for _ in range(40)]
     assert np.mean([any(figure is POWER_LOSS for figure, _ in each) for each in named]) > 0.95
@@ -166,7 +168,8 @@ def test_unit_a_run_that_has_not_settled_states_no_interval(example):
 
     found = run_until_settled(example, start, 1, None, Stop())
     assert len(found.runs[0].durations) == 480 and "no statistical error is known" in found.notes[1]
-    for figure in quantities(example, found.runs, [], 1.0, found.since).values():
+    states = quantities(example, found.runs, [], 1.0, found.since)
+    for figure in (states[one.key] for one in figures.BEARING if one.slow):
         assert figure.statistical_error is None and figure.degrees_of_freedom is None
     alike = [replace(run, group=0) for run in found.runs]
     assert quantities(example, alike, [], 1.0, found.since)["power_loss_W"].statistical_error > 5.0
@@ -199,7 +202,7 @@ def test_unit_unseen_regime():
     assert unseen_regime(POWER_LOSS, runs, since=20) == 0.0
     assert unseen_regime(POWER_LOSS, runs, since=0) == pytest.approx(10.0 / 5.0)
     assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, moving=False) == pytest.approx(2.0)
-    assert slow_change(metrics.CAGE_SPEED, metrics.CAGE_SPEED, runs, 0, moving=True) == 0.0
+    assert slow_change(figures.CAGE_SPEED, figures.CAGE_SPEED, runs, 0, moving=True) == 0.0
 
 
 class Written:
@@ -329,8 +332,8 @@ def test_unit_coverage_counts(outer_result):
     names = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 
     def result(value, statistical, numerical):
-        figures = {name: Quantity(value, statistical, numerical, 9.0) for name in names}
-        return replace(outer_result, **figures)
+        found = {name: Quantity(value, statistical, numerical, 9.0) for name in names}
+        return with_figures(outer_result, **found)
 
     truth = result(100.0, 0.0, None)
     results = [result(100.0 + off, 3.0, 4.0) for off in (0.0, 3.5, 4.9, 5.1)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
-from rbdyn.dynamics.forces import state
+from rbdyn.dynamics.forces import places, state
 from rbdyn.dynamics.forces.bodies import (
     RingMotion,
     action,
@@ -34,16 +34,6 @@ from rbdyn.dynamics.forces.bodies import (
 from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
-from rbdyn.losses import POWER_TERMS
-
-# After the powers lost come the input by the shafts and by loads without a potential, and last the inner race's part of the
-# rolling resistance.
-(
-    OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
-    LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POWERS,
-) = range(len(POWER_TERMS) + 4)  # fmt: skip
-# Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
-POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 
 
 class RollerBearing(NamedTuple):
@@ -251,27 +241,27 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
     support_fx, support_fy = on_outer.x + land.outer_x, on_outer.y + land.outer_y
     support_loss = support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
-    power[row, OUTER_TRACTION] = on_outer.traction
-    power[row, INNER_TRACTION] = on_inner.traction
-    power[row, ROLLING] = on_outer.rolling + on_inner.rolling
-    power[row, RACE_DAMPING] = on_outer.damping + on_inner.damping
-    power[row, POCKET_FRICTION] = pockets.friction
-    power[row, POCKET_DAMPING] = pockets.damping
-    power[row, POCKET_FILM] = pockets.film
-    power[row, LAND_FILM] = land.film
-    power[row, LAND_FRICTION] = land.friction
-    power[row, LAND_DAMPING] = land.damping
-    power[row, DRAG] = drag_loss
-    power[row, SUPPORT_DAMPING] = support_loss
+    power[row, places.OUTER_TRACTION] = on_outer.traction
+    power[row, places.INNER_TRACTION] = on_inner.traction
+    power[row, places.ROLLING] = on_outer.rolling + on_inner.rolling
+    power[row, places.RACE_DAMPING] = on_outer.damping + on_inner.damping
+    power[row, places.POCKET_FRICTION] = pockets.friction
+    power[row, places.POCKET_DAMPING] = pockets.damping
+    power[row, places.POCKET_FILM] = pockets.film
+    power[row, places.LAND_FILM] = land.film
+    power[row, places.LAND_FRICTION] = land.friction
+    power[row, places.LAND_DAMPING] = land.damping
+    power[row, places.DRAG] = drag_loss
+    power[row, places.SUPPORT_DAMPING] = support_loss
     inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
-    power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
-    power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
-    power[row, INNER_ROLLING] = on_inner.rolling
-    loads[row, POCKET_LOAD] = pockets.load
-    loads[row, OUTER_LOAD] = on_outer.load
-    loads[row, INNER_LOAD] = on_inner.load
-    loads[row, LAND_LOAD] = land.load
-    loads[row, POCKET_CONTACT_LOAD] = pockets.contact_load
+    power[row, places.SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, places.LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
+    power[row, places.INNER_ROLLING] = on_inner.rolling
+    loads[row, places.POCKET_LOAD] = pockets.load
+    loads[row, places.OUTER_LOAD] = on_outer.load
+    loads[row, places.INNER_LOAD] = on_inner.load
+    loads[row, places.LAND_LOAD] = land.load
+    loads[row, places.POCKET_CONTACT_LOAD] = pockets.contact_load
 
 
 @routine
@@ -283,8 +273,8 @@ def pocket_loads(bearing, y, row, loads, scratch):
         wall = roller_pocket(bearing, y, cage, scratch.touching[i])
         load = max(load, abs(wall.on_wall))
         contact_load = max(contact_load, wall.load)
-    loads[row, POCKET_LOAD] = load
-    loads[row, POCKET_CONTACT_LOAD] = contact_load
+    loads[row, places.POCKET_LOAD] = load
+    loads[row, places.POCKET_CONTACT_LOAD] = contact_load
 
 
 @routine

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, law, routine
-from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
+from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
+from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
 

@@ -31,7 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import VECTOR, kernel, law, routine
-from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing, derivative, derivative_once
+from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivative_once
+from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS, Layout

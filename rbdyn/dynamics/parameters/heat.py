@@ -10,7 +10,8 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Notes
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, POWERS, ROLLING, RollerBearing
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.places import INNER_ROLLING, POWERS, ROLLING
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
 from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage

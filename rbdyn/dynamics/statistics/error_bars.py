@@ -37,11 +37,13 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
-from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.base.words import quantity as words_of
+from rbdyn.dynamics.figures import FIGURES, WHIRL_SPEED
+from rbdyn.dynamics.forces.places import POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import GROUPS
-from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_chance, student_factor
-from rbdyn.dynamics.statistics.metrics import Figure, Replicate, Runs, mean, quantity
+from rbdyn.dynamics.statistics.metrics import Runs, quantity
+from rbdyn.dynamics.statistics.replicate import Replicate, Statistic
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -131,22 +133,7 @@ def start_of_counting(scene: Scene, runs: Runs) -> Start:
     return Start(run.first, turns, ())
 
 
-def _largest(force: int) -> Figure:
-    """Mean of the largest load of each batch, since a run may have only one or two impact windows."""
-    return Figure(
-        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], mean
-    )
-
-
-WHIRL_SPEED = Figure(lambda run: run.whirl[run.first :, :2], mean)
-TESTED = {
-    "impact_force_N": _largest(POCKET_LOAD),
-    "impact_contact_force_N": _largest(POCKET_CONTACT_LOAD),
-    "whirl_deviation_ratio": metrics.WHIRL_DEVIATION_RATIO,
-    "power_loss_W": metrics.POWER_LOSS,
-    "cage_speed_rpm": metrics.CAGE_SPEED,
-    "whirl speed": WHIRL_SPEED,
-}
+TESTED = (*(it.trend or it for figure in FIGURES if figure.tested and (it := figure.statistic)), WHIRL_SPEED)
 
 
 class Difference(NamedTuple):
@@ -174,7 +161,7 @@ class Difference(NamedTuple):
         return self.share * size
 
 
-def differences_of(figure: Figure, runs: Runs) -> list[Difference]:
+def differences_of(figure: Statistic, runs: Runs) -> list[Difference]:
     """Later half of the counted turns less the earlier one, and the second group of starts less the first.
 
     None where the turns are too few to decide; none of groups where all replicates but two start alike.
@@ -203,13 +190,13 @@ def differences_of(figure: Figure, runs: Runs) -> list[Difference]:
     return found
 
 
-def _values(figure: Figure, moments: Sequence[Array]) -> Array:
+def _values(figure: Statistic, moments: Sequence[Array]) -> Array:
     """The figure of each replicate."""
     return np.array([float(figure.of_sums(part.sum(axis=0))) for part in moments])
 
 
 def _by_batches(
-    figure: Figure, before: Sequence[Array], after: Sequence[Array], share: float, size: float
+    figure: Statistic, before: Sequence[Array], after: Sequence[Array], share: float, size: float
 ) -> Difference | None:
     """Difference of two sets of moments whose errors come from batch means; None where these are too few."""
     parts = [estimate(part, figure.of_sums) for part in (before, after)]
@@ -221,9 +208,9 @@ def _by_batches(
     return Difference(parts[1].value - parts[0].value, error, freedom, size, share)
 
 
-def disagreements(runs: Runs, false_alarms: float) -> list[tuple[Figure, Difference]]:
+def disagreements(runs: Runs, false_alarms: float) -> list[tuple[Statistic, Difference]]:
     """The tested differences that are beyond scatter; the share ``false_alarms`` of settled runs has any."""
-    found = [(figure, each) for figure in TESTED.values() for each in differences_of(figure, runs)]
+    found = [(figure, each) for figure in TESTED for each in differences_of(figure, runs)]
     ranked = sorted(found, key=lambda each: each[1].chance)
     settled = (each.chance > false_alarms / (len(ranked) - place) for place, (_, each) in enumerate(ranked))
     return ranked[: next((place for place, is_settled in enumerate(settled) if is_settled), len(ranked))]
@@ -245,13 +232,13 @@ def settled(runs: Runs, since: int) -> bool:
     )
 
 
-def _settled_error(figure: Figure, runs: Runs, since: int) -> float:
+def _settled_error(figure: Statistic, runs: Runs, since: int) -> float:
     """Half-width of a figure whose runs agree."""
     scatter = estimate([figure.moments(run) for run in runs], figure.of_sums).half_width
     return math.hypot(scatter or 0.0, unseen_regime(figure, runs, since))
 
 
-def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
+def unseen_regime(figure: Statistic, runs: Runs, since: int) -> float:
     """Effect on the mean of a regime that no counted replicate is in, estimated by all stretches from batch ``since`` on."""
     counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
     middle, farthest = float(figure.of_sums(counted)), 0.0
@@ -264,7 +251,7 @@ def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
     return farthest / (len(runs) + 1)
 
 
-def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, moving: bool) -> float:
+def slow_change(figure: Statistic, tested: Statistic, runs: Runs, since: int, *, moving: bool) -> float:
     """Half-width that slow change adds to a figure of steady runs: differences and unseen regimes, as root sum of squares.
 
     ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
@@ -274,21 +261,8 @@ def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, movin
     return math.hypot(bias, unseen_regime(figure, runs, since))
 
 
-FIGURES = {
-    "impact_force_N": (metrics.IMPACT_FORCE, 1.0),
-    "impact_contact_force_N": (metrics.IMPACT_CONTACT_FORCE, 1.0),
-    "whirl_deviation_ratio": (metrics.WHIRL_DEVIATION_RATIO, 1.0),
-    "power_loss_W": (metrics.POWER_LOSS, 1.0),
-    "cage_speed_rpm": (metrics.CAGE_SPEED, 30.0 / math.pi),
-    "cage_slip": (metrics.CAGE_SLIP, 1.0),
-}
-# A slip near zero has no useful relative error; the cage speed shows it.
-JUDGED = {
-    "impact_force_N": "impact force",
-    "whirl_deviation_ratio": "whirl deviation ratio",
-    "power_loss_W": "power loss",
-    "cage_speed_rpm": "cage speed",
-}
+# Figures whose errors have notes, in words.
+JUDGED = {figure.key: words_of(figure.key)[0] for figure in FIGURES if figure.judged}
 # Fewer effective samples leave the half-width itself uncertain by a quarter and more.
 FEW_SAMPLES = 10.0
 # Numerical errors in the notes: above a twentieth of the value, or above a hundredth where they dominate the sum.
@@ -307,19 +281,27 @@ def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Re
 def quantities(
     scene: Scene, runs: Runs, companions: Runs, share: float, since: int | None = None
 ) -> dict[str, Quantity]:
-    """Every figure with its errors, by its name in a record; without a statistical one where the runs have not settled.
+    """Every figure that follows from batches, with its errors, by its key; those of parts too.
 
-    ``share`` of the difference from the companions is the bias of the runs. ``since``: batch from which the replicates show
-    their regimes; unless given, that from which they count.
+    Those of the whole bearing have no statistical error where the runs have not settled. ``share`` of the difference from the
+    companions is the bias of the runs. ``since``: batch from which the replicates show their regimes; unless given, that from
+    which they count.
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
     figures, moving = {}, steady and drifting(runs)
     unknown = moving and not settled(runs, since)
-    for name, (figure, unit) in FIGURES.items():
-        slow = slow_change(figure, TESTED.get(name, figure), runs, since, moving=moving) if steady else 0.0
-        one = quantity(figure, runs, companions, share, slow, unit)
-        figures[name] = replace(one, statistical_error=None, degrees_of_freedom=None) if unknown else one
+    for figure in FIGURES:
+        statistic, scale = figure.statistic, figure.scale_in(scene)
+        if statistic is None or scale is None:
+            continue
+        # Most scenes have no work at all of some losses.
+        counts = steady and figure.slow and any(statistic.moments(run)[:, 1].any() for run in runs)
+        slow = slow_change(statistic, statistic.trend or statistic, runs, since, moving=moving) if counts else 0.0
+        found = quantity(statistic, runs, companions, share, slow, scale, figure.balanced)
+        if unknown and figure.slow and figure.kind == "bearing":
+            found = replace(found, statistical_error=None, degrees_of_freedom=None)
+        figures[figure.key] = found
     return figures
 
 

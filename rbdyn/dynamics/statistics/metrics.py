@@ -37,189 +37,18 @@ the amplitude at the cutoff. Runout turns with cage or shaft. Notches remove it,
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.notes import Note, Notes
-from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate, student_factor
-from rbdyn.losses import POWER_TERMS
+from rbdyn.dynamics.statistics.replicate import Replicate, Statistic
 from rbdyn.result import JITTER, Quantity
 from rbdyn.scene import Scene
-
-SLOWEST_CAGE = 1e-6  # [rad/s]
-
-
-@dataclass(frozen=True)
-class Replicate:
-    """One run in batches. Times in s, works and energies in J, loads in N, angles in rad.
-
-    Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
-    impact window.
-
-    - ``whirl``: samples, sum and sum of squares of the speed of the cage's centre
-    - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
-    - ``work``: integrals of the powers in the order of ``POWER_TERMS`` and what follows there
-    - ``largest``: loads in the order of ``equations``
-    - ``energy``: kinetic, elastic and potential energy together, at the ends of batches
-    - ``energy_scale``: load of a contact times its approach
-    - ``stiffness``: as in ``advance.Carry``
-    - ``group``: of its start, as in ``parameters.state``
-    """
-
-    first: int
-    per_window: int
-    durations: Array
-    whirl: Array
-    work: Array
-    largest: Array
-    cage_angle: Array
-    kinematic_angle: Array
-    energy: Array
-    energy_scale: float
-    accepted_steps: int
-    rejected_steps: int
-    derivatives: int
-    cpu_s: float
-    method: str = "rk45"
-    stiffness: Array = field(default_factory=lambda: np.zeros(3))
-    orbit: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    group: int = 0
-
-    def counted_from(self, first: int) -> "Replicate":
-        """The same run, counted from another batch."""
-        return replace(self, first=first)
-
-    @property
-    def duration(self) -> float:
-        """Time counted [s]."""
-        return float(self.durations[self.first :].sum())
-
-    def windows(self, force: int) -> Array:
-        """Largest load of each whole impact window [N], by its place in the load vector."""
-        forces = self.largest[self.first :, force]
-        whole = len(forces) // self.per_window
-        return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
-
-    @property
-    def impact_force(self) -> float:
-        """Mean over the windows of the largest force on a pocket wall [N]."""
-        return float(self.windows(POCKET_LOAD).mean())
-
-    @property
-    def whirl_deviation_ratio(self) -> float:
-        """Standard deviation over mean of the cage centre's speed; 0 for a cage at rest."""
-        return self._figure(WHIRL_DEVIATION_RATIO)
-
-    @property
-    def power_loss(self) -> float:
-        """Mean power turned into heat [W]."""
-        return self._figure(POWER_LOSS)
-
-    @property
-    def cage_slip(self) -> float:
-        """1 - cage speed over kinematic cage speed."""
-        return self._figure(CAGE_SLIP)
-
-    def _figure(self, figure: "Figure") -> float:
-        return float(figure.of_sums(figure.moments(self).sum(axis=0)))
-
-    def _works(self) -> tuple[float, float, float]:
-        """Work put in, work lost, change of energy [J]."""
-        work = self.work[self.first :].sum(axis=0)
-        return work[SHAFT] + work[LOAD], work[:SHAFT].sum(), self.energy[-1] - self.energy[self.first]
-
-    @property
-    def missing_work(self) -> float:
-        """Work put in less losses less change of energy [J]."""
-        put_in, lost, change = self._works()
-        return float(put_in - lost - change)
-
-    @property
-    def signed_power_gap(self) -> float:
-        """Missing work relative to the largest of its terms."""
-        return self.missing_work / max(*map(abs, self._works()), self.energy_scale)
-
-    @property
-    def power_gap(self) -> float:
-        """Size of the gap of the power balance."""
-        return abs(self.signed_power_gap)
-
-    def power(self, term: str) -> float:
-        """Mean power [W] of one loss."""
-        return float(self.work[self.first :, POWER_TERMS.index(term)].sum() / self.duration)
-
-    @property
-    def inner_rolling_resistance(self) -> float:
-        """Mean power [W] of the rolling resistance at the inner race."""
-        return float(self.work[self.first :, INNER_ROLLING].sum() / self.duration)
-
-    def largest_load(self, force: int) -> float:
-        """Largest load counted [N], by its place in the load vector."""
-        return float(self.largest[self.first :, force].max())
-
-
-class Figure(NamedTuple):
-    """A figure as a function of sums over batches (or impact windows), so that any set of batches has one value.
-
-    ``moments``: (batches, sums) of the counted part of a replicate; ``of_sums``: from sums on the last axis.
-    """
-
-    moments: Callable[[Replicate], Array]
-    of_sums: Callable[[Array], Array]
-
-
-def mean(sums: Array) -> Array:
-    """Second sum over the first: a mean over samples, windows or time."""
-    return sums[..., 1] / sums[..., 0]
-
-
-def _deviation_ratio(sums: Array) -> Array:
-    """Standard deviation over mean (Ghaisas et al. 2004); 0 for a cage at rest."""
-    samples, total, squares = np.moveaxis(sums, -1, 0)
-    defined = (samples > 1.5) & (total > 0.0)
-    samples, total = np.where(defined, samples, 2.0), np.where(defined, total, 1.0)
-    mean = total / samples
-    variance = np.maximum(squares / samples - mean**2, 0.0) * samples / (samples - 1.0)
-    return np.where(defined, np.sqrt(variance) / mean, 0.0)
-
-
-def _slip(sums: Array) -> Array:
-    """1 - angle of the cage over its kinematic angle; 0 where counter-rotation leaves no kinematic speed."""
-    duration, rolling, turned = np.moveaxis(sums, -1, 0)
-    defined = np.abs(rolling) > SLOWEST_CAGE * duration
-    return np.where(defined, 1.0 - turned / np.where(defined, rolling, 1.0), 0.0)
-
-
-def _windowed(force: int) -> Callable[[Replicate], Array]:
-    return lambda run: np.column_stack((np.ones(len(windows := run.windows(force))), windows))
-
-
-def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]:
-    return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
-
-
-def _about_its_place(run: Replicate) -> Array:
-    """Samples of the cage's centre in each batch, and the sum of their squared distances from its mean place in the run."""
-    samples, x, y, squares = run.orbit[run.first :].T
-    mean_x, mean_y = (place.sum() / max(samples.sum(), 1.0) for place in (x, y))
-    about = squares - 2.0 * (mean_x * x + mean_y * y) + samples * (mean_x**2 + mean_y**2)
-    return np.column_stack((samples, np.maximum(about, 0.0)))
-
-
-IMPACT_FORCE = Figure(_windowed(POCKET_LOAD), mean)
-IMPACT_CONTACT_FORCE = Figure(_windowed(POCKET_CONTACT_LOAD), mean)
-WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
-POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
-CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
-CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle))), _slip)
-# Root mean square distance of the cage's centre from its mean place in a replicate [m].
-ORBIT_RADIUS = Figure(_about_its_place, lambda sums: np.sqrt(sums[..., 1] / np.maximum(sums[..., 0], 1.0)))
 
 
 def mean_gap(runs: Sequence[Replicate]) -> float:
@@ -240,36 +69,33 @@ def work_done(runs: Sequence[Replicate]) -> dict[str, float]:
 Runs = Sequence[Replicate]
 
 
-def quantity(figure: Figure, runs: Runs, companions: Runs, share: float, slow: float, unit: float = 1.0) -> Quantity:
+def quantity(
+    statistic: Statistic,
+    runs: Runs,
+    companions: Runs,
+    share: float,
+    slow: float,
+    unit: float = 1.0,
+    balanced: bool = False,
+) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
     Statistical: batch means over all replicates (``batch_means``) and, as root sum of squares, the half-width ``slow`` of slow
-    changes (``error_bars``). Numerical: the ``share`` of the difference from companions, and for the power loss also the gap
+    changes (``error_bars``). Numerical: the ``share`` of the difference from companions, and of a ``balanced`` figure also the gap
     of the power balance. None where it was not estimated.
     """
-    ours = estimate([figure.moments(run) for run in runs], figure.of_sums)
+    ours = estimate([statistic.moments(run) for run in runs], statistic.of_sums)
     statistical = None if ours.half_width is None else math.hypot(ours.half_width, slow)
     numerical = None
     if companions:
-        sums = np.sum([figure.moments(run).sum(axis=0) for run in companions], axis=0)
+        sums = np.sum([statistic.moments(run).sum(axis=0) for run in companions], axis=0)
         times_fewer = sum(run.duration for run in runs) / sum(run.duration for run in companions)
-        numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, share)
-    if figure is POWER_LOSS:
+        numerical = companion_error(ours, float(statistic.of_sums(sums)), times_fewer, share)
+    if balanced:
         missing = abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
         numerical = math.hypot(missing, numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
     return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples, ours.freedom)
-
-
-def orbit_radius_share(scene: Scene, runs: Runs, companions: Runs, share: float) -> Quantity | None:
-    """Radius of the cage's orbit over its radial play, with its errors; None for a cage without a play.
-
-    ``share`` of the difference from the companions is the bias of the runs.
-    """
-    play = scene.cage_play_m
-    if play is None:
-        return None
-    return quantity(ORBIT_RADIUS, runs, companions, share, 0.0, 1.0 / play)
 
 
 def whirl_notes(scene: Scene, share: Quantity | None) -> Notes:

@@ -100,11 +100,13 @@ class Replicate:
 class Statistic(NamedTuple):
     """A figure as a function of sums over batches (or impact windows), so that any set of batches has one value.
 
-    ``moments``: (batches, sums) of the counted part of a replicate; ``of_sums``: from sums on the last axis.
+    ``moments``: (batches, sums) of the counted part of a replicate; ``of_sums``: from sums on the last axis. ``trend``: the statistic
+    that shows in its place whether a run has settled.
     """
 
     moments: Callable[[Replicate], Array]
     of_sums: Callable[[Array], Array]
+    trend: "Statistic | None" = None
 
     def of(self, run: Replicate) -> float:
         """The figure of one replicate."""
@@ -117,13 +119,12 @@ def mean(sums: Array) -> Array:
 
 
 def windowed(force: int) -> Statistic:
-    """Mean over the impact windows of the largest load, by its place in the load vector."""
-    return Statistic(lambda run: np.column_stack((np.ones(len(windows := run.windows(force))), windows)), mean)
+    """Mean over the impact windows of the largest load, by its place in the load vector.
 
-
-def largest(force: int) -> Statistic:
-    """Mean of the largest load of each batch, since a run may have only one or two impact windows."""
-    return timed(lambda run: run.durations * run.largest[:, force])
+    Its trend is that of the largest load of each batch, since a run may have only one or two windows.
+    """
+    trend = timed(lambda run: run.durations * run.largest[:, force])
+    return Statistic(lambda run: np.column_stack((np.ones(len(windows := run.windows(force))), windows)), mean, trend)
 
 
 def timed(values: Callable[[Replicate], Array], of_sums: Callable[[Array], Array] = mean) -> Statistic:
