@@ -19,9 +19,7 @@ from rbdyn.base.faults import MethodError
 
 Kind = Literal["min", "max", "target", "none"]
 # Values of goals that a response does not have.
-BLANK: dict[str, Any] = {
-    "target": np.nan, "lower": -np.inf, "upper": np.inf, "weight": 1.0, "desired": (np.nan, np.nan)
-}  # fmt: skip
+BLANK = {"target": np.nan, "lower": -np.inf, "upper": np.inf, "weight": 1.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +27,6 @@ class Goals:
     """Goals of m responses.
 
     ``kinds`` (m,); ``target`` (m,), NaN without one; ``lower`` and ``upper`` limits (m,), infinite without one; ``weight`` (m,).
-    ``desired`` (m, 2): responses of desirability 0 and 1, NaN for the nadir and the ideal of the front.
     """
 
     kinds: tuple[Kind, ...]
@@ -37,7 +34,6 @@ class Goals:
     lower: Array
     upper: Array
     weight: Array
-    desired: Array
 
     @classmethod
     def of(cls, kinds: Sequence[Kind], **wishes: Sequence[Any]) -> Self:
@@ -130,18 +126,10 @@ def knee_depth(values: Array) -> Array:
 def desirability(costs: Array, goals: Goals) -> Array:
     """Overall desirability (n,) of front points with costs (n, q), from 0 to 1.
 
-    The desirability of a response falls linearly from 1 at the better end of its ``desired`` range to 0 at the worse end.
-    For a target it falls from 1 at the target to 0 at the distance of the nearer end. Without ``desired`` the ends are the
-    ideal and the nadir of the front. The whole is the geometric mean by the weights. Source: Derringer and Suich (1980).
+    The desirability of a response falls linearly from 1 at the ideal of the front to 0 at its nadir. The whole is the
+    geometric mean by the weights. Source: Derringer and Suich (1980).
     """
-    best, worst = costs.min(axis=0), costs.max(axis=0)
-    for column, index in enumerate(goals.objectives):
-        low, high = goals.desired[index]
-        if np.isfinite(low):
-            ends = {"min": (low, high), "max": (-high, -low)}
-            reach = min(high - goals.target[index], goals.target[index] - low)
-            best[column], worst[column] = ends.get(goals.kinds[index], (0.0, reach))
-    scores = (1.0 - normalised(costs, best, worst)).clip(0.0, 1.0)
+    scores = 1.0 - normalised(costs, costs.min(axis=0), costs.max(axis=0))
     return np.prod(scores**goals.cost_weight, axis=1)
 
 

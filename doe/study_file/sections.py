@@ -113,7 +113,7 @@ class Design(Consistent):
 
 
 # Keys by which a response wishes for something beyond its limits.
-WISHES = {"goal", "target", "weight", "desired"}
+WISHES = {"goal", "target", "weight"}
 
 
 class Goal(Consistent):
@@ -121,7 +121,7 @@ class Goal(Consistent):
 
     goal: Literal["min", "max", "target", "none"] = "min"
     """Goal: a small value, a large one, one near target, or "none" (the response is observed, or has limits only). A response
-    that states a limit and no wish (goal, target, weight or desired) has none."""
+    that states a limit and no wish (goal, target or weight) has none."""
     target: Figure | None = None
     """Desired value, for goal = "target"."""
     lower: Figure | None = None
@@ -130,8 +130,6 @@ class Goal(Consistent):
     """Limit that the response must not exceed."""
     weight: Positive = 1.0
     """Weight in the desirability and weights picks."""
-    desired: Annotated[list[Figure], Field(min_length=2, max_length=2)] | None = None
-    """Ends of the desirability: 0 at one, 1 at the other (for a target 0 at both)."""
 
     @model_validator(mode="before")
     @classmethod
@@ -147,14 +145,6 @@ class Goal(Consistent):
             yield f'target = {self.target}: goal = "{self.goal}" has none; write goal = "target"'
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             yield f"lower = {self.lower}: must be below upper = {self.upper}"
-        if self.desired is not None:
-            low, high = self.desired
-            if self.goal == "none":
-                yield f'desired = {self.desired}: goal = "none" desires nothing; leave it out'
-            elif low >= high:
-                yield f"desired = {self.desired}: must rise; write the lower end first"
-            elif self.target is not None and not low < self.target < high:
-                yield f"desired = {self.desired}: must have target = {self.target} between its ends"
 
 
 class Front(Strict):

@@ -64,7 +64,6 @@ class Response(Record):
     lower: float | None
     upper: float | None
     weight: float
-    desired: list[float] | None
     model: str
     transform: str | float
     name: str

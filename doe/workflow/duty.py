@@ -183,10 +183,8 @@ def study_at(study: Problem, name: str) -> Problem:
         if isinstance(response, PointResponse):
             continue
         changes: dict[str, Any] = {"aggregate": "mean", "points": None, **limits.get(response.name, {})}
-        if response.aggregate == "worst_relative":
-            changes["desired"] = None
-            if response.goal == "target":
-                changes |= {"goal": "none", "target": None}
+        if response.aggregate == "worst_relative" and response.goal == "target":
+            changes |= {"goal": "none", "target": None}
         responses.append(response.model_copy(update=changes))
     front = study.file.front.model_copy(update={"tolerance_aware": "none"})
     return replace(study, file=study.file.model_copy(update={"response": responses, "duty": [], "front": front}))

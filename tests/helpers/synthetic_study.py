@@ -117,7 +117,7 @@ def summary() -> dict[str, Any]:
                 for k, name in enumerate(FACTORS)
             ],
             "responses": [
-                {"goal": "min", "target": None, "lower": None, "upper": None, "weight": 1.0, "desired": None, "model": "quadratic",
+                {"goal": "min", "target": None, "lower": None, "upper": None, "weight": 1.0, "model": "quadratic",
                  "transform": "none", "name": name} for name in RESPONSES
             ],
             "replicates": 8,

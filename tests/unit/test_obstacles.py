@@ -211,11 +211,11 @@ def test_unit_a_limit_is_relaxed_to_what_the_value_keeps(value, error, sense, ke
     ("keys", "goal"),
     [
         ("upper = 90.0", "none"), ("lower = 10.0\nupper = 90.0", "none"), ("", "min"),
-        ('upper = 90.0\ngoal = "min"', "min"), ("upper = 90.0\nweight = 2.0", "min"), ("upper = 90.0\ndesired = [10.0, 80.0]", "min"),
+        ('upper = 90.0\ngoal = "min"', "min"), ("upper = 90.0\nweight = 2.0", "min"),
     ],
 )  # fmt: skip
 def test_unit_a_response_with_a_limit_alone_has_no_goal(tmp_path, keys, goal):
-    """Unit: only a goal, a weight or a desired range makes it one."""
+    """Unit: only a goal or a weight makes it one."""
     path = short_study(tmp_path)
     text = path.read_text("utf-8")
     assert IMPACT in text

@@ -81,12 +81,10 @@ def test_weights_pull_the_tchebycheff_pick():
 def test_desirability_is_the_geometric_mean_of_the_ramps():
     goals = Goals.of(["min", "min"])
     assert desirability(LINE, goals) == pytest.approx(np.sqrt((1 - LINE[:, 0]) * (1 - LINE[:, 1])))
-    ramp = Goals.of(["min", "max"], desired=[[0.2, 0.6], [0.0, 2.0]], weight=[3.0, 1.0])
-    # Responses 0.4 (half way down its ramp) and 1.5 (three quarters up): (0.5^3 * 0.75)^(1/4).
-    costs = np.array([[0.4, -1.5], [0.7, -2.0], [0.1, -2.5]])
-    assert desirability(costs, ramp) == pytest.approx([(0.5**3 * 0.75) ** 0.25, 0.0, 1.0])
-    near = Goals.of(["target", "min"], target=[1.0, None], desired=[[0.0, 2.0], None])
-    assert desirability(np.array([[0.5, 0.0], [0.2, 1.0]]), near) == pytest.approx([0.5**0.5, 0.0])
+    weighed = Goals.of(["min", "max"], weight=[3.0, 1.0])
+    # Half way between ideal and nadir of the first, three quarters up the second: (0.5^3 * 0.75)^(1/4).
+    costs = np.array([[0.4, -1.5], [0.6, 0.0], [0.2, -2.0]])
+    assert desirability(costs, weighed) == pytest.approx([(0.5**3 * 0.75) ** 0.25, 0.0, 1.0])
 
 
 def test_every_rule_picks_among_those_that_dominate_the_baseline():
