@@ -25,13 +25,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pandas as pd
 import typer
+from benchmarks.plain_newton import plain_newton
 from numpy.typing import NDArray
 from published import double_decker_search
 from published.double_decker_search import SearchEnd
 
 from rbdyn.accuracy.ball_solvers import Problem, problem_of, timed
 from rbdyn.base.command import print_table
-from rbdyn.quasistatic import finite_search, full_system
+from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.double_decker import DoubleDeckerSolution, double_decker_of, solve_double_decker
 from rbdyn.quasistatic.finite_search import Damping, Search, offset_distances, search_points
 from rbdyn.quasistatic.row import equilibrium
@@ -300,7 +301,7 @@ def figure_7() -> dict[str, Any]:
     for condition in FIGURE_7:
         unsigned, signed = problem_of(scene(condition)), problem_of(scene(condition, True))
         curves["search"][condition.speed] = angles(finite_search.solve, unsigned)
-        curves["newton"][condition.speed] = angles(full_system.plain_newton, unsigned)
+        curves["newton"][condition.speed] = angles(plain_newton, unsigned)
         curves["signed"][condition.speed] = angles(equilibrium.solve, signed)
     gaps = {
         name: [float(np.abs(curve - curves["search"][speed]).max()) for speed, curve in curves[name].items()]

@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 
 import minpack
 import numpy as np
+from ball_solvers import WHOLE, Success, causes, fared, success_table
 from studies import main
 
-from rbdyn.accuracy.ball_solvers import WHOLE, Problem, Solver, Success, causes, fared, success_table
+from rbdyn.accuracy.ball_solvers import Problem, Solver
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.blocks import Table
 from rbdyn.properties.materials import MATERIALS, Material

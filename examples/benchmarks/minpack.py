@@ -8,9 +8,10 @@ import functools
 import math
 
 import numpy as np
+from plain_newton import unloaded
 
 from rbdyn.base.arrays import Array
-from rbdyn.quasistatic.full_system import Stop, System, evaluate, rival, unloaded
+from rbdyn.quasistatic.full_system import Stop, System, evaluate, rival
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.row.newton import ACCEPTED

@@ -4,7 +4,7 @@
 
 - ``tolerances``: bias of the statistics at each tolerance, and error of the motion
 - ``methods``: ours and other integrators at equal error, all on one compiled right-hand side (``fixed_step``); for a ball
-  bearing its solvers (``ball_solvers``)
+  bearing its solver (``ball_solvers``)
 - ``coverage``: how often stated intervals contain the truth
 - ``options`` and ``stability`` (``variants``): cost of each option, and how extreme variants of a scene end
 

@@ -1,14 +1,12 @@
-"""Solvers of the equilibrium of one scene: residual against time, and how often each succeeds nearby.
+"""Solver of the equilibrium of one scene: residual against time.
 
-Every solver starts cold and stops after more and more iterations. Its residual is the largest of the full equations, over
-the largest force of the scene. Times are the shortest of several runs of the whole call from Python, after a first that
-compiles. Then load and speed of the scene vary at random, with a seed.
+It starts cold and stops after more and more iterations. Its residual is the largest of the full equations, over the largest
+force of the scene. Times are the shortest of several runs of the whole call from Python, after a first that compiles.
+``examples/benchmarks/ball_solvers.py`` compares it with others.
 """
 
-import math
 import time
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,8 +17,9 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Table
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
-from rbdyn.base.table import Column, Sheet, columns_of
-from rbdyn.quasistatic import finite_search, full_system
+from rbdyn.base.table import Sheet, columns_of
+from rbdyn.base.words import counted
+from rbdyn.quasistatic import full_system
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution
@@ -32,19 +31,10 @@ from rbdyn.scene.ball import BallScene, SingleRowScene
 ROUNDING = 1e-18
 LIMITS = (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 64, 128, 256, 512)
 REPEATS = 5
-PERTURBATIONS = 200
-SEED = 1
-# Decades each way of each component of the load, and of the speed.
-LOAD_DECADES, SPEED_DECADES = 1.0, 0.5
 
 Solver = Callable[..., Solution]
-# Ours first. The limit counts Newton steps, or iterations of all searches.
-LIMITED: dict[str, Solver] = {
-    "convex": full_system.convex_with_limit,
-    "plain Newton": full_system.plain_newton,
-    "finite search": finite_search.solve,
-}
-WHOLE: dict[str, Solver] = {**LIMITED, "convex": equilibrium.solve}
+# The shipped solver; the limit counts Newton steps.
+SHIPPED: dict[str, Solver] = {"convex": full_system.convex_with_limit}
 
 
 class Problem(NamedTuple):
@@ -66,65 +56,29 @@ class Attempt(Record):
     status: str
 
 
-class Success(Record):
-    """How a solver fares over many problems: share solved; median, 99 % and longest time [us]; median steps; causes."""
-
-    solver: str
-    problems: int = shown("scenes")
-    solved: float = shown("solved", ".2f %")
-    median_us: float = shown("median [us]", ".0f")
-    slow_us: float = shown("99 % [us]", ".0f")
-    longest_us: float = shown("longest [us]", ".0f")
-    median_steps: float = shown("steps", ".0f")
-    causes: dict[str, int]
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the share solved."""
-        return share(round(self.solved * self.problems), self.problems)
-
-    @property
-    def shown_share(self) -> str:
-        """The share solved with its interval, in words."""
-        low, high = self.interval
-        return f"{100.0 * self.solved:.2f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
-
-
-def share(count: int, total: int) -> tuple[float, float]:
-    """95 % interval of a share by ``count`` of ``total`` cases (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
-    z, observed = 1.96, count / total
-    spread = math.sqrt(observed * (1.0 - observed) / total + (0.5 * z / total) ** 2)
-    middle, scale = observed + 0.5 * z * z / total, 1.0 + z * z / total
-    return max((middle - z * spread) / scale, 0.0), min((middle + z * spread) / scale, 1.0)
-
-
-def study(
-    scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS, perturbations: int = PERTURBATIONS
-) -> Report:
+def study(scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS) -> Report:
     """``rbdyn accuracy SCENE methods`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
-        raise InputError([f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"])
-    counted = Progress(progress, len(LIMITED) * (len(limits) + perturbations))
-    attempts = work_precision(problem_of(scene), limits, counted)
-    nearby = perturbed(scene, perturbations)
-    rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]
-    sentence, written = conclusion(attempts, rows), records(attempts)
-    draws = {"count": perturbations, "seed": SEED, "load_decades": LOAD_DECADES, "speed_decades": SPEED_DECADES}
+        raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no study of its solver; take one of its rows"])
+    attempts = work_precision(problem_of(scene), limits, Progress(progress, len(limits)))
+    written = records(attempts)
+    last = _until_solved(attempts)[-1]
+    sentence = f"An equilibrium of this scene takes {last.solve_us:.0f} us in at most {counted(last.limit, 'step')}."
     return reported(
         "solvers",
-        (
-            Sheet("residual against time", columns_of(Attempt), _until_solved(attempts)).block,
-            success_table(f"{perturbations} seeded scenes nearby", rows),
-        ),
-        (*causes(rows), sentence),
+        (attempts_table(attempts),),
+        (sentence,),
         written,
-        lambda path: _draw(attempts, path),
+        lambda path: draw(attempts, path),
         "rbdyn.accuracy.solvers/1",
         rows=written,
-        nearby=records(rows),
-        perturbations=draws,
         conclusion=sentence,
     )
+
+
+def attempts_table(attempts: Sequence[Attempt]) -> Table:
+    """Table of the attempts of each solver up to the first that converges."""
+    return Sheet("residual against time", columns_of(Attempt), _until_solved(attempts)).block
 
 
 def problem_of(scene: SingleRowScene) -> Problem:
@@ -133,18 +87,20 @@ def problem_of(scene: SingleRowScene) -> Problem:
     return Problem(row, control, load_of(scene), constraint_of(scene))
 
 
-def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -> list[Attempt]:
+def work_precision(
+    problem: Problem, limits: Sequence[int], progress: Progress, solvers: Mapping[str, Solver] = SHIPPED
+) -> list[Attempt]:
     """Each solver stopped after each of ``limits`` iterations. Raises RunError where there is no equilibrium."""
     reference = equilibrium.solve(*problem)
     if not reference.is_equilibrium:
         raise RunError(f"there is nothing to compare: {reference.status}")
     scale = max(float(reference.inner_load.max()), float(reference.outer_load.max()), float(np.abs(problem.load).max()))
     attempts = []
-    for name, solver in LIMITED.items():
+    for name, solver in solvers.items():
         for limit in limits:
             solution, took = timed(solver, problem, REPEATS, limit=limit)
             attempts.append(Attempt(name, limit, solution.residual / scale, took, solution.status))
-            counted.step()
+            progress.step()
     return attempts
 
 
@@ -159,83 +115,6 @@ def timed(solver: Solver, problem: Problem, repeats: int, **options: Any) -> tup
     return solution, 1e6 * shortest
 
 
-def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Problem]:
-    """Problems of the scene with other loads and speeds: each component, and both speeds together, times 10^u."""
-    draw = np.random.default_rng(seed)
-    problems = []
-    for _ in range(count):
-        load = [part * 10.0 ** draw.uniform(-LOAD_DECADES, LOAD_DECADES) for part in scene.operation.load]
-        moment = [part * 10.0 ** draw.uniform(-LOAD_DECADES, LOAD_DECADES) for part in scene.operation.moment]
-        faster = 10.0 ** draw.uniform(-SPEED_DECADES, SPEED_DECADES)
-        operation = scene.operation.model_copy(
-            update={
-                "radial_load_N": None,
-                "axial_load_N": None,
-                "load_N": load,
-                "moment_Nm": moment,
-                "preload_N": 0.0,
-                "inner_speed_rpm": scene.operation.inner_speed_rpm * faster,
-                "outer_speed_rpm": scene.operation.outer_speed_rpm * faster,
-            }
-        )
-        problems.append(problem_of(scene.model_copy(update={"operation": operation})))
-    return problems
-
-
-def fared(name: str, solutions: Sequence[Solution], took_us: Sequence[float]) -> Success:
-    """Summary of many solutions and their times [us]."""
-    why = Counter(solution.status for solution in solutions if not solution.is_equilibrium)
-    return Success(
-        name,
-        len(solutions),
-        sum(solution.is_equilibrium for solution in solutions) / len(solutions),
-        float(np.median(took_us)),
-        float(np.percentile(took_us, 99.0)),
-        float(np.max(took_us)),
-        float(np.median([solution.steps for solution in solutions])),
-        dict(why.most_common()),
-    )
-
-
-def success_table(title: str, rows: Sequence[Success], first: str = "solver") -> Table:
-    """Table of how solvers fare."""
-    return Sheet(title, (Column("solver", words=first, files=False), *columns_of(Success)), rows).block
-
-
-def causes(rows: Sequence[Success]) -> list[str]:
-    """A sentence for each solver that failed somewhere."""
-    reasons = {row.solver: "; ".join(f"{count} x {why}" for why, count in row.causes.items()) for row in rows}
-    return [f"{solver} failed: {whys}" for solver, whys in reasons.items() if whys]
-
-
-def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
-    """Which solver to take: the fastest of those whose share solved does not differ from the best."""
-    reached: dict[str, float] = {}
-    for attempt in attempts:
-        if attempt.status == "ok":
-            reached[attempt.solver] = min(attempt.solve_us, reached.get(attempt.solver, float("inf")))
-    most_reliable = max(rows, key=lambda row: row.solved)
-    alike = [row for row in rows if row.interval[1] >= most_reliable.interval[0]]
-    best = min(alike, key=lambda row: row.median_us)
-    rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
-    times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
-    sentences = (
-        f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {best.shown_share} of "
-        f"{best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
-    )
-    return f"{sentences}; so many scenes do not separate its reliability from {rivals}." if rivals else f"{sentences}."
-
-
-def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:
-    solutions, times = [], []
-    for problem in problems:
-        solution, took = timed(solver, problem, 1)
-        solutions.append(solution)
-        times.append(took)
-        counted.step()
-    return fared(name, solutions, times)
-
-
 def _until_solved(attempts: Sequence[Attempt]) -> list[Attempt]:
     """Attempts of each solver up to the first that converges."""
     needed: list[Attempt] = []
@@ -248,7 +127,7 @@ def _until_solved(attempts: Sequence[Attempt]) -> list[Attempt]:
     return needed
 
 
-def _draw(attempts: Sequence[Attempt], path: Path) -> None:
+def draw(attempts: Sequence[Attempt], path: Path) -> None:
     """Residual of each solver stopped after more and more iterations, against its time."""
     from matplotlib.ticker import LogLocator
 

@@ -155,7 +155,7 @@ def accuracy(
         str | None,
         typer.Argument(
             metavar="[tolerances|methods|coverage|options|stability]",
-            help="Error by tolerance; other integrators, or solvers of a ball bearing; how often the stated intervals hold "
+            help="Error by tolerance; other integrators, or the solver of a ball bearing; how often the stated intervals hold "
             "the truth; what each option costs; how extreme variants of the scene end.",
             show_default="tolerances; methods of a ball bearing",
         ),
@@ -167,7 +167,7 @@ def accuracy(
     quiet: command.Quiet = False,
     verbose: Annotated[bool, command.verbose_flag("Also versions.")] = False,
 ) -> None:
-    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
+    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, its solver."""
     with command.guarded(as_json), output_folder(out, "rbdyn accuracy", ACCURACY_FILES, force=force) as folder:
         from rbdyn import accuracy as studies
         from rbdyn.scene import Scene

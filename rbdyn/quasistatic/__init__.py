@@ -2,7 +2,7 @@
 
 - ``bearing``: ``equilibrium`` of a scene, with its solvers by name; ``result``: reports with life, remarks, columns
 - ``row``: one row of balls, its forces and its convex solver; ``double_decker``: two rows with a floating ring between
-- ``full_system``: all equations at once and plain Newton on them; ``finite_search``: the search of Hu et al. 2021
+- ``full_system``: all equations at once; ``finite_search``: the search of Hu et al. 2021
 - ``sweep``: equilibria over keys of a scene; ``preload``: preload for least stress and for longest life
 - ``runout``: form errors, the path of the turning ring, its measures, tolerance classes
 - ``temperatures``: a single row at the temperatures that its friction keeps up; ``heat``: its heat and how that leaves

@@ -19,7 +19,7 @@ from rbdyn.base.words import counted
 from rbdyn.life.balls import FASTEST
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.mounting.fits import growth_record, row_change
-from rbdyn.quasistatic import finite_search, full_system
+from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_record, solve_double_decker
 from rbdyn.quasistatic.result import (
     BallResult,
@@ -47,11 +47,7 @@ from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.notes import clearance_notes, speed_notes
 
 # Solvers by the names in a scene: ``solver(row, control, load, constraint, start) -> Solution``.
-SOLVERS: dict[str, Callable[..., Solution]] = {
-    "convex": solve,
-    "finite_search": finite_search.solve,
-    "newton": full_system.plain_newton,
-}
+SOLVERS: dict[str, Callable[..., Solution]] = {"convex": solve, "finite_search": finite_search.solve}
 # Raceway controls that may have several equilibria.
 SEVERAL_ROOTS = ("inner", "half")
 # Shares of the inner race, and factors on the speeds, whose equilibria are the starts of the search.

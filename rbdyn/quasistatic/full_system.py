@@ -1,17 +1,14 @@
-"""The full system of equations of one row, dense, and two solvers on it for comparison with the convex one.
+"""The full system of equations of one row, dense, for solvers that are compared with the convex one.
 
 The equations are two a ball and one for every free component of the ring. The unknowns [m] are (axial, radial) of every
 ball, then the free components of the ring's displacement (x, y, z, R theta_x, R theta_y). The residuals [N] are the
 unbalanced forces of the balls, then the load less that of the ring. A general solver sees the equations in this form.
 
-- ``plain_newton``: the undamped Newton method of textbooks, from the unloaded geometry. It converges only from a start
-  near the solution; Harris (Rolling Bearing Analysis) and Jones (1960) leave the first guess to experience.
 - ``convex_with_limit``: the convex solver stopped after a number of Newton steps, to show the fall of its residual
 - ``rival``: gives such a solver the call of ``equilibrium.solve``
 """
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -23,21 +20,18 @@ from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import Control, ball_forces, deflection, has_race_control
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution, fill_figures, solution_of
 from rbdyn.quasistatic.row.newton import (
-    ACCEPTED,
     CONVEX_MARCH,
     STEPS,
     Task,
     boundary_conditions,
     descend,
-    eliminate,
     go_to,
     march,
     rough_residual,
-    settle_all,
     space,
     start_afresh,
 )
-from rbdyn.quasistatic.row.ring import LOADED, RING, Row, assemble, component_lengths, groove_centre
+from rbdyn.quasistatic.row.ring import LOADED, RING, Row, assemble, groove_centre
 
 
 class System(NamedTuple):
@@ -190,83 +184,6 @@ def solution_at(control: Control, system: System, stop: Stop) -> Solution:
     # Without a further solve, the choice of free components does not matter.
     _finish(Task(control, row, system.load, np.ones_like(system.load)), state, figures)
     return solution_of(row, state, figures, stop.status, stop.residual, stop.searches)
-
-
-MOST_STEPS = 100
-# Unloaded contacts have no stiffness, so the start pushes the ring along its load by this share of the distance of the
-# groove centres.
-SEAT = 1e-3
-CONVERGED, SINGULAR, NOT_FINITE, EXHAUSTED = range(4)
-SENTENCES = {
-    SINGULAR: "plain Newton stopped: its matrix became singular, because no contact supports a ball or the ring",
-    NOT_FINITE: "plain Newton diverged: its steps grew until the forces were not finite",
-    EXHAUSTED: "plain Newton did not converge in {limit} steps",
-}
-
-
-@entry
-def iterate(control: Any, system: Any, limit: int, u: Any) -> tuple[int, int, float]:
-    """Newton's method from ``u``, which ends at the point of the least residual.
-
-    Returns the outcome, the steps and the largest residual [N] there.
-    """
-    size = u.size
-    residual, jacobian, best = np.zeros(size), np.zeros((size, size)), u.copy()
-    worst, largest = forces(control, system, u, residual, jacobian)
-    least = worst
-    for step in range(limit):
-        if worst <= ACCEPTED * largest:
-            return CONVERGED, step, worst
-        if not eliminate(jacobian, residual, size, 0.0):
-            move(best, u)
-            return SINGULAR, step, least
-        for i in range(size):
-            u[i] -= residual[i]
-        worst, largest = forces(control, system, u, residual, jacobian)
-        if not math.isfinite(worst) or not math.isfinite(largest):
-            move(best, u)
-            return NOT_FINITE, step + 1, least
-        if worst < least:
-            least = worst
-            move(u, best)
-    outcome = CONVERGED if worst <= ACCEPTED * largest else EXHAUSTED
-    if outcome == EXHAUSTED:
-        move(best, u)
-        worst = least
-    return outcome, limit, worst
-
-
-def unloaded(system: System) -> Array:
-    """Unknowns of the unloaded geometry: the ring pushed by the share ``SEAT`` along its load, every ball at rest there.
-
-    The balls orbit with the cage.
-    """
-    row, state = system.row, space(system.row.cosine.size)
-    state.q[:] = system.displacement
-    pull = system.load[system.free]
-    length = float(np.linalg.norm(pull))
-    if length > 0.0:
-        state.q[system.free] += SEAT * float(row.inner_reach[0] + row.outer_reach[0]) * pull / length
-    _rest_balls(row, state)
-    return unknowns(system, state.q, state.balls)
-
-
-@entry
-def _rest_balls(row: Any, state: Any) -> None:
-    """``settle_all``, called from Python."""
-    settle_all(row, state)
-
-
-@rival
-def plain_newton(control: Control, system: System, start: Solution | None, limit: int = MOST_STEPS) -> Stop:
-    """Plain Newton in at most ``limit`` steps, from a ``start`` or the unloaded geometry."""
-    if start is None:
-        u = unloaded(system)
-    else:
-        u = unknowns(system, start.displacement * component_lengths(system.row.lever), start.balls)
-    outcome, steps, residual = iterate(control, system, limit, u)
-    status = OK if outcome == CONVERGED else SENTENCES[outcome].format(limit=limit)
-    return Stop(u, status, steps, residual)
 
 
 @entry

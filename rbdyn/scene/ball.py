@@ -390,9 +390,9 @@ class BallModel(Strict):
     """Whether rings grow by rotation."""
     ring_expansion_form: Literal["thick_ring", "paper"] = "thick_ring"
     """Formula of the growth: that of a thick ring, or that of Hu et al. (double-decker papers) for comparison."""
-    solver: Literal["convex", "finite_search", "newton"] = "convex"
-    """convex: guarded Newton method, which converges from any start; finite_search: the search of Hu et al. 2021; newton: plain
-    Newton method from the loaded ring. The last two are for comparison."""
+    solver: Literal["convex", "finite_search"] = "convex"
+    """convex: guarded Newton method, which converges from any start; finite_search: the search of Hu et al. 2021,
+    for comparison."""
 
 
 class BallMaterials(Strict):

@@ -202,7 +202,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "place", ["doe.workflow.front.front", "doe.workflow.surfaces.fit", "doe.workflow.runs._design"]
+    "place", ["doe.workflow.front.front", "doe.workflow.surfaces.fit", "doe.workflow.design._design"]
 )
 def test_invariant_a_slip_of_the_code_is_not_called_bad_input(tmp_path, monkeypatch, place):
     """Invariant: an error of a library below a command is raised on as what it is, with no file or key named in it."""

@@ -35,7 +35,6 @@ EDGES = {
     "rbdyn/scene/": "where they leave as SI",
     "rbdyn/cli/": "speaks to people",
     "rbdyn/plots/": "speaks to people",
-    "rbdyn/accuracy/ball_solvers.py": "makes scenes of a scene",
     "rbdyn/accuracy/coverage.py": "makes a scene of a scene",
     "rbdyn/accuracy/variants.py": "makes scenes of a scene",
     "rbdyn/quasistatic/result.py": "is the saved record",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+import ball_solvers
 import method_bias
 import numpy as np
 import pytest
 import replication
 import slicing
 
-from rbdyn.accuracy import ball_solvers, tolerances
+from rbdyn.accuracy import tolerances
 from rbdyn.accuracy.tolerances import (
     OUTPUTS,
     Bias,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import ball_battery
+import ball_solvers
 import minpack
 import numpy as np
 import pytest
@@ -12,9 +13,9 @@ from ball_battery import CONTROLS, LOADS, cases, posed
 from conftest import ROOT
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_newton import plain_newton
 
-from rbdyn import Scene
-from rbdyn.accuracy import ball_solvers
+from rbdyn import Scene, accuracy
 from rbdyn.accuracy.ball_solvers import problem_of
 from rbdyn.accuracy.report import Progress
 from rbdyn.base.faults import InputError
@@ -119,7 +120,7 @@ def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
 @pytest.mark.parametrize(
     "solver",
     [
-        full_system.plain_newton,
+        plain_newton,
         finite_search.solve,
         minpack.SOLVERS["MINPACK hybrid"],
         minpack.SOLVERS["MINPACK LM"],
@@ -182,7 +183,7 @@ def test_limit_rule_a_refuses_unloaded_balls_only_as_printed():
     assert lawful.displacement == pytest.approx(equilibrium.solve(*problem).displacement, rel=1e-6, abs=1e-13)
 
 
-@pytest.mark.parametrize("solver", ["newton", "finite_search", "convex"])
+@pytest.mark.parametrize("solver", ["finite_search", "convex"])
 def test_unit_the_scene_chooses_the_solver(solver):
     found = solve_scene(Scene.load(BALLS, [f"model.solver={solver}"])).as_dict()
     assert found["status"] == "ok" and found["solver"] == solver
@@ -192,12 +193,11 @@ def test_unit_the_scene_chooses_the_solver(solver):
 
 def test_extreme_a_rival_that_fails_says_why():
     """Standing balls under a radial load: those that nothing holds make Newton's matrix singular."""
-    found = solve_scene(Scene.load(BALLS, ["model.solver=newton", "operation.inner_speed_rpm=0"]))
+    found = plain_newton(*problem_of(Scene.load(BALLS, ["operation.inner_speed_rpm=0"])))
     assert not found.is_equilibrium and "singular" in found.status
-    json.dumps(found.as_dict(), allow_nan=False)
     problem = problem_of(Scene.load(BALLS))
     for solver, told in (
-        (full_system.plain_newton, "2 steps"),
+        (plain_newton, "2 steps"),
         (finite_search.solve, "searches"),
         (minpack.SOLVERS["MINPACK hybrid"], "MINPACK"),
     ):
@@ -237,6 +237,9 @@ def test_unit_solver_study_of_a_scene(tmp_path):
     from rbdyn.accuracy import write
 
     told = []
+    ours = accuracy.study("methods", Scene.load(BALLS))
+    assert {row["solver"] for row in ours.record["rows"]} == {"convex"}
+    assert ours.sentences[-1].startswith("An equilibrium of this scene takes ")
     found = ball_solvers.study(Scene.load(BALLS), lambda done, total: told.append((done, total)), (2, 30), 3)
     rows = {(row["solver"], row["limit"]): row for row in found.record["rows"]}
     assert rows["convex", 30]["status"] == rows["finite search", 30]["status"] == "ok"
@@ -291,8 +294,6 @@ def test_unit_progress_and_failed_references(problem):
 
 def test_command_line_has_the_studies_of_the_kind_of_bearing(command):
     """A ball bearing has the study of its solvers, which is also the usual one; others are refused by name."""
-    from rbdyn import accuracy
-
     scene = BallScene.load(BALLS)
     assert accuracy.study_name(None, scene) == accuracy.study_name("methods", scene) == "methods"
     ended = command("accuracy", BALLS, "coverage")
@@ -303,6 +304,6 @@ def test_command_line_has_the_studies_of_the_kind_of_bearing(command):
 def test_unit_two_rows_are_refused():
     file = ROOT / "examples" / "double_decker.toml"
     with pytest.raises(InputError, match="take one of its rows"):
-        ball_solvers.study(BallScene.load(file))
-    with pytest.raises(InputError, match=r"model\.solver = 'newton': solves a single row"):
-        BallScene.load(file, ["model.solver=newton"])
+        accuracy.study("methods", BallScene.load(file))
+    with pytest.raises(InputError, match=r"model\.solver = 'finite_search': solves a single row"):
+        BallScene.load(file, ["model.solver=finite_search"])
