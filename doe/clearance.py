@@ -25,7 +25,7 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import verdict
 from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figures import FIGURES
-from rbdyn.result import TEMPERATURES, SimulationResult
+from rbdyn.result import SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
@@ -279,25 +279,15 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def quantity_of(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Figure of a response in the JSON form of a result; empty where the run does not report it."""
-    if name in TEMPERATURES and "temperatures_C" in record:
-        return record["temperatures_C"].get(TEMPERATURES[name]) or {}
-    return record.get(name) or (record.get("part_figures") or {}).get(name) or {}
-
-
 def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
     Each has the shape (runs, responses). The value of a response that a run does not report is NaN.
     """
-    records = [result.as_dict() for result in results]
-    quantities = [[quantity_of(record, name) for name in names] for record in records]
-    keys = "value", "statistical_error", "degrees_of_freedom"
-    values, errors, freedom = ([[quantity.get(key) for quantity in row] for row in quantities] for key in keys)
+    table = [[responses.get(name) for name in names] for responses in (result.responses for result in results)]
+    values, errors, _, freedom = arrays_of(table)
     # Student's t of a mean of n independent values has n - 1 degrees of freedom.
-    samples = np.nan_to_num(np.array(freedom, dtype=float) + 1.0).astype(np.int64)
-    return np.array(values, dtype=float), np.array(errors, dtype=float), samples
+    return values, errors, np.where(np.isfinite(freedom), freedom + 1.0, 0.0).astype(np.int64)
 
 
 def histories(scenes: Mapping[str, Scene], turns: float) -> "dict[str, History]":

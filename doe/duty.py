@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,13 @@ from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError, key_path
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import finite
 from rbdyn.dynamics.figures import FIGURES
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
-    from doe.aggregation import Aggregated, Estimates
+    from rbdyn.base.estimate import Estimate
 
 
 # Figures whose mean over time is that of their inverse.
@@ -54,21 +55,18 @@ class Rule(NamedTuple):
             return np.asarray(self.target + np.where(worst < self.target, -badness, badness))
         return -badness if self.goal == "max" else badness
 
-    def over(self, estimates: "Estimates", weights: Array) -> "Aggregated":
-        """The response (n,) of figures (n, p) at points with ``weights`` (p,), which for worst_relative are ratios already."""
-        from doe.aggregation import Estimates, largest, weighted_mean
+    def over(self, figures: "Estimate", weights: Array) -> "tuple[Estimate, Array]":
+        """The response (n,) of figures (n, p) at points with ``weights`` (p,), and the odds (n, p) of each to be the worst.
 
-        if self.aggregate == "mean" and self.harmonic:
-            mean = weighted_mean(
-                Estimates(1.0 / estimates.values, estimates.errors / estimates.values**2, estimates.freedom), weights
-            )
-            return mean._replace(values=1.0 / mean.values, errors=mean.errors / mean.values**2)
+        Those of worst_relative are ratios already; the odds of a mean are the weights.
+        """
         if self.aggregate == "mean":
-            return weighted_mean(estimates, weights)
-        badness = self.badness(estimates.values)
-        worst = largest(Estimates(badness, *estimates[1:]))
-        places = badness.argmax(axis=1)
-        return worst._replace(values=self.value(worst.values, estimates.values[np.arange(len(places)), places]))
+            mean = figures.inverse.mean(weights).inverse if self.harmonic else figures.mean(weights)
+            return mean, np.broadcast_to(weights, figures.value.shape)
+        badness = self.badness(figures.value)
+        worst, odds = figures._replace(value=badness).largest()
+        at_worst = figures.value[np.arange(len(badness)), badness.argmax(axis=1)]
+        return worst._replace(value=self.value(worst.value, at_worst)), odds
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,7 @@ class Duty:
         self, rule: Rule, values: Array, variances: Array, freedom: Whole, smooth: Array
     ) -> tuple[Array, ...]:
         """A response (p, n) of its figure at groups of points (p, n, g)."""
-        from doe.aggregation import Estimates
+        from rbdyn.base.estimate import Estimate
 
         if rule.aggregate == "worst_relative":
             ratios = values / values[0]
@@ -159,13 +157,12 @@ class Duty:
         normal = np.full(values.shape, np.inf)
         parts = (variances, freedom.astype(float)) if rule.aggregate == "mean" else (smooth, normal)
         flat = [array.reshape(-1, values.shape[2]) for array in (values, *parts)]
-        figure = rule.over(Estimates(flat[0], np.sqrt(flat[1]), flat[2]), self.weights(self.groups))
+        figure, _ = rule.over(Estimate(flat[0], np.sqrt(flat[1]), flat[2]), self.weights(self.groups))
         degrees = (
             np.minimum(figure.freedom, freedom.sum(axis=2).ravel()) if rule.aggregate == "mean" else freedom.min(axis=2)
         )
         return tuple(
-            np.asarray(array).reshape(values.shape[:2])
-            for array in (figure.values, figure.errors**2, np.floor(degrees))
+            np.asarray(array).reshape(values.shape[:2]) for array in (figure.value, figure.error**2, np.floor(degrees))
         )
 
     def weights(self, groups: Sequence[Sequence[str]]) -> Array:
@@ -251,14 +248,15 @@ class DutyResult:
     baseline: Mapping[str, SimulationResult] = field(default_factory=dict)
     baseline_errors: bool = False
 
-    def as_dict(self) -> dict[str, Any]:
-        """Every response, and every figure at every point, as `SimulationResult.as_dict` has them. Raises RunError."""
-        record = {
-            at_point(point, figure): quantity.as_dict()
+    @property
+    def responses(self) -> dict[str, Quantity]:
+        """Every figure at every point, and every response. Raises RunError."""
+        every = {
+            at_point(point, name): figure
             for point, figures in self.at_points.items()
-            for figure, quantity in figures.items()
+            for name, figure in figures.items()
         }
-        return record | {figure: quantity.as_dict() for figure, (quantity, _) in self._responses.items()}
+        return every | {name: figure for name, (figure, _) in self._responses.items()}
 
     @cached_property
     def at_points(self) -> dict[str, dict[str, Quantity]]:
@@ -396,49 +394,42 @@ def _over_points(rule: Rule, parts: Sequence[Quantity], weights: Array) -> tuple
 
     Numerical errors of a method have one sign at all points, so that they add: by the weights, or by the odds.
     """
-    from doe.aggregation import Estimates, quantile
+    from rbdyn.base.estimate import Estimate, quantile
 
     counted = [place for place, weight in enumerate(weights) if weight > 0.0 or rule.aggregate != "mean"]
     if len(counted) == 1:
         return parts[counted[0]], np.eye(len(parts))[counted[0]]
-    freedom = np.array([part.degrees_of_freedom or np.inf for part in parts])
-    halves = np.array([np.nan if part.statistical_error is None else part.statistical_error for part in parts])
-    rows = (np.array([part.value for part in parts]), halves / quantile(freedom), freedom)
-    figure = rule.over(Estimates(*(row[None] for row in rows)), weights)
-    odds = figure.odds[0]
-    joint = math.floor(figure.freedom[0] + 1e-9) if np.isfinite(figure.freedom[0]) else None
-    half = float(figure.errors[0] * quantile(np.array(joint or np.inf)))
+    values, halves, _, freedom = arrays_of([parts])
+    figure, (odds,) = rule.over(Estimate(values, halves / quantile(freedom), freedom), weights)
     possible = [(share, part) for share, part in zip(odds.tolist(), parts, strict=True) if share > 0.0]
     known = [share * part.numerical_error for share, part in possible if part.numerical_error is not None]
-    quantity = Quantity(
-        float(figure.values[0]),
-        half if math.isfinite(half) else None,
-        math.fsum(known) if len(known) == len(possible) else None,
-        min(part.effective_samples for _, part in possible),
-        joint,
-    )
-    return quantity, odds
+    numerical = math.fsum(known) if len(known) == len(possible) else None
+    samples = min(part.effective_samples for _, part in possible)
+    return _quantity(figure.value.item(), figure, numerical, samples), odds
 
 
 def quotient(value: Quantity, divisor: Quantity, with_errors: bool) -> Quantity:
     """Ratio to a positive quantity, to first order in their independent errors; ``with_errors``: whether those of the divisor count."""
-    from doe.aggregation import quantile
+    from rbdyn.base.estimate import Estimate, quantile
 
-    scale, ratio = divisor.value, value.value / divisor.value
-    numerical = None if value.numerical_error is None else value.numerical_error / scale
+    scale, ratio, samples = divisor.value, value.value / divisor.value, value.effective_samples
     if not with_errors:
-        half = None if value.statistical_error is None else value.statistical_error / scale
-        return Quantity(ratio, half, numerical, value.effective_samples, value.degrees_of_freedom)
-    if numerical is not None:
-        numerical = (
-            None if divisor.numerical_error is None else numerical + abs(ratio) * divisor.numerical_error / scale
-        )
-    if value.statistical_error is None or divisor.statistical_error is None:
-        return Quantity(ratio, None, numerical, value.effective_samples)
-    freedom = np.array([part.degrees_of_freedom or np.inf for part in (value, divisor)])
-    halves = np.array([value.statistical_error, abs(ratio) * divisor.statistical_error])
-    variances = (halves / scale / quantile(freedom)) ** 2
-    spread = float((variances**2 / freedom).sum())
-    joint = max(math.floor(float(variances.sum()) ** 2 / spread + 1e-9), 1) if spread > 0.0 else None
-    half = float(np.sqrt(variances.sum()) * quantile(np.array(joint or np.inf)))
-    return Quantity(ratio, half, numerical, min(value.effective_samples, divisor.effective_samples), joint)
+        half, numerical = (error and error / scale for error in (value.statistical_error, value.numerical_error))
+        return Quantity(ratio, half, numerical, samples, value.degrees_of_freedom)
+    _, *halves, freedom = arrays_of([value, divisor])
+    statistical, numerical_errors = (np.array([1.0, abs(ratio)]) * pair / scale for pair in halves)
+    ours, theirs = (
+        Estimate(*figure) for figure in zip(statistical, statistical / quantile(freedom), freedom, strict=True)
+    )
+    known = finite(float(numerical_errors.sum()))
+    return _quantity(ratio, ours - theirs, known, min(samples, divisor.effective_samples))
+
+
+def _quantity(value: float, figure: "Estimate", numerical: float | None, samples: float) -> Quantity:
+    """A quantity with the error of an estimate, whose freedom is rounded down."""
+    from rbdyn.base.estimate import quantile
+
+    freedom, error = float(np.squeeze(figure.freedom)), float(np.squeeze(figure.error))
+    joint = math.floor(freedom + 1e-9) if math.isfinite(freedom) else None
+    half = error * float(quantile(joint or math.inf))
+    return Quantity(value, finite(half), numerical, samples, joint)

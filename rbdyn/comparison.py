@@ -13,15 +13,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
-from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Level, Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, finite, shown, written
 from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, label, quantity, signed_with_error, value_alone
 from rbdyn.base.words import shown as value_text
-from rbdyn.result import Quantity, SavedRecord, SimulationResult, full_status
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, full_status
 from rbdyn.scene import BallScene, Scene, scene_of
 from rbdyn.scene.key_columns import default_of
 
@@ -240,7 +240,7 @@ def differences(first: Mapping[str, Quantity], second: Mapping[str, Quantity]) -
     """Every figure of two tables, whose intervals hold together; the count leaves out figures without scatter or errors."""
     common = [name for name in first if name in second]
     ours, theirs = [first[name] for name in common], [second[name] for name in common]
-    error, wide = errors_of_differences(ours, theirs)
+    error, wide = errors_of_differences(arrays_of(ours), arrays_of(theirs))
     found = {
         name: _difference(one.value, other.value, float(half), float(together))
         for name, one, other, half, together in zip(common, ours, theirs, error, wide, strict=True)

@@ -5,7 +5,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
@@ -75,6 +75,20 @@ class Quantity(Record):
     def value_text(self) -> str:
         """The value to the digits that its stated error bears; to five without one."""
         return value_alone(self.value, self.stated_error)
+
+
+def arrays_of(figures: Sequence[Any]) -> Any:
+    """Figures as arrays (4, ...): values, statistical and numerical half-widths (NaN: unknown), degrees of freedom (infinite: normal).
+
+    ``figures``: of any number of dimensions; None counts as a figure that was not reported.
+    """
+    import numpy as np
+
+    table = np.array(figures, dtype=object)
+    names = ("value", "statistical_error", "numerical_error", "degrees_of_freedom")
+    columns = np.array([[getattr(figure, name, None) for figure in table.flat] for name in names], dtype=float)
+    columns[3] = np.nan_to_num(columns[3], nan=np.inf, posinf=np.inf)
+    return columns.reshape(4, *table.shape)
 
 
 def full_status(result: Any) -> str:

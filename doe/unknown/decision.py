@@ -38,12 +38,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse, special, stats
+from scipy import linalg, sparse, special
 
 from doe.emulator import Emulator, fit_emulator, leave_one_out
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.estimate import wilson
 from rbdyn.base.records import Record, keyed
 
 # Points of true values for a row and at most, steps of their weights and earlier ones, and the cases that an interval holds.
@@ -93,14 +94,6 @@ def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> li
         least, most = wilson(value, count)
         intervals.append(Share(value, min(low, least), max(high, most)))
     return intervals
-
-
-def wilson(share: float, count: int) -> tuple[float, float]:
-    """95 % interval of a share of ``count`` independent rows (Wilson 1927)."""
-    z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
-    middle = (share + z * z / (2.0 * count)) / (1.0 + z * z / count)
-    half = z / (1.0 + z * z / count) * np.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
-    return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
 def shrunk(gains: Array, variances: Array) -> Array:

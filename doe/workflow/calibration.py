@@ -57,7 +57,7 @@ from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import counted, quantity
-from rbdyn.result import SimulationResult
+from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented
@@ -167,7 +167,7 @@ def _vain_question(case: Case, rig: Rig, targets: Sequence[Input]) -> Iterator[s
     """Faults of a question without targets or of one condition, and of measured temperatures that no heat balance of the scene computes."""
     if not targets:
         yield f"{case.source}: uncertain: no unknown input is declared; add one with a law"
-    names = [name for name in rig.outputs if name in clearance.TEMPERATURES and case.scene.thermal is None]
+    names = [name for name in rig.outputs if name in TEMPERATURES and case.scene.thermal is None]
     if len(rig.conditions) == 1:
         yield f"{rig.path}: all rows have one operating condition, so none predicts another; measure at two at least"
     fix = f"{case.source} has no [thermal], which computes temperatures; add that table there or remove the column"
@@ -422,11 +422,8 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
             raise RunError(f"{label}: {result.cause}")
     values, variances, _ = rows.figures(results)
     turns = np.array([result.counted_turns * result.replicates for result in results])
-    records = [result.as_dict() for result in results]
     numerical = [
-        (clearance.quantity_of(records[condition], rows.outputs[name])["numerical_error"] or 0.0)
-        / NORMAL
-        / np.exp(value)
+        (results[condition].responses[rows.outputs[name]].numerical_error or 0.0) / NORMAL / np.exp(value)
         for (condition, name), value in zip(rows.cells, values[0], strict=True)
     ]
     return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2

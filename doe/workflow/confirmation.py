@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from doe import clearance
 from doe.clearance import Simulations
 from doe.duty import DutyResult
 from doe.running.store import Failure
@@ -19,12 +18,12 @@ from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array
+from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
 from rbdyn.base.faults import RunError
-from rbdyn.base.intervals import chance_above, joint_freedom, joint_half_width, one_sided, standard_errors, times_wider
 from rbdyn.base.notes import DANGER, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, keyed, outside_json
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 
@@ -97,22 +96,21 @@ class Confirmed:
         return np.where(mask, joint, np.nan)
 
     @property
-    def parts(self) -> tuple[list[Array], list[Array]]:
-        """Statistical and numerical standard errors (m,), 0 where unknown, and the degrees of freedom of each."""
-        infinite = np.full_like(self.values, np.inf)
-        freedom = [infinite if self.freedom is None else self.freedom, infinite]
-        halves = (self.statistical, self.numerical)
-        return [standard_errors(*pair) for pair in zip(halves, freedom, strict=True)], freedom
+    def estimate(self) -> Estimate:
+        """The responses with their standard errors, 0 where unknown."""
+        freedom = np.full_like(self.values, np.inf) if self.freedom is None else self.freedom
+        numerical = standard_errors(self.numerical, np.inf)
+        return Estimate(self.values, standard_errors(self.statistical, freedom), freedom, numerical)
 
     @property
     def standard_error(self) -> Array:
         """Joint standard errors (m,), 0 where unknown."""
-        return np.asarray(np.hypot(*self.parts[0]))
+        return np.asarray(np.hypot(self.estimate.error, self.estimate.numerical))
 
     @property
     def joint_freedom(self) -> Array:
         """Degrees of freedom (m,) of the joint errors."""
-        return joint_freedom(*self.parts)
+        return self.estimate.joint.freedom
 
 
 class Gain(Record):
@@ -170,17 +168,11 @@ def confirm(
 
 def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
-    record = result.as_dict()
-    quantities = [clearance.quantity_of(record, name) for name in study.responses]
-    values, statistical, numerical = (
-        np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
-        for key in ("value", "statistical_error", "numerical_error")
-    )
-    freedom = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
-    errors = statistical, numerical
+    responses = result.responses
+    values, statistical, numerical, freedom = arrays_of([responses.get(name) for name in study.responses])
     terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
     jitter = orbit.value if orbit is not None and result.jitters else None
-    confirmed = Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(freedom), jitter, check)
+    confirmed = Confirmed(choice.point, values, statistical, numerical, terms, choice.reason, freedom, jitter, check)
     confirmed = replace(confirmed, dangers=tuple(of_level(condensed(result.notes), DANGER)))
     if isinstance(result, DutyResult):
         hot = {name: simulated_scene(one) for name, one in result.points.items() if one.thermal is not None}
@@ -199,7 +191,8 @@ def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
     """Improvements of all responses with a goal; the errors of both runs are independent."""
     goals = study.goals
     objectives = goals.objectives
-    error, freedom = error_of_difference(baseline, pick)
+    change = baseline.estimate - pick.estimate
+    error, freedom = change.half_width, change.freedom
     scale = 100.0 / np.abs(baseline.values[objectives])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
     columns = zip(objectives, percent, error[objectives] * scale, freedom[objectives], strict=True)
@@ -207,12 +200,6 @@ def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
         Gain(study.responses[index], float(p), float(e), study.file.response[index].goal, float(dof))
         for index, p, e, dof in columns
     ]
-
-
-def error_of_difference(first: Confirmed, second: Confirmed) -> tuple[Array, Array]:
-    """95 % half-widths (m,) of the differences of two simulated points, and the degrees of freedom behind them (Welch)."""
-    errors, freedom = zip(first.parts, second.parts, strict=True)
-    return joint_half_width([*errors[0], *errors[1]], [*freedom[0], *freedom[1]])
 
 
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:

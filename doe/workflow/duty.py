@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from doe.duty import scenes_of
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
@@ -23,7 +21,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import finite
 from rbdyn.life.duty import DutyLife
-from rbdyn.result import Quantity
+from rbdyn.result import Quantity, arrays_of
 from rbdyn.scene import Scene
 
 Figures = Mapping[str, Quantity]
@@ -210,10 +208,5 @@ def own_pick(study: Problem, runs: Runs, pick: Array) -> OwnPick:
 def _at_point(study: Problem, confirmed: Confirmed, name: str) -> Confirmed:
     """A simulated point at one point of the duty, whose study it is."""
     figures = [confirmed.at_points[name][response] for response in study.responses]
-    values = np.array([figure.value for figure in figures])
-    statistical, numerical = (
-        np.array([np.nan if (error := getattr(figure, key)) is None else error for figure in figures])
-        for key in ("statistical_error", "numerical_error")
-    )
-    freedom = np.array([figure.degrees_of_freedom or np.inf for figure in figures])
+    values, statistical, numerical, freedom = arrays_of(figures)
     return Confirmed(confirmed.point, values, statistical, numerical, freedom=freedom)

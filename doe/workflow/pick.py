@@ -29,7 +29,6 @@ from doe.workflow.confirmation import (
     LostPickError,
     confirm,
     confirmed_from,
-    error_of_difference,
     every_limit,
     limits_of,
     verdict_of,
@@ -506,7 +505,7 @@ def _gains_by_simulation(
             continue
         outer_point = confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(outer_point.values)) / (AHEAD * study.step[index])
-        joint = error_of_difference(pick, outer_point)[0][goals.objectives]
+        joint = (pick.estimate - outer_point.estimate).half_width[goals.objectives]
         figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
         gains_beyond[index] = dict(zip(responses, figures, strict=True))
     return gains_beyond

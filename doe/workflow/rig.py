@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from doe.clearance import TEMPERATURES
 from doe.study_file.table import gap_notes
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, refuse
@@ -17,6 +16,7 @@ from rbdyn.base.notes import Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.base.words import counted
 from rbdyn.dynamics.figures import FIGURES
+from rbdyn.result import TEMPERATURES
 from rbdyn.scene.key_columns import key_values, unknown_keys
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.

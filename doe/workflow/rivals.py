@@ -13,7 +13,7 @@ import numpy as np
 from doe.pareto import Goals, ParetoFront
 from doe.response_surface import Surface
 from doe.workflow.adaptive import Adaptive
-from doe.workflow.confirmation import ORDER, Confirmed, error_of_difference, limits_of, point_words, verdict_of
+from doe.workflow.confirmation import ORDER, Confirmed, limits_of, point_words, verdict_of
 from doe.workflow.pick import SearchedPick
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import predict_all, quadratics
@@ -95,7 +95,7 @@ def rivals_sentences(forecast: Forecast, confirmed: Mapping[str, Confirmed]) -> 
 def _uncertain(study: Problem, rival: Confirmed, pick: Confirmed) -> str:
     """The responses whose difference is within its error."""
     goals = study.goals
-    apart = np.abs(rival.values - pick.values) <= np.nan_to_num(error_of_difference(rival, pick)[0], nan=np.inf)
+    apart = np.abs(rival.values - pick.values) <= np.nan_to_num((rival.estimate - pick.estimate).half_width, nan=np.inf)
     names = [quantity(study.responses[index])[0] for index in goals.objectives if apart[index]]
     return f" ({' and '.join(names)} only within the error)" if names else ""
 

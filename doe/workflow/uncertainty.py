@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.clearance import TEMPERATURES, Simulations, quantity_of, responses_of, work_of
+from doe.clearance import Simulations, responses_of, work_of
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -40,7 +40,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
 from rbdyn.base.words import are, counted
 from rbdyn.dynamics.figures import FIGURES
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import TEMPERATURES, Quantity, SimulationResult
 from rbdyn.scene.unknown import UnknownInput
 
 # Outputs of every scene; those with a heat balance also have their temperatures.
@@ -135,7 +135,7 @@ def find_uncertainty(
     refuse(
         f"--figure {name}: {path} does not give it; leave it out"
         for name in case.outputs
-        if not quantity_of(nominal.as_dict(), name)
+        if name not in nominal.responses
     )
     seed, joint, effort = case.uncertain.seed, case.joint(case.every), 1
     fresh_sets, idle = joint.sets(FRESH, seed + 1), dict[str, float]()
@@ -206,14 +206,10 @@ def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
 
 
 def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
-    numerical = _quantity(nominal, case.outputs[place]).numerical_error or 0.0
+    numerical = nominal.responses[case.outputs[place]].numerical_error or 0.0
     samples = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
     runs = Runs(sets.quantiles, *samples, (numerical / NORMAL) ** 2)
     return runs, emulated(runs, case.uncertain.inputs, declared(case))
-
-
-def _quantity(nominal: SimulationResult, name: str) -> Quantity:
-    return Quantity.from_dict(dict(quantity_of(nominal.as_dict(), name)))
 
 
 def _output(
@@ -231,7 +227,7 @@ def _output(
         }
         floor = (effects.get("total") or effects["shapley"])[-1]
     return OutputRange(
-        nominal=_quantity(nominal, name),
+        nominal=nominal.responses[name],
         input=interval,
         variance=variance_by_cause(runs, fitted),
         **by_key,

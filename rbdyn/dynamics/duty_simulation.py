@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.intervals import errors_of_differences
 from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
@@ -20,7 +20,7 @@ from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
-from rbdyn.result import Quantity, SavedRecord, SimulationResult, figure_columns, full_status, versions
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status, versions
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 from rbdyn.scene.thermal import simulated_scene
@@ -173,7 +173,8 @@ def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
         badness = {point: WORST[name](figure.value) for point, figure in figures.items()}
         worst = max(badness, key=lambda point: badness[point])
         others = [point for point in figures if point != worst]
-        error, _ = errors_of_differences([figures[worst]] * len(others), [figures[point] for point in others])
+        pair = [figures[worst]] * len(others), [figures[point] for point in others]
+        error, _ = errors_of_differences(*(arrays_of(each) for each in pair))
         apart = [
             abs(figures[worst].value - figures[point].value) > half for point, half in zip(others, error, strict=True)
         ]

@@ -5,8 +5,9 @@ import pytest
 from decisions import noisy, smooth
 from scipy import stats
 
-from doe.unknown.decision import _shares, better, decides, in_doubt, wilson
+from doe.unknown.decision import _shares, better, decides, in_doubt
 from doe.unknown.inputs import nested
+from rbdyn.base.estimate import wilson
 
 
 def test_noise_is_taken_off_the_share_of_cases() -> None:

@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 import rbdyn
+from rbdyn.base.estimate import times_wider
 from rbdyn.base.faults import InputError
-from rbdyn.base.intervals import times_wider
 from rbdyn.comparison import comparison, differences, different_inputs
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene

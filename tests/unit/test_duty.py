@@ -12,7 +12,6 @@ from instant_runs import instant_result, instantly, unillustrated, with_figures
 from scipy import stats
 from short_studies import EXAMPLES, rows, short_study, silent
 
-from doe.aggregation import Estimates, largest, quantile, weighted_mean
 from doe.clearance import Simulations
 from doe.duty import Duty, DutyResult, Rule, quotient
 from doe.report.files import summary
@@ -23,6 +22,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from doe.workflow.runs import run_design
 from doe.workflow.whole import run_study
+from rbdyn.base.estimate import Estimate, quantile
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulate_module
 from rbdyn.result import Quantity
@@ -65,10 +65,6 @@ def confirmed_at(study, point):
         return confirm(study, simulate_original(study, simulations), {"pick": Choice(point, "")}, simulations)[0]
 
 
-def quantities(result):
-    return {name: Quantity.from_dict(quantity) for name, quantity in result.as_dict().items()}
-
-
 def figures_of(patch, figures):
     """Let simulations end at once with ``figures(scene)`` by name: value, half-width of 95 %, degrees of freedom."""
     ran = instantly(patch)
@@ -95,7 +91,7 @@ def test_one_point_alone_gives_the_bits_of_the_plain_study(tmp_path, monkeypatch
         runs = designed(study, study.path.parent)
         confirmed = confirmed_at(study, study.baseline + 0.5 * study.step)
         arrays = [getattr(runs, key).tolist() for key in ("coded", "actual", "values", "errors", "replicates")]
-        parts = [array.tolist() for point in confirmed.values() for parts in point.parts for array in parts]
+        parts = [array.tolist() for point in confirmed.values() for array in map(np.asarray, point.estimate.joint)]
         limits = [limit.verdict for limit in every_limit(study, confirmed["pick"])]
         found.append((set(rows(study.path.parent / "study.sqlite")), arrays, runs.notes, parts, limits))
     assert found[0] == found[1]
@@ -328,16 +324,16 @@ def result_of(rule, parts, shares, baseline=None, errors=True):
 def test_a_mean_has_the_errors_of_its_parts_by_their_weights():
     """Statistical errors add in root mean square with the freedom of Welch and Satterthwaite, numerical ones linearly."""
     parts = {"a": Quantity(10.0, 1.0, 0.2, 30.0, 8), "b": Quantity(30.0, 4.0, 0.4, 20.0, 5)}
-    mean = quantities(result_of(Rule("mean", "min", None), parts, {"a": 0.25, "b": 0.75}))["impact_force_N"]
+    mean = result_of(Rule("mean", "min", None), parts, {"a": 0.25, "b": 0.75}).responses["impact_force_N"]
     variances = [(0.25 * 1.0 / stats.t.ppf(0.975, 8)) ** 2, (0.75 * 4.0 / stats.t.ppf(0.975, 5)) ** 2]
     freedom = math.floor(sum(variances) ** 2 / (variances[0] ** 2 / 8 + variances[1] ** 2 / 5))
     assert mean.value == 25.0
     assert mean.degrees_of_freedom == freedom == 5
     assert mean.statistical_error == pytest.approx(stats.t.ppf(0.975, freedom) * math.sqrt(sum(variances)))
     assert mean.numerical_error == pytest.approx(0.25 * 0.2 + 0.75 * 0.4)
-    unknown = quantities(
-        result_of(Rule("mean", "min", None), parts | {"b": Quantity(30.0, None, None, 1.0)}, {"a": 0.5, "b": 0.5})
-    )
+    unknown = result_of(
+        Rule("mean", "min", None), parts | {"b": Quantity(30.0, None, None, 1.0)}, {"a": 0.5, "b": 0.5}
+    ).responses
     assert unknown["impact_force_N"].statistical_error is None
     assert unknown["impact_force_N"].numerical_error is None
 
@@ -350,7 +346,7 @@ def test_the_worst_point_is_that_of_the_goal(goal, target, worst, point):
     parts = {"a": Quantity(10.0, 0.1, 0.2, 30.0, 8), "b": Quantity(30.0, 0.4, 0.4, 20.0, 5)}
     result = result_of(Rule("worst", goal, target), parts, {"a": 0.25, "b": 0.75})
     # Far from each other, it is that point with its own errors.
-    assert quantities(result)["impact_force_N"] == replace(parts[point], value=worst)
+    assert result.responses["impact_force_N"] == replace(parts[point], value=worst)
     assert result.worst == {"impact_force_N": (point, 1.0)}
 
 
@@ -372,7 +368,7 @@ def test_a_worst_ratio_has_the_errors_of_the_baseline_too():
     parts = {"a": Quantity(110.0, 2.0, 0.5, 30.0, 8), "b": Quantity(10.0, 0.1, 0.0, 20.0, 5)}
     base = {"a": Quantity(100.0, 3.0, 0.5, 30.0, 8), "b": Quantity(20.0, 0.1, 0.0, 20.0, 5)}
     result = result_of(Rule("worst_relative", "min", None), parts, {"a": 0.5, "b": 0.5}, base)
-    ratio = quantities(result)["impact_force_N"]
+    ratio = result.responses["impact_force_N"]
     variances = (np.array([2.0, 1.1 * 3.0]) / 100.0 / stats.t.ppf(0.975, 8)) ** 2
     freedom = math.floor(variances.sum() ** 2 / (variances**2 / 8).sum())
     assert ratio.value == pytest.approx(1.1)
@@ -382,7 +378,7 @@ def test_a_worst_ratio_has_the_errors_of_the_baseline_too():
     assert quotient(parts["a"], base["a"], False).statistical_error == pytest.approx(0.02)
     zero = base | {"b": Quantity(0.05, 0.1, 0.0, 20.0, 5)}
     with pytest.raises(RunError, match=r"at b is .*, not above 0 by more than its error"):
-        result_of(Rule("worst_relative", "min", None), parts, {"a": 0.5, "b": 0.5}, zero).as_dict()
+        assert result_of(Rule("worst_relative", "min", None), parts, {"a": 0.5, "b": 0.5}, zero).responses is None
 
 
 @pytest.mark.parametrize("truth", [(100.0, 40.0, 30.0), (100.0, 99.0, 97.0), (100.0, 100.0, 100.0)], ids=str)
@@ -394,7 +390,7 @@ def test_the_interval_of_the_worst_holds_the_truth(truth):
         halves = (errors * stats.t.ppf(0.975, 9)).tolist()
         values = (np.array(truth) + 2.0 * random.standard_normal(3)).tolist()
         parts = {name: Quantity(x, h, 0.0, 10.0, 9) for name, x, h in zip("abc", values, halves, strict=True)}
-        worst = quantities(result_of(rule, parts, dict.fromkeys("abc", 1.0 / 3.0)))["impact_force_N"]
+        worst = result_of(rule, parts, dict.fromkeys("abc", 1.0 / 3.0)).responses["impact_force_N"]
         caught += abs(worst.value - max(truth)) <= worst.statistical_error
     assert 0.92 <= caught / 400 <= 0.98
 
@@ -402,17 +398,17 @@ def test_the_interval_of_the_worst_holds_the_truth(truth):
 def test_the_largest_of_level_figures_is_less_biased_than_the_largest_estimate():
     values = np.random.default_rng(2).standard_normal((100, 6))
     errors, freedom = np.ones_like(values), np.full_like(values, np.inf)
-    naive, corrected = values.max(axis=1).mean(), largest(Estimates(values, errors, freedom)).values.mean()
+    naive, corrected = values.max(axis=1).mean(), Estimate(values, errors, freedom).largest()[0].value.mean()
     assert naive > 1.1
     assert abs(corrected) < 0.6
 
 
 def test_figures_without_errors_are_simply_compared():
     values = np.array([[3.0, 5.0]])
-    exact = Estimates(values, np.full_like(values, np.nan), np.full_like(values, np.inf))
-    assert largest(exact).values.tolist() == [5.0]
-    assert math.isnan(largest(exact).errors[0])
-    assert weighted_mean(exact, np.array([0.5, 0.5])).values.tolist() == [4.0]
+    exact = Estimate(values, np.full_like(values, np.nan), np.full_like(values, np.inf))
+    assert exact.largest()[0].value.tolist() == [5.0]
+    assert math.isnan(exact.largest()[0].error[0])
+    assert exact.mean(np.array([0.5, 0.5])).value.tolist() == [4.0]
     assert quantile(np.array(np.inf)) == pytest.approx(1.959964)
 
 
@@ -458,8 +454,8 @@ def test_the_interval_of_the_worst_holds_the_truth_of_many_points(points, apart)
     """Figures that lie ``apart`` by so many standard errors, one after the other; 2000 seeds."""
     random, truth = np.random.default_rng(8), -apart * np.arange(points)
     errors = np.sqrt(random.chisquare(9, (2000, points)) / 9)
-    worst = largest(Estimates(truth + random.standard_normal(errors.shape), errors, np.full(errors.shape, 9.0)))
-    caught = np.abs(worst.values - truth.max()) <= worst.errors * quantile(worst.freedom)
+    worst = Estimate(truth + random.standard_normal(errors.shape), errors, np.full(errors.shape, 9.0)).largest()[0]
+    caught = np.abs(worst.value - truth.max()) <= worst.half_width
     assert 0.92 <= caught.mean() <= 0.98
 
 
@@ -476,7 +472,7 @@ def test_the_interval_of_the_worst_ratio_holds_the_truth():
     for _ in range(1000):
         parts = {"a": simulated(90.0, 0.03, 7), "b": simulated(45.0, 0.03, 7)}
         base = {"a": simulated(100.0, 0.02, 15), "b": simulated(50.0, 0.02, 15)}
-        ratio = quantities(result_of(rule, parts, {"a": 0.5, "b": 0.5}, base))["impact_force_N"]
+        ratio = result_of(rule, parts, {"a": 0.5, "b": 0.5}, base).responses["impact_force_N"]
         caught += abs(ratio.value - 0.9) <= ratio.statistical_error
     assert 0.92 <= caught / 1000 <= 0.98
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from doe.workflow.confirmation import Confirmed, Gain, error_of_difference
-from rbdyn.base.intervals import chance_above, joint_freedom, one_sided, times_wider
+from doe.workflow.confirmation import Confirmed, Gain
+from rbdyn.base.estimate import chance_above, one_sided, times_wider, welch
 
 REPEATS, TOGETHER = 40_000, 3
 # Three standard errors of a share of so many repeats of 95 %.
@@ -44,15 +44,15 @@ def test_invariant_gains_of_few_replicates_hold_together(replicates, spread):
     and not in far more."""
     random = np.random.default_rng(10 + replicates)
     one, other = simulated(random, replicates), simulated(random, replicates, spread)
-    error, freedom = error_of_difference(one, other)
-    held = together(one.values - other.values, error * times_wider(freedom, TOGETHER))
+    change = one.estimate - other.estimate
+    held = together(one.values - other.values, change.half_width * times_wider(change.freedom, TOGETHER))
     assert 0.95 - 0.007 - SAMPLING < held < 0.95 + 0.023 + SAMPLING
 
 
 def test_closed_form_of_joint_degrees_of_freedom():
     """Closed form: equal errors add their degrees of freedom, one alone keeps its own, and what is known has no end of them."""
     one, none = np.array([1.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    found = joint_freedom([one, none], [np.full(3, 4.0), np.full(3, 4.0)])
+    found = welch([one, none], [np.full(3, 4.0), np.full(3, 4.0)])
     assert found.tolist() == [8.0, 4.0, np.inf]
     half = np.full(1, 3.0), np.full(1, 4.0)
     point = Confirmed(np.zeros(1), np.zeros(1), *half, freedom=np.full(1, 7.0))

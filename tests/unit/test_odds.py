@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from doe.unknown.decision import odds, wilson
+from doe.unknown.decision import odds
+from rbdyn.base.estimate import wilson
 
 COUNT, SPREAD = 256, 3.0
 

@@ -14,10 +14,10 @@ from short_studies import short_study
 
 import rbdyn
 from doe import clearance
-from doe.aggregation import Estimates
 from doe.commands.new import limits_of
 from doe.duty import Rule
 from doe.workflow.problem import Problem
+from rbdyn.base.estimate import Estimate
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.figures import PARTS, of_kind
@@ -68,9 +68,9 @@ def test_a_life_over_a_duty_is_that_of_palmgren_and_miner():
     """The mean over points of time is the life of the damage that they do."""
     lives, shares = np.array([[2e4, 300.0, 9e5]]), np.array([0.7, 0.05, 0.25])
     errors, freedom = 0.01 * lives, np.full((1, 3), np.inf)
-    mean = Rule("mean", "max", None, harmonic=True).over(Estimates(lives, errors, freedom), shares)
-    assert mean.values[0] == pytest.approx(1.0 / (shares / lives[0]).sum())
-    assert mean.errors[0] == pytest.approx(0.01 * mean.values[0] ** 2 * np.sqrt(((shares / lives[0]) ** 2).sum()))
+    mean, _ = Rule("mean", "max", None, harmonic=True).over(Estimate(lives, errors, freedom), shares)
+    assert mean.value[0] == pytest.approx(1.0 / (shares / lives[0]).sum())
+    assert mean.error[0] == pytest.approx(0.01 * mean.value[0] ** 2 * np.sqrt(((shares / lives[0]) ** 2).sum()))
 
 
 def test_clearances_of_a_heat_balance_have_the_errors_of_its_temperatures():

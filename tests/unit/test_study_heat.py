@@ -14,7 +14,7 @@ from short_studies import EXAMPLES, silent
 from typer.testing import CliRunner
 
 from doe import clearance
-from doe.clearance import TEMPERATURES, Simulations
+from doe.clearance import Simulations
 from doe.cli import app
 from doe.report.files import summary
 from doe.running.store import Failure, Store
@@ -26,7 +26,7 @@ from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
 from doe.workflow.whole import check_study, operating_clearances, run_study
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics import simulate as simulation
-from rbdyn.result import Quantity
+from rbdyn.result import TEMPERATURES, Quantity
 from rbdyn.scene import Scene
 
 HOT = EXAMPLES / "hot_roller.toml"

@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.clearance import TEMPERATURES
 from doe.report.sections.chain import estimates_note, grade_cell, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points, in_operation, least_words
 from doe.report.sections.record import (
@@ -52,6 +51,7 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Ti
 from rbdyn.base.identity import identity_line
 from rbdyn.base.records import finite
 from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
+from rbdyn.result import TEMPERATURES
 
 # Meaning of a clearance of the scene, by its key.
 CLEARANCES = {
