@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import Effort, Follow, path_given, registered
@@ -13,6 +13,11 @@ from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
 from rbdyn.base.pace import Notice
 from rbdyn.base.words import improvement, quantity
+
+if TYPE_CHECKING:
+    from doe.report.summary import Summary
+    from doe.workflow.parts import Made
+    from doe.workflow.tolerances import FactorTolerance
 
 # Patterns of the names of all files of a study.
 STUDY_FILES = (
@@ -36,24 +41,29 @@ class StudyAnswer(Answer):
 
     finished_before: bool = False
 
+    @cached_property
+    def summary(self) -> "Summary":
+        """The record with its parts as attributes."""
+        from doe.report.summary import restored
+
+        return restored(self.as_dict())
+
     def blocks(self) -> list[Block]:
         from doe.report.files import blocks
 
-        return blocks(self.as_dict())
+        return blocks(self.summary)
 
     def sections(self) -> list[Section]:
         from doe.report.page import sections
 
-        return sections(self.as_dict())
+        return sections(self.summary)
 
     def rows(self) -> Mapping[str, Rows]:
-        from doe.report.sections.duty import duty_rows
+        from doe.report.sections.duty import duty_figures
         from doe.report.sections.fit import fit_rows
-        from doe.report.summary import restored
-        from doe.response_surface.statistics import Fits
 
         record = self.record
-        fits = fit_rows([*Fits.from_dict(record["fit"]).responses.values()])
+        fits = fit_rows([*self.summary.fit.responses.values()])
         return {
             "gains": self._gains(),
             "pick": self._factors(),
@@ -69,13 +79,13 @@ class StudyAnswer(Answer):
             ],
             "front": [point_row(point) for point in self._front()],
             "confirmation": [
-                {"point": name, **point["factors"], "response": response, **value}
-                for name, point in record["confirmation"].items()
-                for response, value in point["responses"].items()
+                {"point": name, **point.factors, "response": response, **value.as_dict()}
+                for name, point in self.summary.confirmation.items()
+                for response, value in point.responses.items()
             ],
             "parts": part_rows(record["chains"]),
             **{name: fits[name] for name in ("quality", "anova", "coefficients")},
-            **({"duty": duty_rows(restored(record))} if "duty" in record else {}),
+            **({"duty": duty_figures(self.summary).records} if self.summary.duty else {}),
         }
 
     def _front(self) -> list[dict[str, Any]]:
@@ -84,42 +94,40 @@ class StudyAnswer(Answer):
         return self.record["front"]["front"] if searched is None else searched["front"]
 
     def _gains(self) -> Rows:
-        confirmation, gains = self.record["confirmation"], self.record["gains"]
-        rows = []
-        for name, pick in confirmation["pick"]["responses"].items():
-            baseline, gain = confirmation["baseline"]["responses"][name], gains.get(name, {})
+        gains, points, rows = self.summary.gains, self.summary.confirmation, []
+        for name, pick in points["pick"].responses.items():
+            gain = gains.get(name)
             rows.append(
                 {
                     "response": name,
-                    "baseline": baseline["value"],
-                    "pick": pick["value"],
-                    "gain_percent": gain.get("percent"),
-                    "gain_error_percent": gain.get("error_percent"),
-                    "verdict": gain.get("verdict"),
+                    "baseline": points["baseline"].responses[name].value,
+                    "pick": pick.value,
+                    "gain_percent": None if gain is None else gain.percent,
+                    "gain_error_percent": None if gain is None else gain.error_percent,
+                    "verdict": None if gain is None else gain.verdict,
                 }
             )
         return rows
 
     def _factors(self) -> Rows:
-        baseline, tolerances = self.record["confirmation"]["baseline"]["factors"], self.record.get("tolerances", {})
-        tolerances = tolerances | self.record["made"]
+        baseline = self.summary.confirmation["baseline"].factors
+        widths: dict[str, FactorTolerance | Made] = {**(self.summary.tolerances or {}), **self.summary.made}
         return [
             {
                 "factor": name,
                 "baseline": baseline.get(name),
                 "pick": value,
-                "half_width": (tolerances.get(name) or {}).get("half_width"),
+                "half_width": widths[name].half_width if name in widths else None,
             }
-            for name, value in self.record["pick"].items()
+            for name, value in self.summary.pick.items()
         ]
 
     def brief(self) -> str:
-        gains = self.record["gains"].items()
         changes = [
-            f"{quantity(name)[0]} {improvement(gain['percent'], gain['error_percent'], gain['goal'])}"
-            for name, gain in gains
+            f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"
+            for name, gain in self.summary.gains.items()
         ]
-        sentence = self.record["limits_sentence"]
+        sentence = self.summary.limits_sentence
         return ", ".join([*changes, *([sentence] if sentence else [])])
 
 

@@ -10,7 +10,7 @@ tolerance, where the same shape applies.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,16 +58,6 @@ class WidestTolerances:
     limited_by: str
     at_rim: Mask
     sentence: str
-
-    def as_dict(self, factors: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """JSON: half width, probability with its error and interval, and limiting goal, by factor."""
-        sure: dict[str, Any] = {"probability": self.probability, "standard_error": self.standard_error}
-        sure |= {"interval": list(self.interval)}
-        return {
-            name: {"half_width": float(width), **sure, "limited_by": RIM if rim else self.limited_by}
-            for name, width, rim in zip(factors, self.half_widths, self.at_rim, strict=True)
-            if not np.isnan(width)
-        }
 
     def among(self, factors: Rows, count: int) -> Self:
         """The same tolerances for ``factors`` among ``count`` factors, the others without one."""

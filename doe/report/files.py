@@ -1,6 +1,7 @@
 """The files of a study: summary.json, the report, answer.txt, tables and pictures; and its answer on the terminal."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,10 @@ import numpy as np
 from doe import clearance
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
-from doe.report.sections.answer import changes, confirmation_record, first_screen, gains_record, judged_limits_record
+from doe.report.sections.answer import changes, first_screen
 from doe.report.sections.chain import chain_tables, chains
 from doe.report.sections.design import runs_record
-from doe.report.sections.duty import costs, duty_rows, figures, gain_stills
+from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_record, front_tables, predicted_record
 from doe.report.sections.record import notes_of, readable
@@ -26,20 +27,20 @@ from doe.report.sections.search import (
     limiting_sentence,
     search_sentences,
 )
-from doe.report.summary import restored
+from doe.report.summary import Summary, restored
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.asked import Settings
-from doe.workflow.confirmation import statement
+from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.design import evaluation
+from doe.workflow.duty import DutyAnswer
 from doe.workflow.pick import SearchedPick
 from doe.workflow.runs import RUNS_TABLE
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail, Verdict
-from rbdyn.base.identity import Identity
-from rbdyn.base.records import finite, plain, save_table
+from rbdyn.base.records import finite, save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
@@ -59,18 +60,20 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     """
     from doe.report import pictures as plots
 
-    study, record = outcome.study, summary(outcome)
+    study = outcome.study
+    record = summary(outcome).as_dict()
+    result = restored(record)
     tables = {
         RUNS_TABLE: _runs_table(record),
         **fit_files(outcome.surfaces),
         "front.csv": front_tables(record["front"])["front.csv"]
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
-        "confirmation.csv": _confirmation_table(outcome, record),
+        "confirmation.csv": confirmation_table(result.confirmation),
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
     if outcome.duty is not None:
-        tables["duty_points.csv"] = duty_rows(restored(record))
+        tables["duty_points.csv"] = duty_figures(result).records
     if outcome.robust is not None:
         tables |= {
             sheet.file: sheet.records for sheet in (robust_input_sheet(outcome.robust), decider_sheet(outcome.robust))
@@ -89,16 +92,16 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         plots.robust_front(outcome.robust.front, folder / pictures[-1])
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
-        plots.adaptive_search(restored(record), folder / pictures[-1])
-    if outcome.duty is not None and gain_stills(restored(record)):
+        plots.adaptive_search(result, folder / pictures[-1])
+    if gain_stills(result):
         pictures.append("duty_gains.png")
-        plots.duty_gains(restored(record), folder / pictures[-1])
+        plots.duty_gains(result, folder / pictures[-1])
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
-    texts = {"report.html": html_report(record, clearance.motion_record(motions)), "answer.txt": answer_text(record)}
+    texts = {"report.html": html_report(result, clearance.motion_record(motions)), "answer.txt": answer_text(result)}
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    write_workbook(folder / WORKBOOK, [folder / name for name in tables], Identity.from_dict(record["identity"]))
+    write_workbook(folder / WORKBOOK, [folder / name for name in tables], result.identity)
     record["files"] = [*texts, "summary.json", *tables, WORKBOOK, *pictures]
     record["answer_sha256"] = digest_of((folder / "answer.txt").read_bytes())
     sign(record)
@@ -106,19 +109,19 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     return record
 
 
-def answer_text(record: dict[str, Any]) -> str:
+def answer_text(record: Summary | Mapping[str, Any]) -> str:
     """answer.txt, of the record of ``doe study --json``."""
     return terminal.text(blocks(record))
 
 
-def blocks(record: dict[str, Any]) -> list[Block]:
+def blocks(record: Summary | Mapping[str, Any]) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
     clean = restored(record)
     details = [
         *in_few_runs(clean),
         changes(clean),
         *costs(clean),
-        figures(clean),
+        duty_figures(clean).block,
         *chains(clean, {}).blocks,
         *reference(clean, {}).blocks,
         *diagnostics(clean, {}).blocks,
@@ -134,62 +137,61 @@ def blocks(record: dict[str, Any]) -> list[Block]:
     )
 
 
-def summary(outcome: StudyResult) -> dict[str, Any]:
-    """JSON of ``doe study``."""
-    study, gains = outcome.study, outcome.gains["pick"]
-    record: dict[str, Any] = {
-        "format": FORMAT,
-        "identity": study_identity("doe study", study).as_dict(),
-        "status": outcome.status,
-        "limits": judged_limits_record(outcome),
-        "limits_sentence": outcome.limits_sentence,
-        "obstacles": outcome.obstacles.as_dict(),
-        "tried": outcome.tries,
-        "edge": outcome.edge.as_dict(),
-        "asked": Settings.of_runs(study).as_dict(),
-        "design": study_design_record(outcome),
-        "fit": fits_of(outcome.surfaces).as_dict(),
-        "front": front_record(study, outcome.surfaces, outcome.front),
-        "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
-        "pick": study.by_factor(outcome.pick.point),
-        "operating_clearances_mm": outcome.clearances.operating,
-        "clearance_class": outcome.clearances.class_sentence,
-        "confirmation": confirmation_record(outcome),
-        "gains": gains_record(gains),
-        "statement": statement(gains),
-        "whirl_sentence": outcome.whirl_sentence,
-        "rivals_sentences": outcome.rivals_sentences,
-        "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
-        "made": outcome.made,
-        "missed_chains": outcome.missed_chains,
-        "beside_reference": {row.response: row.as_dict() for row in outcome.published_comparisons},
-        "notes": plain(outcome.every_note),
-        "failures": grouped(outcome.failures),
-        "cost": dict(outcome.cost),
-        "versions": versions(),
-        "inputs": outcome.inputs,
-        "seeds": {
-            "design": study.file.design.seed,
-            "front": study.file.front.seed,
-            "adaptive": study.file.adaptive.seed,
+def summary(outcome: StudyResult) -> Summary:
+    """The record of ``doe study --json``."""
+    study, tolerances, gains = outcome.study, outcome.tolerances, outcome.gains["pick"]
+    odds = {} if outcome.robust is None else outcome.robust.odds
+    return Summary(
+        format=FORMAT,
+        identity=study_identity("doe study", study),
+        status=outcome.status,
+        limits={limit.response: PickLimit(limit.nameless, odds.get(limit.response)) for limit in outcome.limits},
+        limits_sentence=outcome.limits_sentence,
+        obstacles=outcome.obstacles,
+        tried=outcome.tries,
+        edge=outcome.edge,
+        asked=Settings.of_runs(study),
+        design=study_design_record(outcome),
+        fit=fits_of(outcome.surfaces),
+        front=front_record(study, outcome.surfaces, outcome.front),
+        pick_on_surfaces=predicted_record(study, outcome.surfaces, outcome.pick.point),
+        pick=study.by_factor(outcome.pick.point),
+        operating_clearances_mm=outcome.clearances.operating,
+        clearance_class=outcome.clearances.class_sentence,
+        confirmation={
+            name: ConfirmedPoint.of(study, point, outcome.gains.get(name)) for name, point in outcome.confirmed.items()
         },
-    }
-    if outcome.duty is not None:
-        record["duty"] = outcome.duty.as_dict()
-        for point in record["duty"]["points"]:
-            point["operating_clearances_mm"] = outcome.clearances_at_points[point["name"]].operating
-    if outcome.adaptive is not None:
-        record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
-    if outcome.searched_pick is not None:
-        record["adaptive"]["chosen"] = _chosen_record(outcome.searched_pick)
-    if outcome.robust is not None:
-        record["robust"] = outcome.robust.as_dict()
-    if outcome.tolerances is not None:
-        record["tolerances"] = outcome.tolerances.as_dict()
-        record["tolerances_gains"] = outcome.tolerances.gains_record()
-        record["tolerances_sentence"] = outcome.tolerances.sentence
-        record["tolerances_warning"] = outcome.tolerances.warning
-    return record
+        gains=gains,
+        statement=statement(gains),
+        whirl_sentence=outcome.whirl_sentence,
+        rivals_sentences=outcome.rivals_sentences,
+        chains={name: chain.as_dict() for name, chain in outcome.chains.items()},
+        made=outcome.made,
+        missed_chains=outcome.missed_chains,
+        beside_reference=outcome.published_comparisons,
+        notes=list(outcome.every_note),
+        failures=grouped(outcome.failures),
+        cost=dict(outcome.cost),
+        versions=versions(),
+        inputs=outcome.inputs,
+        seeds={"design": study.file.design.seed, "front": study.file.front.seed, "adaptive": study.file.adaptive.seed},
+        duty=_duty(outcome),
+        adaptive=None if outcome.adaptive is None else _adaptive_record(outcome, outcome.adaptive),
+        robust=outcome.robust,
+        tolerances=None if tolerances is None else tolerances.by_factor,
+        tolerances_gains=None if tolerances is None else tolerances.by_gain,
+        tolerances_sentence=None if tolerances is None else tolerances.sentence,
+        tolerances_warning=None if tolerances is None else tolerances.warning,
+    )
+
+
+def _duty(outcome: StudyResult) -> DutyAnswer | None:
+    """The answer over the duty with the clearances in operation at its points."""
+    if outcome.duty is None:
+        return None
+    clearances = outcome.clearances_at_points
+    points = [replace(point, operating_clearances_mm=clearances[point.name].operating) for point in outcome.duty.points]
+    return replace(outcome.duty, points=points)
 
 
 def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]:
@@ -199,7 +201,9 @@ def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]
     volumes = (
         {} if outcome.front_comparison is None else compared_record(outcome.study, adaptive, outcome.front_comparison)
     )
-    return adaptive_record(outcome.study, adaptive) | {"compared": volumes} | sentences_record
+    pick = outcome.searched_pick
+    chosen = {} if pick is None else {"chosen": _chosen_record(pick)}
+    return adaptive_record(outcome.study, adaptive) | {"compared": volumes} | sentences_record | chosen
 
 
 def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
@@ -276,25 +280,24 @@ def _reference_table(outcome: StudyResult) -> list[dict[str, Any]]:
     ]
 
 
-def _confirmation_table(outcome: StudyResult, record: dict[str, Any]) -> list[dict[str, Any]]:
+def confirmation_table(points: Mapping[str, ConfirmedPoint]) -> list[dict[str, Any]]:
     """A row for each point and response."""
     rows = []
-    for name, point in record["confirmation"].items():
-        joint = outcome.confirmed[name].error
-        for (response, quantity), error in zip(point["responses"].items(), joint, strict=True):
-            gain, limit = point.get("gains", {}).get(response, {}), point["limits"].get(response)
+    for name, point in points.items():
+        for response, value in point.responses.items():
+            gain, limit = (point.gains or {}).get(response), point.limits.get(response)
             rows.append(
                 {
                     "point": name,
-                    **point["factors"],
+                    **point.factors,
                     "response": response,
-                    **quantity,
-                    "improvement_percent": gain.get("percent"),
-                    "improvement_error_percent": gain.get("error_percent"),
-                    "verdict": gain.get("verdict", ""),
-                    "joint_error": error,
-                    "limit": f"{limit['sense']} {limit['bound']:g}" if limit else "",
-                    "limit_verdict": limit["verdict"] if limit else "",
+                    **value.as_dict(),
+                    "improvement_percent": None if gain is None else gain.percent,
+                    "improvement_error_percent": None if gain is None else gain.error_percent,
+                    "verdict": "" if gain is None else gain.verdict,
+                    "joint_error": value.joint_error,
+                    "limit": "" if limit is None else f"{limit.sense} {limit.bound:g}",
+                    "limit_verdict": "" if limit is None else limit.verdict,
                 }
             )
     return rows

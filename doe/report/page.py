@@ -202,34 +202,24 @@ def _surfaces(summary: Summary) -> list[dict[str, Any]]:
     ]
 
 
-def reference(summary: Record, motion: Mapping[str, Any]) -> Section:
+def reference(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Levels, effects and ranks compared with a published table, with the reasons for what differs."""
     levels, effects, words = [], [], []
-    for name, row in (part(summary, "beside_reference") or {}).items():
-        for whose in ("ours", "theirs"):
-            triple = row.get(f"{whose}_min_mean_max") or ("",) * 3
-            ranks = shown(row.get("rank_correlation"), 2) if whose == "ours" else ""
-            levels.append((f"{label(name)}, {whose}", *map(shown, triple), ranks))
-        for factor, effect in (row.get("linear_effects") or {}).items():
-            sign = "same" if effect.get("same_sign") else "opposite"
-            sizes = (_effect(effect, whose) for whose in ("ours", "theirs"))
-            effects.append((label(name), label(factor), *sizes, sign))
-        words.append(" ".join(filter(None, (row.get("verdict"), row.get("why")))))
+    for name, row in summary.beside_reference.items():
+        levels.append((f"{label(name)}, ours", *map(shown, row.ours_min_mean_max), shown(row.rank_correlation, 2)))
+        levels.append((f"{label(name)}, theirs", *map(shown, row.theirs_min_mean_max), ""))
+        for factor, effect in row.linear_effects.items():
+            sizes = (f"{effect.ours:+.3g}", f"{effect.theirs:+.3g}")
+            effects.append((label(name), label(factor), *sizes, "same" if effect.same_sign else "opposite"))
+        words.append(" ".join(filter(None, (row.verdict, row.why))))
     levels_header = ("response", "least", "mean", "largest", "rank correlation")
     header = ("response", "factor", "ours", "theirs", "sign")
-    caption = "Linear effects per coded unit (* significant at 5 %)"
     blocks: list[Block] = [
-        Bullets([sentence for sentence in words if sentence]),
+        Bullets(words),
         Table("Levels", levels_header, levels),
-        Table(caption, header, effects, text_columns=(1, 4)),
+        Table("Linear effects per coded unit", header, effects, text_columns=(1, 4)),
     ]
     return Section("reference", "Compared with the published table", blocks)
-
-
-def _effect(effect: Record, whose: str) -> str:
-    """An effect, starred where it is significant."""
-    size = effect.get(whose)
-    return "" if size is None else f"{size:+.3g}{'*' if effect.get(f'{whose}_significant') else ''}"
 
 
 def identity(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -237,17 +227,16 @@ def identity(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     return identity_section(summary.identity)
 
 
-def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def settings(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Seeds, versions and cost: what it takes to get the same numbers again."""
-    captions = (("seeds", "Seeds"), ("versions", "Versions"), ("cost", "Cost, times in seconds"))
-    tables = [record_table(caption, part(summary, key)) for key, caption in captions]
-    return Section("settings", "Settings, versions, cost", tables)
+    tables = {"Seeds": summary.seeds, "Versions": summary.versions, "Cost, times in seconds": summary.cost}
+    blocks = [record_table(caption, figures) for caption, figures in tables.items()]
+    return Section("settings", "Settings, versions, cost", blocks)
 
 
-def notes(summary: Record, motion: Mapping[str, Any]) -> Section:
+def notes(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Runs that failed, and limits of the model that the runs met."""
-    failures = failure_table(part(summary, "failures") or [])
-    return Section("notes", "Notes and failures", [failures, Remarks(notes_of(summary))])
+    return Section("notes", "Notes and failures", [failure_table(summary.failures), Remarks(tuple(summary.notes))])
 
 
 CHAPTERS = (

@@ -7,7 +7,14 @@ from typing import Any
 from doe.report.sections.record import drop_undefined
 from doe.response_surface.statistics import Fits
 from doe.workflow.asked import Settings
+from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
+from doe.workflow.duty import DutyAnswer
 from doe.workflow.judgement import Robust
+from doe.workflow.obstacles import Obstacles
+from doe.workflow.parts import Made
+from doe.workflow.pick import Edge
+from doe.workflow.surfaces import PublishedComparison
+from doe.workflow.tolerances import FactorTolerance, KeptGain
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
@@ -22,11 +29,11 @@ class Summary(Record, kw_only=True):
     format: str
     identity: Identity
     status: str
-    limits: Any
+    limits: dict[str, PickLimit]
     limits_sentence: str
-    obstacles: Any
+    obstacles: Obstacles
     tried: int
-    edge: Any
+    edge: Edge
     asked: Settings
     design: Any
     fit: Fits
@@ -35,26 +42,26 @@ class Summary(Record, kw_only=True):
     pick: dict[str, Any]
     operating_clearances_mm: dict[str, dict[str, float]]
     clearance_class: str
-    confirmation: Any
-    gains: Any
+    confirmation: dict[str, ConfirmedPoint]
+    gains: dict[str, Gain]
     statement: str
     whirl_sentence: str
     rivals_sentences: list[str]
     chains: Any
-    made: Any
+    made: dict[str, Made]
     missed_chains: dict[str, str]
-    beside_reference: Any
+    beside_reference: dict[str, PublishedComparison]
     notes: list[Note]
     failures: Any
     cost: dict[str, float]
     versions: dict[str, str]
     inputs: str
     seeds: dict[str, int]
-    duty: Any = None
+    duty: DutyAnswer | None = None
     adaptive: Any = None
     robust: Robust | None = None
-    tolerances: Any = None
-    tolerances_gains: Any = None
+    tolerances: dict[str, FactorTolerance] | None = None
+    tolerances_gains: dict[str, KeptGain] | None = None
     tolerances_sentence: str | None = None
     tolerances_warning: str | None = None
 

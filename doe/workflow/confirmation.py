@@ -21,9 +21,9 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Notes, condensed, of_level
-from rbdyn.base.records import Record, derived, keyed, outside_json
+from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
-from rbdyn.result import Quantity, SimulationResult, arrays_of
+from rbdyn.result import TEMPERATURES, Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 
@@ -36,6 +36,10 @@ REAL, LOSS, NOISE = (
     "a real loss, more than its error",
     "inside its own noise: no gain is shown",
 )
+
+Verdict = Literal["kept", "undecided", "broken"]
+# From the best to the worst.
+ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
 
 
 def point_words(name: str) -> str:
@@ -83,7 +87,7 @@ class Confirmed:
     at_points: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
     worst: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     temperatures: Mapping[str, Quantity] | None = None
-    temperature_ranges: Mapping[str, Sequence[float]] | None = None
+    temperature_ranges: dict[str, list[float]] | None = None
     hot: Mapping[str, Scene] = field(default_factory=dict)
     jitter_points: tuple[str, ...] = ()
     dangers: Notes = ()
@@ -120,16 +124,15 @@ class Gain(Record):
     of the error.
     """
 
-    response: str = outside_json()
     percent: float
-    error: float = keyed("error_percent")
+    error_percent: float
     goal: str = "min"
-    verdict: str = derived(lambda self: gain_verdict(self.percent, self.error))
+    verdict: str = derived(lambda self: gain_verdict(self.percent, self.error_percent))
     freedom: float = outside_json(default=np.inf)
 
     def error_among(self, count: int) -> float:
         """Half-width that holds together with those of ``count`` gains."""
-        return self.error * float(times_wider(self.freedom, count))
+        return self.error_percent * float(times_wider(self.freedom, count))
 
 
 class LostPickError(RunError):
@@ -187,8 +190,8 @@ def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | Du
     )
 
 
-def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
-    """Improvements of all responses with a goal; the errors of both runs are independent."""
+def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> dict[str, Gain]:
+    """Improvements by response of those with a goal; the errors of both runs are independent."""
     goals = study.goals
     objectives = goals.objectives
     change = baseline.estimate - pick.estimate
@@ -196,10 +199,10 @@ def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
     scale = 100.0 / np.abs(baseline.values[objectives])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
     columns = zip(objectives, percent, error[objectives] * scale, freedom[objectives], strict=True)
-    return [
-        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal, float(dof))
+    return {
+        study.responses[index]: Gain(float(p), float(e), study.file.response[index].goal, float(dof))
         for index, p, e, dof in columns
-    ]
+    }
 
 
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
@@ -217,19 +220,21 @@ def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
     return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
 
 
-def statement(gains: Sequence[Gain]) -> str:
-    """Whether the gains are real, in words.
+def statement(gains: Mapping[str, Gain]) -> str:
+    """Whether the gains by response are real, in words.
 
     A gain is real if it exceeds its error; the intervals of all gains hold together with 95 % (Bonferroni).
     """
     count = len(gains)
     by_words = {
-        REAL: [gain for gain in gains if gain.percent > gain.error_among(count)],
-        LOSS: [gain for gain in gains if -gain.percent > gain.error_among(count)],
-        NOISE: [gain for gain in gains if abs(gain.percent) <= gain.error_among(count)],
+        REAL: [name for name, gain in gains.items() if gain.percent > gain.error_among(count)],
+        LOSS: [name for name, gain in gains.items() if -gain.percent > gain.error_among(count)],
+        NOISE: [name for name, gain in gains.items() if abs(gain.percent) <= gain.error_among(count)],
     }
     parts = [
-        f"{', '.join(_improved(gain, count) for gain in group)}: {words}" for words, group in by_words.items() if group
+        f"{', '.join(f'{name} {_improved(gains[name], count)}' for name in names)}: {words}"
+        for words, names in by_words.items()
+        if names
     ]
     intervals = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
     return f"Simulated changes from the baseline{intervals}: {'; '.join(parts)}."
@@ -237,30 +242,57 @@ def statement(gains: Sequence[Gain]) -> str:
 
 def _improved(gain: Gain, count: int) -> str:
     """A gain in words, with the error that holds together with those of ``count`` gains."""
-    return f"{gain.response} {improvement(gain.percent, gain.error_among(count), gain.goal)}"
+    return improvement(gain.percent, gain.error_among(count), gain.goal)
 
 
-Verdict = Literal["kept", "undecided", "broken"]
+class Limit(Record, kw_only=True):
+    """A limit of a ``response`` (left out where a table is by response), its simulated ``value`` and the verdict.
 
-# From the best to the worst.
-ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
-
-
-@dataclass(frozen=True)
-class Limit:
-    """A limit of a response, its simulated ``value`` and the joint 95 % half-width ``error`` of that (NaN: unknown).
-
-    ``one_sided`` times the half-width is the one-sided error at the probability that the study asks for. ``freedom``:
-    degrees of freedom of the error.
+    ``error``: joint 95 % half-width of the value, None if unknown; ``probability`` of keeping the bound, by that error.
+    ``margin``: one-sided error at the probability that the study asks for.
     """
 
-    response: str
-    sense: str
+    response: str = keyed("response", default=None)
     bound: float
+    sense: str
     value: float
-    error: float
-    one_sided: float
-    freedom: float = math.inf
+    verdict: Verdict
+    error: float | None
+    probability: float | None
+    margin: float = outside_json(default=0.0)
+
+    @classmethod
+    def judged(
+        cls,
+        response: str,
+        sense: str,
+        bound: float,
+        value: float,
+        error: float,
+        one_sided: float,
+        freedom: float = math.inf,
+    ) -> "Limit":
+        """A limit judged at a value with a half-width ``error`` of ``freedom`` degrees of freedom, NaN if unknown.
+
+        Kept by more than the one-sided error, which is ``one_sided`` times the error, broken by more than the error, else
+        undecided.
+        """
+        room, margin = bound - value if sense == "<=" else value - bound, one_sided * error
+        verdict: Verdict = "kept" if room > margin else "broken" if -room > error else "undecided"
+        if error > 0.0:
+            probability = float(chance_above(room, error, freedom))
+        else:
+            probability = math.nan if math.isnan(error) else float(room >= 0.0)
+        return cls(
+            response=response,
+            bound=bound,
+            sense=sense,
+            value=value,
+            verdict=verdict,
+            error=finite(error),
+            probability=finite(probability),
+            margin=float(np.nan_to_num(margin)),
+        )
 
     @property
     def room(self) -> float:
@@ -268,18 +300,14 @@ class Limit:
         return self.bound - self.value if self.sense == "<=" else self.value - self.bound
 
     @property
-    def verdict(self) -> Verdict:
-        """Kept by more than the one-sided error, broken by more than the error, else undecided."""
-        if self.room > self.one_sided * self.error:
-            return "kept"
-        return "broken" if -self.room > self.error else "undecided"
+    def nameless(self) -> "Limit":
+        """The limit without its response."""
+        return replace(self, response=None)  # type: ignore[arg-type]
 
     @property
-    def probability(self) -> float:
-        """Probability that the bound is kept, by the error of the value; NaN where that is unknown."""
-        if not self.error > 0.0:
-            return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
-        return float(chance_above(self.room, self.error, self.freedom))
+    def badness(self) -> tuple[int, float]:
+        """The larger, the worse."""
+        return ORDER.index(self.verdict), -self.room
 
     @property
     def bound_words(self) -> str:
@@ -298,15 +326,14 @@ class Limit:
         if math.isnan(self.value):
             return math.nan
         sign = 1.0 if self.sense == "<=" else -1.0
-        margin = float(np.nan_to_num(self.one_sided * self.error))
-        edge = self.value + sign * max(margin, 0.0)
-        unit = 10.0 ** -decimals(margin if margin > 0.0 else 1e-2 * abs(edge) or 1.0)
+        edge = self.value + sign * max(self.margin, 0.0)
+        unit = 10.0 ** -decimals(self.margin if self.margin > 0.0 else 1e-2 * abs(edge) or 1.0)
         return float(f"{unit * (math.floor(sign * edge / unit) + 1.0) * sign:.12g}")
 
     @property
     def text(self) -> str:
         """The limit with its value in words."""
-        probability = "error unknown" if math.isnan(self.error) else f"probability {chance(self.probability)}"
+        probability = "error unknown" if self.probability is None else f"probability {chance(self.probability)}"
         return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {probability})"
 
 
@@ -316,20 +343,25 @@ def every_limit(study: Problem, confirmed: Confirmed) -> list[Limit]:
     sides = one_sided(freedom, study.file.confirmation.limit_probability).tolist()
     columns = (confirmed.values.tolist(), confirmed.error.tolist(), sides, freedom.tolist())
     figures = list(zip(*columns, strict=True))
-    return [Limit(study.responses[index], sense, bound, *figures[index]) for index, sense, bound in study.goals.limited]
+    return [
+        Limit.judged(study.responses[index], sense, bound, *figures[index])
+        for index, sense, bound in study.goals.limited
+    ]
 
 
 def limits_of(study: Problem, confirmed: Confirmed) -> list[Limit]:
-    """The limits of the study at a simulated point, one per response.
-
-    Of a lower and an upper limit it is the one with the worse verdict, or with less room.
-    """
-    worst: dict[str, Limit] = {}
-    for limit in every_limit(study, confirmed):
-        current = worst.get(limit.response)
-        if current is None or _badness(limit) > _badness(current):
-            worst[limit.response] = limit
+    """The limits of the study at a simulated point, one per response."""
+    worst = worst_limits(every_limit(study, confirmed))
     return [worst[name] for name in study.responses if name in worst]
+
+
+def worst_limits(limits: Sequence[Limit]) -> dict[str, Limit]:
+    """By response the limit with the worse verdict, or with less room."""
+    worst: dict[str, Limit] = {}
+    for limit in limits:
+        if limit.response not in worst or limit.badness > worst[limit.response].badness:
+            worst[limit.response] = limit
+    return worst
 
 
 def verdict_of(limits: Sequence[Limit]) -> Verdict:
@@ -369,5 +401,108 @@ def odds_sentence(study: Problem, odds: Mapping[str, Share] | None) -> str:
     return f"Probability that the pick keeps its limits over the unknown inputs: {shares}."
 
 
-def _badness(limit: Limit) -> tuple[int, float]:
-    return ORDER.index(limit.verdict), -limit.room
+class SimulatedValue(Record):
+    """A simulated response with the half-widths of its 95 % intervals, None where one was not estimated."""
+
+    value: float
+    statistical_error: float | None
+    numerical_error: float | None
+
+    @property
+    def error(self) -> float | None:
+        """Half-width of both together; None where the statistical one is unknown, as for ``Quantity.stated_error``."""
+        return (
+            None if self.statistical_error is None else math.hypot(self.statistical_error, self.numerical_error or 0.0)
+        )
+
+    @property
+    def joint_error(self) -> float | None:
+        """Half-width of the errors that are known; None where neither is."""
+        if self.statistical_error is None and self.numerical_error is None:
+            return None
+        return float(np.hypot(self.statistical_error or 0.0, self.numerical_error or 0.0))
+
+    @property
+    def text(self) -> str:
+        """The value with its error."""
+        return with_error(self.value, self.error)
+
+    @classmethod
+    def of(cls, quantity: Quantity) -> "SimulatedValue":
+        """The value of a quantity with both errors."""
+        return cls(quantity.value, quantity.statistical_error, quantity.numerical_error)
+
+
+class Temperature(Record):
+    """A steady temperature [C] with its 95 % half-width, None if unknown."""
+
+    value: float
+    error: float | None
+
+    @property
+    def text(self) -> str:
+        """The temperature with its error."""
+        return with_error(self.value, self.error)
+
+
+class Balance(Record):
+    """Heat balance of a point: 5, 50 and 95 % of its temperatures and clearances over its inputs; None without ranges."""
+
+    ranges: dict[str, list[float]] | None
+
+
+class ConfirmedPoint(Record, kw_only=True):
+    """A simulated point as reports show it, with the limits there and, except for the baseline, the gains over that.
+
+    ``every_limit``: the lower and the upper limit of a response apart; ``limits``: by response the worse of them.
+    """
+
+    factors: dict[str, float]
+    reason: str
+    responses: dict[str, SimulatedValue]
+    power_terms_W: dict[str, float]  # noqa: N815
+    limits: dict[str, Limit]
+    every_limit: list[Limit]
+    friction_check: dict[str, float | None] | None = None
+    temperatures_C: dict[str, Temperature] | None = None  # noqa: N815
+    thermal: Balance | None = None
+    gains: dict[str, Gain] | None = None
+    statement: str | None = None
+
+    @classmethod
+    def of(cls, study: Problem, point: Confirmed, gains: dict[str, Gain] | None) -> "ConfirmedPoint":
+        """A simulated point of a study; ``gains`` over the baseline, None for that itself."""
+        columns = (point.values.tolist(), map(finite, point.statistical), map(finite, point.numerical))
+        nodes = point.temperatures
+        return cls(
+            factors=study.by_factor(point.point),
+            reason=point.reason,
+            responses=dict(zip(study.responses, map(SimulatedValue, *columns), strict=True)),
+            power_terms_W=dict(point.power_terms),
+            limits={limit.response: limit.nameless for limit in limits_of(study, point)},
+            every_limit=every_limit(study, point),
+            friction_check=None if point.friction_check is None else dict(point.friction_check),
+            temperatures_C=None
+            if nodes is None
+            else {
+                name: Temperature(nodes[node].value, nodes[node].stated_error) for name, node in TEMPERATURES.items()
+            },
+            thermal=None if nodes is None else Balance(point.temperature_ranges),
+            gains=gains,
+            statement=None if gains is None else statement(gains),
+        )
+
+
+class PickLimit(Record):
+    """A limit at the pick, and the ``odds`` [p, low, high] that the pick keeps all limits of the response over the unknown inputs.
+
+    The odds are None where they were not asked for.
+    """
+
+    limit: Limit = spread()
+    odds: Share | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict by simulation."""
+        return self.limit.verdict

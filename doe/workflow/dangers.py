@@ -1,6 +1,6 @@
 """Dangers of a choice: responses that it makes worse, and figures beyond their runs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import improvement, quantity
 
 
-def worse_notes(gains: Sequence[Gain]) -> Notes:
-    """A note on a pick that is worse than the baseline, by its simulated ``gains``."""
+def worse_notes(gains: Mapping[str, Gain]) -> Notes:
+    """A note on a pick that is worse than the baseline, by its simulated ``gains`` by response."""
     worse = [
-        f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
-        for gain in gains
+        f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"
+        for name, gain in gains.items()
         if gain.verdict == "worse"
     ]
     return (Note("worse", f"the pick is worse than the baseline: {', '.join(worse)}"),) if worse else ()

@@ -4,125 +4,102 @@ The pick is the compromise of all points. The front on the surfaces of one point
 the study's pick to that, on these surfaces, is what the compromise costs at the point; no run is made for it.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any
 
 from doe.duty import scenes_of
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
-from doe.workflow.confirmation import Confirmed, Gain, gains
+from doe.workflow.confirmation import Confirmed, Gain, SimulatedValue, gains
 from doe.workflow.front import find_front, out_of_reach
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
-from rbdyn.base.records import finite
+from rbdyn.base.records import Record, finite, keyed
+from rbdyn.base.words import chance
 from rbdyn.life.duty import DutyLife
-from rbdyn.result import Quantity, arrays_of
+from rbdyn.result import arrays_of
 from rbdyn.scene import Scene
 
-Figures = Mapping[str, Quantity]
 
+class OwnPick(Record):
+    """The pick at a point of the duty alone by factor, its responses on the surfaces of the point, and why it is.
 
-@dataclass(frozen=True, eq=False)
-class OwnPick:
-    """The pick (k,) at a point of the duty alone, why it is, and its responses by name on the surfaces of the point.
-
-    ``gains``: how much better it is there than the study's pick, with the errors of these surfaces.
+    ``gains_over_pick``: how much better it is there than the study's pick, with the errors of these surfaces.
     """
 
-    point: Array
+    factors: dict[str, float]
+    responses: dict[str, float]
     reason: str
-    values: Mapping[str, float]
-    gains: list[PredictedGain]
-
-    def as_dict(self, study: Problem) -> dict[str, Any]:
-        """JSON: factors, responses, reason, and by response the gain over the study's pick."""
-        gains = {gain.response: gain.as_dict() for gain in self.gains}
-        return {
-            "factors": study.by_factor(self.point),
-            "responses": dict(self.values),
-            "reason": self.reason,
-            "gains_over_pick": gains,
-        }
+    gains_over_pick: dict[str, PredictedGain]
 
 
-@dataclass(frozen=True, eq=False)
-class AtPoint:
+class AtPoint(Record):
     """A point of the duty: its share of the time, its overrides, and the simulated figures of baseline and pick there.
 
-    ``gains``: those of the pick over the baseline. ``own``: the pick of this point alone, or None with the reason in ``note``.
+    ``gains``: those of the pick over the baseline. ``own``: the pick of this point alone, or None with the reason in
+    ``own_note``. ``operating_clearances_mm``: by factor, the clearance in operation by name of the end.
     """
 
     name: str
     share: float
-    overrides: list[str]
-    baseline: Figures
-    pick: Figures
-    gains: list[Gain]
+    overrides: list[str] = keyed("set")
+    baseline: dict[str, SimulatedValue]
+    pick: dict[str, SimulatedValue]
+    gains: dict[str, Gain]
     own: OwnPick | None
-    note: str = ""
+    own_note: str
+    operating_clearances_mm: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class DutyAnswer:
+class WorstPoint(Record):
+    """The likeliest worst point of the duty, and the probability that it is."""
+
+    point: str
+    probability: float
+
+    @property
+    def words(self) -> str:
+        """'cruise (probability 0.625)'."""
+        return f"{self.point} (probability {chance(self.probability)})"
+
+
+class LifeOverDuty(Record):
+    """Life over the duty by static loads, with that at each point alone [h] and the damage there; None where it has no end."""
+
+    L10_h: float | None
+    L10_Mrev: float | None
+    equivalent_load_N: float | None  # noqa: N815
+    point_hours: dict[str, float | None]
+    damage: dict[str, float]
+
+    @classmethod
+    def of(cls, life: DutyLife, names: Sequence[str]) -> "LifeOverDuty":
+        """The life of a bearing over the points of these names."""
+        return cls(
+            finite(life.hours),
+            finite(life.million_turns),
+            finite(life.equivalent_load),
+            dict(zip(names, map(finite, life.point_hours), strict=True)),
+            dict(zip(names, life.damage, strict=True)),
+        )
+
+
+class DutyAnswer(Record):
     """The points of a duty in the order of the study, and how each response follows from them.
 
-    ``worst``: by simulated point, then by response that is a worst one, the likeliest worst point of the duty and the
-    probability that it is. ``life``: life over the duty at "baseline" and "pick", by static loads.
+    ``worst``: by simulated point, then by response that is a worst one, the likeliest worst point. ``life``: at "baseline"
+    and "pick".
     """
 
-    study: Problem
     points: list[AtPoint]
-    aggregate: Mapping[str, str]
-    worst: Mapping[str, Mapping[str, tuple[str, float]]]
-    life: Mapping[str, DutyLife]
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON."""
-        return {
-            "points": [self._point(point) for point in self.points],
-            "aggregate": dict(self.aggregate),
-            "worst": {
-                name: {
-                    response: {"point": point, "probability": probability}
-                    for response, (point, probability) in worst.items()
-                }
-                for name, worst in self.worst.items()
-            },
-            "life": {name: self._life(life) for name, life in self.life.items()},
-        }
-
-    def _life(self, life: DutyLife) -> dict[str, Any]:
-        names = [point.name for point in self.points]
-        return {
-            **life.as_record(),
-            "point_hours": dict(zip(names, map(finite, life.point_hours), strict=True)),
-            "damage": dict(zip(names, life.damage, strict=True)),
-        }
-
-    def _point(self, point: AtPoint) -> dict[str, Any]:
-        return {
-            "name": point.name,
-            "share": point.share,
-            "set": list(point.overrides),
-            "baseline": quantities_record(point.baseline),
-            "pick": quantities_record(point.pick),
-            "gains": {gain.response: gain.as_dict() for gain in point.gains},
-            "own": None if point.own is None else point.own.as_dict(self.study),
-            "own_note": point.note,
-        }
-
-
-def quantities_record(figures: Figures) -> dict[str, Any]:
-    """JSON of figures by name: value, statistical and numerical error."""
-    return {
-        name: {key: getattr(quantity, key) for key in ("value", "statistical_error", "numerical_error")}
-        for name, quantity in figures.items()
-    }
+    aggregate: dict[str, str]
+    worst: dict[str, dict[str, WorstPoint]]
+    life: dict[str, LifeOverDuty]
 
 
 def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) -> DutyAnswer | None:
@@ -139,14 +116,23 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
             own = own_pick(here, runs.at_points[name], pick.point)
         except InputError as error:
             note = f"{name} alone has no pick: {'; '.join(error.faults)}"
-        figures = baseline.at_points[name], pick.at_points[name]
-        points.append(AtPoint(name, study.shares[name], point.set, *figures, gains(here, *ends), own, note))
-    aggregate = {
+        before, after = (
+            {figure: SimulatedValue.of(quantity) for figure, quantity in end.at_points[name].items()}
+            for end in (baseline, pick)
+        )
+        points.append(AtPoint(name, study.shares[name], [*point.set], before, after, gains(here, *ends), own, note))
+    aggregate: dict[str, str] = {
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)
     }
-    worst = {"baseline": baseline.worst, "pick": pick.worst}
-    life = lives(study, {"baseline": baseline.point, "pick": pick.point}, {"baseline": baseline.hot, "pick": pick.hot})
-    return DutyAnswer(study, points, aggregate, worst, life)
+    both, names = {"baseline": baseline, "pick": pick}, [point.name for point in points]
+    worst = {
+        end: {response: WorstPoint(*worst) for response, worst in confirmed.worst.items()}
+        for end, confirmed in both.items()
+    }
+    life = lives(
+        study, {end: point.point for end, point in both.items()}, {end: point.hot for end, point in both.items()}
+    )
+    return DutyAnswer(points, aggregate, worst, {end: LifeOverDuty.of(figures, names) for end, figures in life.items()})
 
 
 def lives(
@@ -202,7 +188,8 @@ def own_pick(study: Problem, runs: Runs, pick: Array) -> OwnPick:
     values = predict_all(surfaces, study.coded(point)[None])[0]
     from_pick = study.file.model_copy(update={"baseline": study.by_factor(pick)})
     over_pick = predicted_gains(replace(study, file=from_pick), surfaces, point)
-    return OwnPick(point, front.pick_reason, dict(zip(study.responses, values.tolist(), strict=True)), over_pick)
+    responses = dict(zip(study.responses, values.tolist(), strict=True))
+    return OwnPick(study.by_factor(point), responses, front.pick_reason, {gain.response: gain for gain in over_pick})
 
 
 def _at_point(study: Problem, confirmed: Confirmed, name: str) -> Confirmed:

@@ -56,7 +56,7 @@ class MissedLimit(Record):
             sense=limit.sense,
             bound=limit.bound,
             value=finite(limit.value),
-            error=finite(limit.error),
+            error=limit.error,
             verdict=limit.verdict,
             excess=finite(-limit.room),
             relaxed=finite(limit.keepable),
@@ -221,7 +221,7 @@ def _least_move(
     for limit in every_limit(study, pick):
         column = values[:, study.responses.index(limit.response)]
         beyond = column - limit.bound if limit.sense == "<=" else limit.bound - column
-        broken |= beyond > -(limit.one_sided * np.nan_to_num(limit.error))
+        broken |= beyond > -limit.margin
     for point in points[~broken]:
         try:
             study.confirmation_run(point)

@@ -10,7 +10,7 @@ those of the scene, and their grade is the widest that all of them may have toge
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from doe.dimension_chain import Chain, chain_from, grade_tolerances
 from doe.dimension_chain.allocation import Allocation
@@ -21,6 +21,7 @@ from doe.study_file.sections import StudyChain
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.records import Record
 from rbdyn.properties.tolerances import STANDARD_TOLERANCES
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import MARKING
@@ -143,22 +144,31 @@ def _size(value: float) -> float:
     return round(value, DIGITS)
 
 
+class PartWidth(Record):
+    """Nominal and width of the tolerance of a part [mm]."""
+
+    nominal_mm: float
+    width_mm: float
+
+
 class Grade(NamedTuple):
-    """Grade of the parts of a tolerance, such as "IT5" or `FINER`, its place in `GRADES` (-1: finer than all), size and width [mm]
-    by part."""
+    """Grade of the parts of a tolerance, such as "IT5" or `FINER`, its place in `GRADES` (-1: finer than all), and the parts."""
 
     name: str
     place: int
-    widths: Mapping[str, tuple[float, float]]
+    parts: dict[str, PartWidth]
 
     def finer_than(self, number: int) -> bool:
         """Whether it is finer than the grade of this number."""
         return self.place < GRADES.index(f"IT{number}")
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON: the grade, and the size and the width of each part."""
-        parts = {name: {"nominal_mm": size, "width_mm": width} for name, (size, width) in self.widths.items()}
-        return {"grade": self.name, "parts": parts}
+
+class Made(Record):
+    """The half width that the parts of a factor are made to, their grade, and the chain that closes on it."""
+
+    half_width: float
+    grade: str | None
+    chain: str
 
 
 @dataclass(frozen=True)
@@ -179,7 +189,8 @@ class SharedTolerance:
         if not fitting:
             return Grade(FINER, -1, {})
         best = fitting[-1]
-        return Grade(GRADES[best], best, {part.name: (part.nominal, tables[part.name][best]) for part in self.parts})
+        parts = {part.name: PartWidth(part.nominal, tables[part.name][best]) for part in self.parts}
+        return Grade(GRADES[best], best, parts)
 
 
 def grades_of(study: Problem, scene: Scene, point: Array, half_widths: Array) -> dict[str, Grade]:
@@ -232,7 +243,7 @@ def grade_of_parts(parts: Iterable[ChainPart]) -> Grade | None:
     ladder = {word: GRADES.index(word.split()[-1]) - word.startswith("finer") for word in words.values() if word}
     if not ladder or not all(words.values()):
         return None
-    widths = {name: (part.nominal_mm, part.tolerance_mm) for name, part in made.items()}
+    widths = {name: PartWidth(part.nominal_mm, part.tolerance_mm) for name, part in made.items()}
     return Grade(" and ".join(sorted(ladder, key=ladder.__getitem__)), min(ladder.values()), widths)
 
 

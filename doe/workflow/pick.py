@@ -38,7 +38,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError
-from rbdyn.base.records import Record, derived, finite, keyed, outside_json
+from rbdyn.base.records import Record, finite
 from rbdyn.base.words import improvement, quantity, shown
 
 # Student's t of more degrees of freedom is normal to all digits that count.
@@ -248,10 +248,7 @@ def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confi
     assert front.violations is not None
     bounds = np.array([abs(bound) or 1.0 for _, _, bound in study.goals.limited])
     missed = min(
-        max(
-            (-limit.room - np.nan_to_num(limit.error)) / (abs(limit.bound) or 1.0)
-            for limit in every_limit(study, point)
-        )
+        max((-limit.room - (limit.error or 0.0)) / (abs(limit.bound) or 1.0) for limit in every_limit(study, point))
         for point in simulated
     )
     return bool((front.violations / bounds).max() < missed)
@@ -339,37 +336,36 @@ class Place(NamedTuple):
         return f"{point} lies farther out than any run: the surfaces extrapolate there." if self.beyond else ""
 
 
+class BeyondBound(Record):
+    """Improvement of a response beyond a bound in its unit, with its 95 % half-width, None if unknown."""
+
+    value: float
+    error: float | None
+
+
 class Outward(Record):
     """A factor whose pick lies at a bound of the region, and how each response with a goal changes beyond it.
 
-    ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
-    factor in millimetres, else one unit of the factor); an unknown half-width is NaN. ``source`` is
-    "the surfaces" or "simulation". ``goals`` by response; a small value is the default.
+    ``gains`` by response: improvement over ``per``, a micrometre of a factor in millimetres, else one unit of the factor.
+    ``source`` is "the surfaces" or "simulation".
     """
 
-    factor: str = outside_json()
     side: str
     bound: float
-    unit: str = keyed("per")
+    per: str
     source: str
-    gains: Mapping[str, tuple[float, float]] = outside_json()
-    goals: Mapping[str, str] = outside_json(default_factory=dict)
-    gains_beyond: dict[str, dict[str, float | None]] = derived(
-        lambda self: {name: {"value": gain, "error": finite(error)} for name, (gain, error) in self.gains.items()},
-        "gains",
-    )
+    gains: dict[str, BeyondBound]
 
-    @property
-    def sentence(self) -> str:
-        """The bound and the change beyond it, in two sentences."""
+    def sentence(self, factor: str, goals: Mapping[str, str]) -> str:
+        """The bound and the change beyond it, in two sentences; ``goals`` by response, of a small value unless stated."""
         changes = ", ".join(
-            f"{name} {improvement(gain, error, self.goals.get(name, 'min'), quantity(name)[1])}"
-            for name, (gain, error) in self.gains.items()
+            f"{name} {improvement(gain.value, gain.error, goals.get(name, 'min'), quantity(name)[1])}"
+            for name, gain in self.gains.items()
         )
-        position = f"{self.bound:.4g} {quantity(self.factor)[1]}".rstrip()
+        position = f"{self.bound:.4g} {quantity(factor)[1]}".rstrip()
         return (
-            f"The pick is at the {self.side} bound of {self.factor}, {position}. "
-            f"Extrapolated change per {self.unit} beyond it by {self.source}: {changes}."
+            f"The pick is at the {self.side} bound of {factor}, {position}. "
+            f"Extrapolated change per {self.per} beyond it by {self.source}: {changes}."
         )
 
 
@@ -379,28 +375,28 @@ class Edge(Record):
     ``beyond_runs``: whether the pick is farther out than any run of the design. ``sentence`` says all of it in words.
     """
 
-    outward: tuple[Outward, ...] = outside_json()
     beyond_runs: bool
-    factors: dict[str, Outward] = derived(lambda self: {bound.factor: bound for bound in self.outward})
+    factors: dict[str, Outward]
     front_share: float
-    searched_share: float | None = keyed("direct_front_share")
-    sentence: str = derived(lambda self: self._sentence())
+    direct_front_share: float | None
+    sentence: str
 
-    def _sentence(self) -> str:
-        near = f"within {100.0 * NEAR:g} % of a bound of the region"
-        shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces lies {near}"
-        if self.searched_share is not None:
-            searched = f"{100.0 * self.searched_share:.0f} % of the simulator's own front"
-            shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces and {searched} lie {near}"
-        if self.outward:
-            bounds = " ".join(bound.sentence for bound in self.outward)
-            beyond = (
-                " The pick lies farther out than any run: the surfaces extrapolate there." if self.beyond_runs else ""
-            )
-            return f"{bounds}{beyond} {shares}; a wider design may find more."
-        if self.beyond_runs:
-            return f"The pick lies between the bounds, but farther out than any run: the surfaces extrapolate there; {shares}."
-        return f"The pick lies inside the region; {shares}."
+
+def _edge_sentence(outward: Sequence[str], beyond_runs: bool, front_share: float, searched_share: float | None) -> str:
+    """Where pick and fronts lie; ``outward``: sentences on the bounds at the pick."""
+    near = f"within {100.0 * NEAR:g} % of a bound of the region"
+    shares = f"{100.0 * front_share:.0f} % of the front on the surfaces lies {near}"
+    if searched_share is not None:
+        searched = f"{100.0 * searched_share:.0f} % of the simulator's own front"
+        shares = f"{100.0 * front_share:.0f} % of the front on the surfaces and {searched} lie {near}"
+    if outward:
+        beyond = " The pick lies farther out than any run: the surfaces extrapolate there." if beyond_runs else ""
+        return f"{' '.join(outward)}{beyond} {shares}; a wider design may find more."
+    if beyond_runs:
+        return (
+            f"The pick lies between the bounds, but farther out than any run: the surfaces extrapolate there; {shares}."
+        )
+    return f"The pick lies inside the region; {shares}."
 
 
 def share_at_edge(study: Problem, points: Array) -> float:
@@ -433,19 +429,20 @@ def edge_of(
     sides = sides_of(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
     gains_beyond = {} if simulations is None else _gains_by_simulation(study, pick, names, simulations)
-    outward = []
+    outward = {}
     for index, side in names:
         gains, source = gains_beyond.get(index), "simulation"
         if gains is None:
             gains, source = _gains_on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
         bound = float(ends[index, int(side > 0)])
-        per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
-        goals = {response.name: response.goal for response in study.file.response}
-        which = "upper" if side > 0 else "lower"
-        outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
+        per_unit = {name: BeyondBound(gain * scale, finite(error * scale)) for name, (gain, error) in gains.items()}
+        outward[study.factors[index]] = Outward("upper" if side > 0 else "lower", bound, unit, source, per_unit)
+    goals = {response.name: response.goal for response in study.file.response}
+    sentences = [bound.sentence(name, goals) for name, bound in outward.items()]
     far = None if searched is None else float(sides_of(searched, ends).any(axis=1).mean())
-    return Edge(tuple(outward), study.beyond_runs(study.coded(pick.point)), share_at_edge(study, front), far)
+    extrapolates, near = study.beyond_runs(study.coded(pick.point)), share_at_edge(study, front)
+    return Edge(extrapolates, outward, near, far, _edge_sentence(sentences, extrapolates, near, far))
 
 
 def sides_of(points: Array, ends: Array) -> Whole:

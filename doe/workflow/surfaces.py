@@ -4,7 +4,7 @@ Gains are predicted with errors, and a published table of the same design is com
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -124,39 +124,38 @@ def standard_errors(half_widths: Array, number: Whole) -> Array:
 
 
 class Effect(Record):
-    """Linear effect of a factor per coded unit, ours and theirs, and whether theirs is significant at 5 %."""
+    """Linear effect of a factor per coded unit, ours and theirs."""
 
     ours: float
     theirs: float
     same_sign: bool = derived(lambda self: self.ours * self.theirs > 0.0)
-    theirs_significant: bool = outside_json()
+    theirs_significant: bool = outside_json(default=False)
+    """Whether theirs is significant at 5 %."""
 
 
 class PublishedComparison(Record):
-    """One response compared with a published table of the same design.
+    """A response compared with a published table of the same design.
 
-    Ranges are the least, mean and largest value; ``effects`` are by factor. ``rank_correlation`` is Spearman's over the
+    Ranges are the least, mean and largest value; effects are by factor. ``rank_correlation`` is Spearman's over the
     runs. ``verdict`` is a sentence on level, signs of the significant published effects, and ranks.
     """
 
-    response: str = outside_json()
-    our_range: tuple[float, float, float] = keyed("ours_min_mean_max")
-    their_range: tuple[float, float, float] = keyed("theirs_min_mean_max")
-    effects: dict[str, Effect] = keyed("linear_effects")
+    ours_min_mean_max: tuple[float, ...]
+    theirs_min_mean_max: tuple[float, ...]
+    linear_effects: dict[str, Effect]
     rank_correlation: float
-    verdict: str = derived(lambda self: self._sentence())
+    verdict: str
     why: str
 
-    def _sentence(self) -> str:
-        significant = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
-        opposite = [factor for factor, effect in significant.items() if not effect.same_sign]
-        level = f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs"
-        ranks = f"rank correlation {self.rank_correlation:+.2f}"
-        if opposite:
-            signs = f"of their {len(significant)} significant linear effects, sign differs for {', '.join(opposite)}"
-        else:
-            signs = f"of their {len(significant)} significant linear effects, all with our sign"
-        return f"{level}; {signs}; {ranks}."
+
+def _verdict(response: str, level: float, effects: Mapping[str, Effect], rank_correlation: float) -> str:
+    significant = {factor: effect for factor, effect in effects.items() if effect.theirs_significant}
+    opposite = [factor for factor, effect in significant.items() if not effect.same_sign]
+    if opposite:
+        signs = f"of their {len(significant)} significant linear effects, sign differs for {', '.join(opposite)}"
+    else:
+        signs = f"of their {len(significant)} significant linear effects, all with our sign"
+    return f"{response}: our mean is {level:.2f} of theirs; {signs}; rank correlation {rank_correlation:+.2f}."
 
 
 def reference_runs(study: Problem) -> Runs | None:
@@ -188,29 +187,29 @@ def reference_runs(study: Problem) -> Runs | None:
     return Runs(table.coded[order], table.actual[order], values, errors, (*table.notes, *notes))
 
 
-def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> list[PublishedComparison]:
-    """Each response of both tables, with the linear effects on the surfaces through each table."""
+def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> dict[str, PublishedComparison]:
+    """Each response of both tables by name, with the linear effects on the surfaces through each table."""
     columns = np.flatnonzero(np.isfinite(theirs.values).any(axis=0))
     study = study.with_responses([study.responses[column] for column in columns])
     ours, theirs = (_of_columns(runs, columns) for runs in (ours, theirs))
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
-    rows = []
+    compared = {}
     for index, (name, pair) in enumerate(zip(study.responses, surfaces, strict=True)):
         both = np.isfinite(ours.values[:, index]) & np.isfinite(theirs.values[:, index])
         our_values, their_values = ours.values[both, index], theirs.values[both, index]
-        rows.append(
-            PublishedComparison(
-                response=name,
-                our_range=(our_values.min(), our_values.mean(), our_values.max()),
-                their_range=(their_values.min(), their_values.mean(), their_values.max()),
-                effects={name: _effect(*pair, letter) for name, letter in lettered.items()},
-                rank_correlation=float(spearmanr(our_values, their_values).statistic),
-                why=study.file.reference.why.get(name, ""),
-            )
+        effects = {factor: _effect(*pair, letter) for factor, letter in lettered.items()}
+        ranks = float(spearmanr(our_values, their_values).statistic)
+        compared[name] = PublishedComparison(
+            ours_min_mean_max=(our_values.min(), our_values.mean(), our_values.max()),
+            theirs_min_mean_max=(their_values.min(), their_values.mean(), their_values.max()),
+            linear_effects=effects,
+            rank_correlation=ranks,
+            verdict=_verdict(name, our_values.mean() / their_values.mean(), effects, ranks),
+            why=study.file.reference.why.get(name, ""),
         )
-    return rows
+    return compared
 
 
 def _of_columns(runs: Runs, columns: Rows) -> Runs:
@@ -444,29 +443,29 @@ def gain_verdict(percent: float, error: float) -> str:
 class PredictedGain(Record):
     """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
 
-    ``error`` is that of the difference of the two predictions, in which common errors cancel: the contrast c'Vc and the
+    ``error_percent`` is that of the difference of the two predictions, in which common errors cancel: the contrast c'Vc and the
     model error at both points, with the degrees of freedom of `Surface.interval_dof`.
 
     ``scatter``: by how much two single runs at one point differ, by the pure error of replicates. ``within_scatter``:
     whether the gain is no larger. Both are None if no run is repeated.
     """
 
-    response: str = outside_json()
-    baseline: float = outside_json()
-    value: float = outside_json()
     percent: float
-    error: float = keyed("error_percent")
-    verdict: str = derived(lambda self: gain_verdict(self.percent, self.error))
+    error_percent: float
+    verdict: str = derived(lambda self: gain_verdict(self.percent, self.error_percent))
     scatter: float | None = keyed("single_run_scatter_percent")
     goal: str = "min"
     within_scatter: bool | None = derived(
         lambda self: None if self.scatter is None else abs(self.percent) <= self.scatter, "within_single_run_scatter"
     )
+    response: str = outside_json(default="")
+    baseline: float = outside_json(default=math.nan)
+    value: float = outside_json(default=math.nan)
 
     @property
     def sentence(self) -> str:
         """The gain in words."""
-        gain = improvement(self.percent, self.error, self.goal)
+        gain = improvement(self.percent, self.error_percent, self.goal)
         change = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, {gain}"
         verdict = {
             "within error": "which is within its error",
@@ -507,7 +506,7 @@ def predicted_gains(study: Problem, surfaces: Sequence[Surface], point: Array) -
                 baseline=float(values[0, index]),
                 value=float(values[1, index]),
                 percent=float(scale * (costs[0, column] - costs[1, column])),
-                error=error * scale,
+                error_percent=error * scale,
                 scatter=None if scatter is None else scatter * scale,
                 goal=study.file.response[index].goal,
             )

@@ -11,7 +11,6 @@ tolerances without that gain.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +21,12 @@ from doe.response_surface import Surface
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import Draws, draws_of, keeping, open_errors
-from doe.workflow.parts import Grade, grades_of
+from doe.workflow.parts import Grade, PartWidth, grades_of
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import predict_all
 from rbdyn.base.arrays import Array, Rows
-from rbdyn.base.words import improvement, quantity, rounded_down, shown
+from rbdyn.base.records import Record
+from rbdyn.base.words import improvement, label, quantity, rounded_down, shown
 from rbdyn.scene import Scene
 
 ENOUGH = 3.0  # times the smallest difference that matters, from which a gain counts by default
@@ -69,7 +69,7 @@ def demands_of(
     counted = _counted(
         settings,
         by_name,
-        simulated and {gain.response for gain in gains(study, *simulated) if gain.percent > gain.error},
+        simulated and {name for name, gain in gains(study, *simulated).items() if gain.percent > gain.error_percent},
     )
     least = {name: settings.at_least.get(name, settings.keep * by_name[name]) for name in names if name in counted}
     return tuple(Demand(one.name, one.goal, by_name[one.name], least.get(one.name)) for one in responses)
@@ -82,6 +82,47 @@ def _counted(settings: Tolerances, percent: Mapping[str, float], real: Collectio
     positive = [name for name, gain in percent.items() if gain > 0.0]
     large = [name for name in positive if percent[name] >= ENOUGH * settings.smallest_difference_percent]
     return large or [name for name in positive if real is None or name in real]
+
+
+class WithoutGain(Record):
+    """The tolerance of a factor without the ``gain`` that limits it."""
+
+    gain: str
+    half_width: float
+    grade: str | None
+    limited_by: str
+
+
+class FactorTolerance(Record):
+    """The widest tolerance of a factor, as a half width, with the share of parts that keep what the study asks.
+
+    ``interval``: of that share with the errors of the surfaces. ``grade``, ``parts``: of ISO 286; None and empty where none is
+    listed. ``without_limiting_gain`` is None where no grade is too fine or no gain limits.
+    """
+
+    half_width: float
+    probability: float
+    standard_error: float
+    interval: tuple[float, ...]
+    limited_by: str
+    grade: str | None
+    parts: dict[str, PartWidth]
+    without_limiting_gain: WithoutGain | None
+
+    @property
+    def parts_words(self) -> str:
+        """'IT6: guide land 16 µm, cage outside 16 µm'."""
+        parts = [f"{label(name)} {shown(1e3 * part.width_mm)} µm" for name, part in self.parts.items()]
+        return ": ".join(filter(None, (self.grade or "", ", ".join(parts))))
+
+
+class KeptGain(Record):
+    """A predicted gain, the least of it that a part keeps, and the range of a gain that does not count, all in percent."""
+
+    predicted_percent: float
+    at_least_percent: float | None
+    counts: bool
+    parts_percent: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,31 +162,36 @@ class PickTolerances:
         """Factors whose parts need a finer grade than the shop's."""
         return [name for name, grade in self.grades.items() if grade.finer_than(self.settings.finest_grade)]
 
-    def as_dict(self) -> dict[str, dict[str, Any]]:
-        """JSON by factor: as the widest tolerances, with the grade, the parts, and the tolerance without the limiting gain."""
-        record = self.widest.as_dict(self.factors)
-        without = {} if self.relaxed is None else self.relaxed.as_dict()
-        return {
-            name: values
-            | (self.grades[name].as_dict() if name in self.grades else {"grade": None, "parts": {}})
-            | {"without_limiting_gain": self._without(without.get(name))}
-            for name, values in record.items()
-        }
+    @property
+    def by_factor(self) -> dict[str, FactorTolerance]:
+        """The tolerance of each factor that has one."""
+        widest, relaxed, tolerances = self.widest, None if self.relaxed is None else self.relaxed.by_factor, {}
+        for name, width, rim in zip(self.factors, widest.half_widths.tolist(), widest.at_rim, strict=True):
+            if np.isnan(width):
+                continue
+            grade, without = self.grades.get(name), None
+            if relaxed is not None:
+                other = relaxed[name]
+                without = WithoutGain(self.limiting_gain, other.half_width, other.grade, other.limited_by)
+            tolerances[name] = FactorTolerance(
+                half_width=width,
+                probability=widest.probability,
+                standard_error=widest.standard_error,
+                interval=widest.interval,
+                limited_by=RIM if rim else widest.limited_by,
+                grade=None if grade is None else grade.name,
+                parts={} if grade is None else grade.parts,
+                without_limiting_gain=without,
+            )
+        return tolerances
 
-    def _without(self, record: Mapping[str, Any] | None) -> dict[str, Any] | None:
-        if record is None:
-            return None
-        return {"gain": self.limiting_gain, **{key: record[key] for key in ("half_width", "grade", "limited_by")}}
-
-    def gains_record(self) -> dict[str, dict[str, Any]]:
-        """JSON of the demands by response; ``parts_percent`` is the range of a gain that does not count."""
+    @property
+    def by_gain(self) -> dict[str, KeptGain]:
+        """The demands by response."""
         return {
-            demand.response: {
-                "predicted_percent": demand.percent,
-                "at_least_percent": demand.least,
-                "counts": demand.least is not None,
-                "parts_percent": list(self.free[demand.response]) if demand.response in self.free else None,
-            }
+            demand.response: KeptGain(
+                demand.percent, demand.least, demand.least is not None, self.free.get(demand.response)
+            )
             for demand in self.demands
         }
 

@@ -4,12 +4,12 @@ Its faults are found before anything runs. Its result also holds the clearances 
 published table.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +45,7 @@ from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.first_look import first_look
 from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
 from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
-from doe.workflow.parts import grade_of_parts
+from doe.workflow.parts import Made, grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
@@ -237,10 +237,10 @@ class StudyResult:
     edge: Edge
     tries: int
     confirmed: Mapping[str, Confirmed]
-    gains: Mapping[str, list[Gain]]
+    gains: Mapping[str, dict[str, Gain]]
     tolerances: PickTolerances | None
     chains: Mapping[str, ChainResult]
-    published_comparisons: list[PublishedComparison]
+    published_comparisons: dict[str, PublishedComparison]
     reference_values: Array | None
     failures: tuple[Failure, ...]
     notes: Notes
@@ -283,17 +283,17 @@ class StudyResult:
         }
 
     @property
-    def made(self) -> dict[str, dict[str, Any]]:
+    def made(self) -> dict[str, Made]:
         """By factor the half width that its parts are made to, and their grades: of the narrowest chain that closes on it."""
-        made: dict[str, dict[str, Any]] = {}
+        made: dict[str, Made] = {}
         for chain in self.study.file.chain:
             result = self.chains.get(chain.name)
             if result is None or result.refused:
                 continue
             half_width = 0.5 * (result.limits_mm[1] - result.limits_mm[0])
-            if chain.factor not in made or half_width < made[chain.factor]["half_width"]:
+            if chain.factor not in made or half_width < made[chain.factor].half_width:
                 grade = grade_of_parts(result.parts)
-                made[chain.factor] = {"half_width": half_width, "grade": grade and grade.name, "chain": chain.name}
+                made[chain.factor] = Made(half_width, grade and grade.name, chain.name)
         return made
 
     @property
@@ -343,7 +343,8 @@ class StudyResult:
         pick = (*self.obstacles.notes, *worse_notes(self.gains["pick"]))
         runs = (note.about(f"at the {name}") for name in ("pick", "baseline") for note in self.confirmed[name].dangers)
         duty, points = self.duty, self.study.file.duty
-        life = () if duty is None else life_notes(duty.life["pick"].hours, sum(point.share for point in points))
+        hours = math.inf if duty is None else duty.life["pick"].L10_h or math.inf
+        life = () if duty is None else life_notes(hours, sum(point.share for point in points))
         return (*pick, *life, *runs, *self.notes)
 
     @property
@@ -427,7 +428,7 @@ def run_study(
         gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
-        published_comparisons=[] if reference is None else _compared(study, runs, reference),
+        published_comparisons={} if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=_failures(runs, searched, robustness, selection),
         notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study, surfaces))), *runs.notes),
@@ -489,12 +490,12 @@ def _tolerances(
     return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
 
 
-def _compared(study: Problem, runs: Runs, reference: Runs) -> list[PublishedComparison]:
+def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, PublishedComparison]:
     """The runs compared with those of the published table, which has no run added in place of a failed one."""
     return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
 
 
-def _gains(study: Problem, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
+def _gains(study: Problem, confirmed: Mapping[str, Confirmed]) -> dict[str, dict[str, Gain]]:
     return {name: gains(study, confirmed["baseline"], point) for name, point in confirmed.items() if name != "baseline"}
 
 

@@ -16,7 +16,16 @@ COEFFICIENTS: dict[str, dict[str, float]] = {
     "whirl_deviation_ratio": {"1": 0.41, "A": -0.004, "B": 0.003, "C": 0.047, "BC": -0.031, "A^2": 0.038},
     "power_loss_W": {"1": 239.0, "A": -1.0, "B": -9.7, "C": -0.6, "B^2": 2.6},
 }
-VERDICT = {"percent": 11.16, "error_percent": 0.65, "verdict": "better"}
+VERDICT = {"percent": 11.16, "error_percent": 0.65, "goal": "min", "verdict": "better"}
+NOTHING_MISSED = {
+    "reachable": True,
+    "limits": [],
+    "at_bounds": [],
+    "beyond": [],
+    "chains": {},
+    "tolerances": "",
+    "sentences": [],
+}
 
 
 def predicted(response: str, coded: list[float]) -> float:
@@ -92,11 +101,19 @@ def summary() -> dict[str, Any]:
     front = [point([0.5, 1.0 - 0.1 * k, -1.6 + 0.1 * k]) for k in range(12)]
     pick, baseline = front[3], point([0.0, 0.0, 0.0])
     limits = [(c - REACH * s, c + REACH * s) for c, s in zip(CENTRE, STEP, strict=True)]
-    confirmed = {
+    simulated = {
         name: {"value": value, "statistical_error": 0.3, "numerical_error": 0.2}
         for name, value in baseline["responses"].items()
     }
     chosen = {"radial_clearance_mm": 0.0225, "guide_clearance_mm": 0.185, "pocket_clearance_mm": 0.235}
+    confirmed = {
+        "factors": chosen,
+        "reason": "",
+        "responses": simulated,
+        "power_terms_W": {},
+        "limits": {},
+        "every_limit": [],
+    }
     return {
         "format": "doe.study/2",
         "identity": {"command": "doe study", "bearing": "made-up bearing", "drawing": "", "point": "24000 rpm",
@@ -104,9 +121,10 @@ def summary() -> dict[str, Any]:
         "status": "ok",
         "limits": {},
         "limits_sentence": "",
-        "obstacles": {},
+        "obstacles": NOTHING_MISSED,
         "tried": 1,
-        "edge": {},
+        "edge": {"beyond_runs": False, "factors": {}, "front_share": 0.1, "direct_front_share": None,
+                 "sentence": "The pick lies inside the region; 10 % of the front lies within 4 % of a bound of the region."},
         "asked": {
             "study_file": "study.toml",
             "scene_file": "scene.toml",
@@ -159,11 +177,14 @@ def summary() -> dict[str, Any]:
         "made": {},
         "missed_chains": {},
         "inputs": "0123456789abcdef",
-        "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
+        "tolerances": {
+            FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "standard_error": 0.01, "interval": [0.9, 0.98], "grade": None,
+                         "parts": {}, "limited_by": RESPONSES[0], "without_limiting_gain": None}
+        },
         "confirmation": {
-            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0, "nil": 0.0}},
-            "pick": {"factors": chosen, "responses": confirmed, "power_terms_W": {"land": 66.0, "drag": 36.0}},
-            "knee": {"factors": chosen, "responses": confirmed, "gains": {RESPONSES[0]: VERDICT}, "reason": "the knee"},
+            "baseline": confirmed | {"factors": baseline["factors"], "power_terms_W": {"land": 70.0, "drag": 36.0, "nil": 0.0}},
+            "pick": confirmed | {"power_terms_W": {"land": 66.0, "drag": 36.0}},
+            "knee": confirmed | {"gains": {RESPONSES[0]: VERDICT}, "statement": "", "reason": "the knee"},
         },
         "gains": dict.fromkeys(RESPONSES, VERDICT),
         "statement": "The gain is real in all three responses.",

@@ -11,7 +11,7 @@ from synthetic_study import FACTORS, RESPONSES, summary
 
 from doe.report.files import answer_text, blocks
 from doe.report.page import page_data, sections
-from doe.report.sections.duty import at_points, duty_rows, gain_stills
+from doe.report.sections.duty import at_points, duty_figures, gain_stills
 from doe.report.sections.record import readable
 from doe.report.summary import restored
 from rbdyn.base import terminal
@@ -19,6 +19,7 @@ from rbdyn.base.blocks import Detail, Paragraph, Table
 
 IMPACT, WHIRL, POWER = RESPONSES
 GAIN = {"percent": 11.16, "error_percent": 0.65, "goal": "min", "verdict": "better"}
+COST = {**GAIN, "percent": 0.5, "verdict": "within error", "single_run_scatter_percent": None}
 
 
 def quantity(value: float) -> dict:
@@ -39,12 +40,10 @@ def point(name: str, share: float, power: float) -> dict:
             "factors": dict.fromkeys(FACTORS, 0.02),
             "responses": {IMPACT: 79.0, POWER: power - 11.0},
             "reason": "the knee",
-            "gains_over_pick": {
-                IMPACT: {**GAIN, "verdict": "within error"},
-                POWER: {**GAIN, "verdict": "within error"},
-            },
+            "gains_over_pick": {IMPACT: COST, POWER: COST},
         },
         "own_note": "",
+        "operating_clearances_mm": {},
     }
 
 
@@ -69,8 +68,8 @@ def over_duty() -> dict:
     for response in record["asked"]["responses"]:
         response |= {"aggregate": record["duty"]["aggregate"][response["name"]], "points": None}
     record["limits"] = {
-        f"idle: {POWER}": {"sense": "<=", "bound": 30.0, "value": 10.0, "error": 0.5, "verdict": "kept", "probability": 1.0},
-        f"take-off: {POWER}": {"sense": "<=", "bound": 230.0, "value": 230.0, "error": 0.5, "verdict": "undecided", "probability": 0.5},
+        f"idle: {POWER}": {"sense": "<=", "bound": 30.0, "value": 10.0, "error": 0.5, "verdict": "kept", "probability": 1.0, "odds": None},
+        f"take-off: {POWER}": {"sense": "<=", "bound": 230.0, "value": 230.0, "error": 0.5, "verdict": "undecided", "probability": 0.5, "odds": None},
     }  # fmt: skip
     return record
 
@@ -83,7 +82,7 @@ def sentences(record: dict) -> dict[str, str]:
 
 def test_without_a_duty_nothing_is_said_of_one():
     """Unit: the answer and the report of a study at one point have no word on a duty."""
-    assert at_points(summary()) and sentences(summary()) == {}
+    assert sentences(summary()) == {}
     assert "duty" not in answer_text(summary()) and "duty" not in {part.key for part in sections(restored(summary()))}
 
 
@@ -113,8 +112,8 @@ def test_the_dearest_compromise_is_named_where_it_exceeds_its_errors():
     """Unit: within errors no cost is claimed; beyond them the largest is named; without picks of points nothing is said."""
     assert any(text.startswith("The compromise costs no point more than the errors") for text in sentences(over_duty()))
     record = over_duty()
-    record["duty"]["points"][1]["own"]["gains_over_pick"][POWER]["verdict"] = "better"
-    record["duty"]["points"][2]["own"]["gains_over_pick"][IMPACT] = {**GAIN, "percent": 15.0}
+    record["duty"]["points"][1]["own"]["gains_over_pick"][POWER] = {**COST, "percent": 11.16}
+    record["duty"]["points"][2]["own"]["gains_over_pick"][IMPACT] = {**COST, "percent": 15.0}
     (text,) = (text for text in sentences(record) if text.startswith("The compromise"))
     assert text == (
         "The compromise costs most at take-off: a pick for that point alone has impact force 15.00 ± 0.65 % less on its surfaces."
@@ -147,7 +146,8 @@ def test_life_and_energy_over_the_duty():
         "Energy lost in an hour of the duty: 129.00 ± 0.37 Wh at the baseline, 119.00 ± 0.37 Wh at the pick." in texts
     )
     record = over_duty()
-    record["duty"]["life"] = {name: {"L10_h": None} for name in ("baseline", "pick")}
+    for life in record["duty"]["life"].values():
+        life["L10_h"] = None
     for entry in record["duty"]["points"]:
         del entry["pick"][POWER]
     assert not any(text.startswith(("Life", "Energy")) for text in sentences(record))
@@ -169,12 +169,12 @@ def test_gains_are_drawn_at_each_point_and_over_the_duty():
     """Unit: a picture a response with a goal, a row a point and one over the duty; long names are cut."""
     record = over_duty()
     record["duty"]["points"][0]["name"] = "idle " * 20
-    first, second = gain_stills(record)
+    first, second = gain_stills(restored(record))
     assert first.words == "Gain in impact force at 3 points of the duty" and first.height == second.height
     svg = first.svg()
     assert all(f">{name}<" in svg for name in ("cruise", "take-off", "over the duty"))
     assert svg.count('class="mark"') == 4 and "idle " * 20 not in svg
-    assert gain_stills(summary()) == []
+    assert gain_stills(restored(summary())) == []
 
 
 def test_clearances_in_operation_stand_at_each_point():
@@ -194,7 +194,10 @@ def test_a_ratio_has_no_unit_anywhere():
     """Unit: tables, headings and pictures call a worst ratio one; a limit at a point keeps its unit."""
     record = over_duty()
     record["limits"] = {f"idle: {IMPACT}": record["limits"][f"idle: {POWER}"]}
-    record["confirmation"]["pick"]["limits"] = record["limits"]
+    (limit,) = record["limits"].values()
+    every = [{"response": f"idle: {IMPACT}", **limit}]
+    for name in ("baseline", "pick"):
+        record["confirmation"][name] |= {"limits": record["limits"], "every_limit": every}
     whole = terminal.text(blocks(record), Detail.ALL, 200)
     assert "impact force, worst ratio" in whole and "idle: impact force [N] ≤ 30" in whole
     assert "impact force [N]" not in whole.replace("idle: impact force [N]", "")
@@ -205,7 +208,7 @@ def test_a_ratio_has_no_unit_anywhere():
 
 def test_the_table_has_a_row_a_response_at_a_point():
     """Unit: duty_points.csv has baseline, pick, gain, cost of the compromise and verdict on limits of each."""
-    rows = duty_rows(restored(over_duty()))
+    rows = duty_figures(restored(over_duty())).records
     assert [(row["point"], row["response"]) for row in rows[:3]] == [
         ("idle", IMPACT),
         ("idle", POWER),
@@ -214,7 +217,7 @@ def test_the_table_has_a_row_a_response_at_a_point():
     assert rows[1] == {
         "point": "idle", "share": 0.25, "response": POWER, "baseline": 20.0, "pick": 10.0, "baseline_error": 0.5,
         "pick_error": 0.5, "improvement_percent": 11.16, "improvement_error_percent": 0.65, "verdict": "better",
-        "own_pick_percent": 11.16, "own_pick_error_percent": 0.65, "limit_verdict": "kept",
+        "own_pick_percent": 0.5, "own_pick_error_percent": 0.65, "limit_verdict": "kept",
     }  # fmt: skip
 
 
@@ -222,7 +225,7 @@ def test_the_manual_describes_every_column():
     """Report: the chapter on tables names each column of duty_points.csv."""
     text = (ROOT / "doe" / "manual" / "67_study_tables.md").read_text(encoding="utf-8")
     section = text.partition("### duty_points.csv")[2].partition("###")[0]
-    assert set(duty_rows(restored(over_duty()))[0]) == set(re.findall("`([^`]+)`", section))
+    assert set(duty_figures(restored(over_duty())).records[0]) == set(re.findall("`([^`]+)`", section))
 
 
 @pytest.mark.parametrize("width", [80, 60, 40])

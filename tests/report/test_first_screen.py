@@ -47,8 +47,14 @@ def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
     record = summary()
     limit = {"sense": "<=", "bound": 260.0, "value": 231.0, "error": 1.0, "verdict": verdict, "probability": 0.99}
     for name in ("baseline", "pick"):
-        record["confirmation"][name]["limits"] = {RESPONSES[2]: limit}
+        record["confirmation"][name] |= {
+            "limits": {RESPONSES[2]: limit},
+            "every_limit": [{"response": RESPONSES[2], **limit}],
+        }
     words = {"kept": "Limit kept", "broken": "LIMIT BROKEN", "undecided": "LIMIT UNDECIDED"}[verdict]
+    if verdict != "kept":
+        missed = {"point": None, "excess": 1.0, "relaxed": 261.0, "response": RESPONSES[2], **limit}
+        record["obstacles"] = record["obstacles"] | {"limits": [missed]}
     command = "The probability over the unknown inputs is computed by: doe study study.toml --robust."
     record["limits_sentence"] = f"{words} at the pick. {'' if odds else command}".strip()
     record["limits"] = {RESPONSES[2]: {**limit, "odds": odds}}
@@ -94,8 +100,6 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
     ("record", "words", "role"),
     [
         (limited(), "Every limit is kept at the pick.", "statement"),
-        (limited("broken"), "LIMIT BROKEN at the pick.", "warning"),
-        (limited("undecided"), "LIMIT UNDECIDED at the pick.", "warning"),
         (limited(odds=[0.57, 0.51, 0.63]), "Limit kept at the pick.", "warning"),
         (limited(odds=[0.97, 0.93, 0.99]), "Every limit is kept at the pick and over the unknown inputs.", "statement"),
     ],
@@ -103,6 +107,13 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
 def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(record, words, role):
     (judged,) = [role for text, role in roles(record).items() if text.startswith(words)]
     assert judged == role
+
+
+@pytest.mark.parametrize("verdict", ["broken", "undecided"])
+def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
+    text = answer_text(limited(verdict))
+    assert "at the pick. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
+    assert "doe study study.toml --robust states the odds over the unknown inputs." in text
 
 
 @pytest.mark.parametrize(
@@ -118,7 +129,9 @@ def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(
 def test_a_loss_or_no_gain_is_no_good_news(verdicts, words, role):
     record = summary()
     for gain, verdict in zip(RESPONSES, verdicts.split(), strict=True):
-        record["gains"][gain] = record["gains"][gain] | {"verdict": verdict.replace("within", "within error")}
+        record["gains"][gain] = record["gains"][gain] | {
+            "percent": {"better": 11.0, "worse": -11.0, "within": 0.1}[verdict]
+        }
     record["statement"] = f"Simulated changes: {words}."
     assert roles(record)[record["statement"]] == role
 

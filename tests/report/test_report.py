@@ -26,7 +26,7 @@ from doe.report.still import Still
 from doe.unknown.decision import Better
 from doe.unknown.propagation import Share
 from doe.workflow.judgement import Robust, RobustFront, RobustPoint
-from doe.workflow.pick import Outward
+from doe.workflow.pick import BeyondBound, Outward
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
@@ -138,7 +138,11 @@ def test_pick_is_the_one_that_the_study_stands_by():
     aware = record["front"]["front"][9]
     record["front"]["picks"]["tolerance_aware"] = aware
     record["pick"] = {name: round(x, 3) for name, x in aware["factors"].items()}
-    record["confirmation"]["pick"] |= {"factors": record["pick"], "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}}}
+    record["confirmation"]["pick"] |= {
+        "factors": record["pick"],
+        "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}},
+        "statement": "",
+    }
     record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
     record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {"factors": plain["factors"]}
     text = html_report(record)
@@ -184,7 +188,6 @@ def test_nan_never_appears():
     fit = record["fit"]["responses"][RESPONSES[0]]
     fit["r2"] = fit["diagnostics"]["runs"][0]["cook"] = None
     record["design"]["points"][0]["responses"][RESPONSES[0]] = {"value": float("nan"), "error": float("nan")}
-    record["gains"][RESPONSES[1]] = {"percent": 3.0, "error_percent": float("inf"), "verdict": "within error"}
     record["front"]["front"][0]["responses"][RESPONSES[0]] = float("nan")
     text = html_report(record, motion())
     told = " ".join(Outline(text).words) + json.dumps(data_of(text))
@@ -305,8 +308,10 @@ def test_error_bars_end_at_the_frame():
 
 
 def test_beyond_the_edge_each_response_has_direction_and_unit():
-    gains = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
-    told = Outward("guide_clearance_mm", "upper", 0.25, "µm", "simulation", gains, {"cage_speed_rpm": "max"}).sentence
+    figures = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
+    gains = {name: BeyondBound(*figure) for name, figure in figures.items()}
+    outward = Outward("upper", 0.25, "µm", "simulation", gains)
+    told = outward.sentence("guide_clearance_mm", {"cage_speed_rpm": "max"})
     assert (
         "The pick is at the upper bound of guide_clearance_mm, 0.25 mm. Extrapolated change per µm beyond it by simulation"
         in told

@@ -136,10 +136,11 @@ def obstacles(verdict: str | None, reachable: bool = True, chains: dict[str, str
 
 def test_unit_dangers_of_a_choice():
     """Unit: a response worse beyond its error, a broken or undecided limit, a chain that misses; a kept one is no note."""
-    gains = [Gain("power_loss_W", -3.0, 1.0), Gain("impact_force_N", -0.5, 1.0), Gain("cage_slip", 4.0, 1.0)]
+    gains = {"power_loss_W": Gain(-3.0, 1.0), "impact_force_N": Gain(-0.5, 1.0), "cage_slip": Gain(4.0, 1.0)}
     (worse,) = worse_notes(gains)
     assert (worse.code, worse) == ("worse", "the pick is worse than the baseline: power loss 3.0 ± 1.0 % more")
-    assert worse_notes(gains[1:]) == ()
+    del gains["power_loss_W"]
+    assert worse_notes(gains) == ()
     found = obstacles("broken", chains={"guide": "misses"}).notes
     assert {note.code for note in found} == {"broken-limit", "missed-chain"}
     assert found[0].startswith("Limit power loss <= 250 W is missed by 5.0 ± 1.0 W") and "guide: misses" in found[-1]

@@ -64,9 +64,9 @@ def test_closed_form_of_joint_degrees_of_freedom():
 
 def test_limit_case_of_known_errors_is_normal():
     """Limit case: with infinitely many degrees of freedom all is as with normal errors; few make it wider."""
-    gain = Gain("force", 9.0, 8.0)
+    gain = Gain(9.0, 8.0)
     assert gain.error_among(2) == pytest.approx(8.0 * special.ndtri(0.9875) / special.ndtri(0.975))
-    assert Gain("force", 9.0, 8.0, freedom=3.0).error_among(2) > gain.error_among(2)
+    assert Gain(9.0, 8.0, freedom=3.0).error_among(2) > gain.error_among(2)
     assert "freedom" not in gain.as_dict()
     assert one_sided(np.inf, 0.95) == pytest.approx(1.6449 / 1.96, abs=1e-4)
     for freedom in (2.0, np.inf):

@@ -200,11 +200,11 @@ def test_the_corners_say_before_the_design_ends_what_is_likely(bound, unlikely, 
 )
 def test_unit_a_limit_is_relaxed_to_what_the_value_keeps(value, error, sense, kept):
     """Unit: rounded away from the value, so that the printed bound is kept with the probability demanded."""
-    limit = Limit("impact_force_N", sense, 40.0 if sense == "<=" else 120.0, value, error, 1.6449 / 1.96)
+    limit = Limit.judged("impact_force_N", sense, 40.0 if sense == "<=" else 120.0, value, error, 1.6449 / 1.96)
     assert limit.keepable == pytest.approx(kept, rel=1e-2)
-    assert Limit("impact_force_N", sense, limit.keepable, value, error, 1.6449 / 1.96).verdict == "kept"
+    assert Limit.judged("impact_force_N", sense, limit.keepable, value, error, 1.6449 / 1.96).verdict == "kept"
     assert abs(limit.keepable - value) < 2.0 * error + 0.02 * value
-    assert np.isnan(Limit("cage_slip", sense, 1.0, np.nan, np.nan, 0.8).keepable), "nothing is reported"
+    assert np.isnan(Limit.judged("cage_slip", sense, 1.0, np.nan, np.nan, 0.8).keepable), "nothing is reported"
 
 
 @pytest.mark.parametrize(
@@ -235,7 +235,7 @@ def test_a_published_table_is_compared_by_the_columns_that_it_has(tmp_path, monk
     )
     assert np.isnan(table.values).all(axis=0).tolist() == [False, False, False, True]
     outcome = run_study(study, tmp_path, 1, lambda title: silent)
-    assert [row.response for row in outcome.published_comparisons] == study.responses[:3]
+    assert [*outcome.published_comparisons] == study.responses[:3]
     assert any("cage_slip" in note for note in outcome.notes)
 
 

@@ -157,7 +157,7 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
     assert third.face == face and third.more == third.less == third.turn == []
     outcome = SimpleNamespace(
         study=study, adaptive=adaptive, pick=SimpleNamespace(point=centre + half * np.array([0.2, 0.0, 0.98])),
-        limits=[Limit("power_loss_W", "<=", 6.0, 5.0, 0.1, 0.8), Limit("impact_force_N", "<=", 0.02, 0.0, 0.01, 0.8)],
+        limits=[Limit.judged("power_loss_W", "<=", 6.0, 5.0, 0.1, 0.8), Limit.judged("impact_force_N", "<=", 0.02, 0.0, 0.01, 0.8)],
         chains={"guide": SimpleNamespace(refused=False), "pocket": SimpleNamespace(refused=True)},
     )  # fmt: skip
     told = limiting_sentence(outcome)

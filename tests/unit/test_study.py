@@ -123,17 +123,17 @@ def test_centre_runs_differ_by_seed_only(finished):
 def test_stands_beside_the_published_table(finished):
     outcome, _, _ = finished
     theirs = reference_runs(outcome.study)
-    assert [row.response for row in outcome.published_comparisons] == outcome.study.responses
-    for row in outcome.published_comparisons:
-        column = outcome.study.responses.index(row.response)
+    assert [*outcome.published_comparisons] == outcome.study.responses
+    for name, row in outcome.published_comparisons.items():
+        column = outcome.study.responses.index(name)
         ranks = [np.argsort(np.argsort(runs.values[:, column])) for runs in (outcome.runs, theirs)]
         assert row.rank_correlation == pytest.approx(np.corrcoef(ranks)[0, 1], abs=2e-2)  # some of theirs are equal
-        assert row.verdict.startswith(row.response)
+        assert row.verdict.startswith(name)
         assert row.why
     # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
-    impact = outcome.published_comparisons[0]
-    assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
-    assert all(effect.theirs > 0.0 and effect.theirs_significant for effect in impact.effects.values())
+    impact = outcome.published_comparisons["impact_force_N"]
+    assert impact.theirs_min_mean_max == pytest.approx((145.6, 203.7, 278.2))
+    assert all(effect.theirs > 0.0 and effect.theirs_significant for effect in impact.linear_effects.values())
 
 
 def test_nothing_runs_twice(finished, monkeypatch):
@@ -244,9 +244,9 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
     baseline = Confirmed(study.baseline, np.array([100.0, 1.0, 50.0]), np.array([3.0, 0.0, 0.0]), none)
     pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
     found = gains(study, baseline, pick)
-    assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
-    assert found[0].response == "impact_force_N"
-    assert (found[0].percent, found[0].error) == (pytest.approx(4.0), pytest.approx(5.0))
+    assert [gain.verdict for gain in found.values()] == ["within error", "better", "worse"]
+    gain = found["impact_force_N"]
+    assert (gain.percent, gain.error_percent) == (pytest.approx(4.0), pytest.approx(5.0))
 
 
 def test_key_follows_scene_and_version(tmp_path):

@@ -33,10 +33,10 @@ def simulations(store: Store, retry: bool = False) -> Simulations:
 
 def test_gains_are_real_only_beyond_their_joint_error():
     """Closed form: for two responses the joint intervals are 2.2414 / 1.9600 times as wide."""
-    text = statement([Gain("force", 9.0, 8.0), Gain("loss", 3.0, 1.0)])
+    text = statement({"force": Gain(9.0, 8.0), "loss": Gain(3.0, 1.0)})
     assert "force 9.0 ± 9.1 % less: inside its own noise: no gain is shown" in text
     assert "loss 3.0 ± 1.1 % less: real, more than its error" in text
-    assert "a real loss" in statement([Gain("force", -9.0, 2.0)])
+    assert "a real loss" in statement({"force": Gain(-9.0, 2.0)})
 
 
 def test_a_target_is_gained_by_coming_nearer(tmp_path):
@@ -44,7 +44,7 @@ def test_a_target_is_gained_by_coming_nearer(tmp_path):
     study, _ = fitted(tmp_path, (f'{loss}"min"', f'{loss}"target"\ntarget = 40.0'))
     none = np.zeros(3)
     base, pick = (Confirmed(study.baseline, np.array([1.0, 1.0, loss]), none, none) for loss in (50.0, 35.0))
-    assert gains(study, base, pick)[2].percent == pytest.approx(10.0)
+    assert list(gains(study, base, pick).values())[2].percent == pytest.approx(10.0)
 
 
 def test_points_that_a_drawing_cannot_tell_apart_are_confirmed_once(tmp_path):

@@ -43,7 +43,7 @@ def limited_study(folder, limit="upper = 35.0", more=()):
 
 
 def limit(value, error, bound=90.0, sense="<=", probability=1.6449 / 1.96):
-    return Limit("force", sense, bound, value, error, probability)
+    return Limit.judged("force", sense, bound, value, error, probability)
 
 
 @pytest.mark.parametrize(
@@ -169,17 +169,17 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     ]
     pick = Confirmed(corner, np.ones(3), np.zeros(3), np.zeros(3))
     edge = edge_of(study, surfaces, pick, np.array([corner, study.centre]), None, None)
-    (outward,) = edge.outward
-    assert (outward.factor, outward.side, outward.unit) == ("guide_clearance_mm", "upper", "µm")
+    ((factor, outward),) = edge.factors.items()
+    assert (factor, outward.side, outward.per) == ("guide_clearance_mm", "upper", "µm")
     # Two a coded unit of 50 µm.
-    gain, error = outward.gains["impact_force_N"]
+    gain, error = outward.gains["impact_force_N"].value, outward.gains["impact_force_N"].error
     assert gain == pytest.approx(0.04, rel=1e-4) and error < 1e-6
     assert (
         "The pick is at the upper bound of guide_clearance_mm, " in edge.sentence
         and "50 % of the front" in edge.sentence
     )
     inside = SimpleNamespace(point=study.centre)
-    assert not edge_of(study, surfaces, inside, study.centre[None], None, None).outward
+    assert not edge_of(study, surfaces, inside, study.centre[None], None, None).factors
 
 
 def test_unit_one_rule_says_where_a_point_lies(tmp_path):

@@ -146,7 +146,6 @@ def test_closed_form_of_the_interval_of_one_linear_limit():
     share = (1.0 + (1.0 - errors) / half).clip(0.0, 2.0) / 2.0
     # The shortest interval of these shares, which pile up at 1.
     assert found.interval.high == 1.0 and found.interval.low == pytest.approx(np.quantile(share, 0.05), abs=0.02)
-    assert found.as_dict(["x"])["x"]["interval"] == list(found.interval)
     assert f"({found.interval.words}) of the parts" in found.sentence
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from chains import chain
 from conftest import EXAMPLE
 from pareto_cases import TOLERANCES, edited_study
+from synthetic_study import summary
 
 from doe.dimension_chain import solve
 from doe.report.sections.answer import first_screen
 from doe.report.sections.chain import chain_tables
+from doe.report.summary import restored
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed
+from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty
 from doe.workflow.front import draws_of
-from doe.workflow.parts import FINER, Part, SharedTolerance, clearance_parts, grade_of_parts, grades_of
+from doe.workflow.parts import FINER, Part, PartWidth, SharedTolerance, clearance_parts, grade_of_parts, grades_of
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import fit_surfaces
 from doe.workflow.tolerances import widest_tolerances_of
@@ -59,7 +64,7 @@ def widest(planes, confirmed=None, point=PICK, **settings):
 
 def counted(found):
     """Names of the responses whose gains count."""
-    return {name for name, gain in found.gains_record().items() if gain["counts"]}
+    return {name for name, gain in found.by_gain.items() if gain.counts}
 
 
 def test_unit_small_gains_do_not_count(planes):
@@ -70,7 +75,7 @@ def test_unit_small_gains_do_not_count(planes):
         "A gain counts from 3 times the smallest difference that matters, 1 %; power loss 0.60 % less does not."
         in found.sentence
     )
-    low, high = found.gains_record()[LOSS]["parts_percent"]
+    low, high = found.by_gain[LOSS].parts_percent
     # 1.2 % a coded unit: 95 % of evenly spread parts are within 0.95 of the half width.
     half = 0.95 * 1.2 * found.half_widths[0] / 0.005
     assert (low, high) == pytest.approx((0.6 - half, 0.6 + half), rel=0.02)
@@ -107,8 +112,8 @@ def test_closed_form_of_a_gain_at_least(planes):
         assert found.half_widths[1] == pytest.approx(room / 0.9 * 0.05, rel=0.01)
     assert "[tolerances] does not name whirl deviation ratio 10.00 % less, power loss 0.60 % less." in found.sentence
     both = widest(planes, gains=[WHIRL], at_least={IMPACT: 5.0})
-    assert both.gains_record()[IMPACT]["at_least_percent"] == 5.0
-    assert both.gains_record()[WHIRL]["at_least_percent"] == pytest.approx(5.0)
+    assert both.by_gain[IMPACT].at_least_percent == 5.0
+    assert both.by_gain[WHIRL].at_least_percent == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize(
@@ -130,15 +135,15 @@ def test_unit_warning_names_the_gain_and_the_width_without_it(planes):
     """Unit: 0.6 % of loss demands raceways of a fine grade; without it the tolerance is that of the other gains."""
     found, without = widest(planes, gains=[IMPACT, WHIRL, LOSS], at_least={LOSS: 0.5}), widest(planes)
     assert found.limiting_gain == LOSS and "radial_clearance_mm" in found.too_fine
-    record = found.as_dict()["radial_clearance_mm"]
-    assert record["without_limiting_gain"]["gain"] == LOSS
-    assert record["without_limiting_gain"]["half_width"] == pytest.approx(without.half_widths[0])
-    assert record["without_limiting_gain"]["grade"] == without.grades["radial_clearance_mm"].name
+    record = found.by_factor["radial_clearance_mm"]
+    assert record.without_limiting_gain.gain == LOSS
+    assert record.without_limiting_gain.half_width == pytest.approx(without.half_widths[0])
+    assert record.without_limiting_gain.grade == without.grades["radial_clearance_mm"].name
     assert found.warning.startswith(
         "The gain of power loss demands parts finer than IT4: radial clearance within ± 0.0"
     )
     assert (
-        f"({record['grade']})" in found.warning
+        f"({record.grade})" in found.warning
         and "Without the gain of power loss the tolerance would be" in found.warning
     )
     assert "power loss 0." in found.warning.partition("in 95 % of the parts: ")[2]
@@ -160,10 +165,8 @@ def test_literature_grades_of_iso_286(size, width, grade):
 def test_unit_parts_share_a_tolerance():
     """Unit: land and cage of 50 mm have IT6, 16 um each, of 32 um; a graded part takes its own first."""
     pair = (Part("land", 1.0, 50.0, "drawing"), Part("cage", -1.0, 49.8, "drawing"))
-    assert SharedTolerance(pair).grade(0.032).as_dict() == {
-        "grade": "IT6",
-        "parts": {"land": {"nominal_mm": 50.0, "width_mm": 0.016}, "cage": {"nominal_mm": 49.8, "width_mm": 0.016}},
-    }
+    grade = SharedTolerance(pair).grade(0.032)
+    assert grade.name == "IT6" and grade.parts == {"land": PartWidth(50.0, 0.016), "cage": PartWidth(49.8, 0.016)}
     assert SharedTolerance(pair, (0.004,)).grade(0.032).name == "IT5"
 
 
@@ -176,7 +179,7 @@ def test_unit_parts_are_those_of_the_chain_or_the_scene(tmp_path):
     grades = grades_of(study, scene, study.baseline, np.array([0.0105, 0.016, 0.004]))
     # 21 um less 4 um of rollers: raceways of 52.5 and 34.5 mm have 8 + 7 um in IT4.
     assert (grades["radial_clearance_mm"].name, grades["guide_clearance_mm"].name) == ("IT4", "IT6")
-    assert set(grades["pocket_clearance_mm"].widths) == {"pocket_width", "roller_diameter"}
+    assert set(grades["pocket_clearance_mm"].parts) == {"pocket_width", "roller_diameter"}
     assert grades["pocket_clearance_mm"].name == "IT4"
     assert not grades["radial_clearance_mm"].finer_than(4) and grades["radial_clearance_mm"].finer_than(5)
     assert "radial_clearance_mm" not in grades_of(study, scene, study.baseline, np.array([np.nan, 0.016, 0.004]))
@@ -229,27 +232,17 @@ def test_unit_a_tolerance_has_the_grades_of_the_parts_to_make():
     # IT3 takes 6 + 5 um of 14, IT4 10 + 8: the smaller raceway may have the wider grade.
     assert [part.grade for part in solved.parts] == ["IT3", "IT4"]
     assert (grade.name, grade.place) == ("IT3 and IT4", 4) and grade.finer_than(4) and not grade.finer_than(3)
-    record = {
-        "asked": {
-            "factors": [{"letter": "A", "name": "radial_clearance_mm", "key": RADIAL, "centre": 10.0, "step": 0.1}]
-        },
-        "pick": {"radial_clearance_mm": 10.0},
-        "chains": {"radial": solved.as_dict()},
-        "made": {"radial_clearance_mm": {"half_width": 0.007, "grade": grade.name, "chain": "radial"}},
-        "tolerances": {"radial_clearance_mm": {"half_width": 0.0073, "grade": "IT3"}},
-        "duty": {
-            "points": [
-                {
-                    "name": name,
-                    "share": 0.5,
-                    "operating_clearances_mm": {"radial_clearance_mm": {"baseline": play, "pick": play - 1.0}},
-                }
-                for name, play in (("cruise", 9.95), ("take-off", 9.75))
-            ]
-        },
-        "operating_clearances_mm": {"radial_clearance_mm": {"baseline": 9.95, "pick": 8.95}},
-    }
-    screen = text(first_screen(record))
+    record = summary()
+    record["made"] = {"radial_clearance_mm": {"half_width": 0.007, "grade": grade.name, "chain": "radial"}}
+    record["operating_clearances_mm"] = {"radial_clearance_mm": {"baseline": 9.95, "pick": 8.95}}
+    record["asked"]["factors"][0]["resolution"] = 0.001
+    points = [
+        AtPoint(name, 0.5, [], {}, {}, {}, None, "", {"radial_clearance_mm": {"baseline": play, "pick": play - 1.0}})
+        for name, play in (("cruise", 9.95), ("take-off", 9.75))
+    ]
+    life = LifeOverDuty(None, None, None, {}, {})
+    duty = DutyAnswer(points, {}, {"baseline": {}, "pick": {}}, {"baseline": life, "pick": life})
+    screen = text(first_screen(replace(restored(record), duty=duty)))
     card = next(line for line in screen.splitlines() if line.strip().startswith("radial clearance"))
     assert "± 0.0070 " in card and card.rstrip().endswith("IT3 and IT4") and " 8.750 " in card
     assert "They are the least over the duty: at take-off." in screen
@@ -283,5 +276,5 @@ def test_unit_an_estimate_is_marked_on_drawing_table_and_report():
     assert first.text.startswith("≈ 61.333 ") and not second.text.startswith("≈")
     rows = chain_tables({"guide": solved})["part_dimensions.csv"]
     assert [row["estimated"] for row in rows] == [True, False]
-    shown = text(first_screen({"chains": {"guide": solved.as_dict()}}))
+    shown = text(first_screen(restored(summary() | {"chains": {"guide": solved.as_dict()}})))
     assert f"≈ estimated: {first.name} 61.333 mm; state it before the part is drawn." in shown

@@ -13,39 +13,25 @@ from doe.report.sections.record import (
     LIMITS,
     SENSES,
     SIGNS_NOTE,
-    VERDICTS,
-    Factor,
-    Record,
     change,
     dimension,
-    factors,
     moved,
     nearest,
     of_hundred,
     part,
-    responses,
     share_with_interval,
     sign_of,
     signed,
     sizes,
-    value_text,
 )
-from doe.workflow.asked import Response, Settings
-from doe.workflow.confirmation import (
-    LOSS,
-    NOISE,
-    REAL,
-    Confirmed,
-    Gain,
-    Limit,
-    every_limit,
-    limits_of,
-    point_words,
-    statement,
-)
+from doe.report.summary import Summary
+from doe.workflow.asked import Factor, Response
+from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
+from doe.workflow.parts import Made
+from doe.workflow.pick import Edge
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import PredictedGain
-from doe.workflow.whole import StudyResult
+from doe.workflow.tolerances import FactorTolerance
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import identity_line
@@ -66,12 +52,12 @@ SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
 LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
 
 
-def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def answer(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
     """What an engineer acts on, in the order of a first screen."""
     return Section("answer", "The answer", first_screen(summary))
 
 
-def first_screen(summary: Record) -> list[Block]:
+def first_screen(summary: Summary) -> list[Block]:
     """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point.
 
     Over a duty the verdicts at each of its points follow the gains.
@@ -87,29 +73,28 @@ def first_screen(summary: Record) -> list[Block]:
     ]
 
 
-def _judged(summary: Record) -> list[Block]:
+def _judged(summary: Summary) -> list[Block]:
     """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
-    limits = list((part(summary, "limits") or {}).values())
-    odds = [limit["odds"][0] for limit in limits if limit.get("odds")]
-    kept = summary.status in ("ok", "missed") and all(limit.get("verdict") == "kept" for limit in limits)
-    sentence = part(summary, "limits_sentence") or ""
-    if not kept or min(odds, default=1.0) < NEARLY_ALL:
-        return [_limits_judged(summary), Paragraph(sentence, "warning")]
+    odds = [limit.odds.value for limit in summary.limits.values() if limit.odds]
+    table = _limits_judged(summary)
+    if summary.obstacles.limits or not summary.limits:
+        # The dangers above say which limits are missed, and by how much.
+        return [table, *([_command_for_odds(summary)] if summary.limits else ())]
+    if min(odds, default=1.0) < NEARLY_ALL:
+        return [table, Paragraph(summary.limits_sentence, "warning")]
     everywhere = " and over the unknown inputs" if odds else ""
-    verdict = Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement")
-    return [_limits_judged(summary), *([verdict, _command_for_odds(summary)] if sentence else ())]
+    return [table, Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement"), _command_for_odds(summary)]
 
 
-def _command_for_odds(summary: Record) -> Paragraph:
+def _command_for_odds(summary: Summary) -> Paragraph:
     """The command that states the odds, where these are unknown."""
     command = f"doe study {summary.asked.study_file} --robust"
     return Paragraph("" if summary.robust else f"{command} states the odds over the unknown inputs.")
 
 
-def _gained(summary: Record) -> list[Block]:
+def _gained(summary: Summary) -> list[Block]:
     """The gains with their verdicts, and the odds of them over the unknown inputs or the command that computes these."""
-    text = gains_statement(summary)
-    robust = summary.robust
+    text, robust = summary.statement, summary.robust
     sentences = robust.sentences if robust else []
     # Only the first two sentences are verdicts: the odds of the gains, and what decides.
     first: Role = "statement" if robust and robust.better.all.value >= NEARLY_ALL else "warning"
@@ -117,48 +102,46 @@ def _gained(summary: Record) -> list[Block]:
     further: list[Role] = [""] * len(sentences)
     return [
         _gains(summary),
-        Paragraph(text, _role_of_gains(summary, text)),
+        Paragraph(text, _role_of_gains(summary.gains, text)),
         *(Paragraph(sentence, role) for sentence, role in zip(sentences, [first, second, *further], strict=False)),
         _robust_points(summary),
-        *([] if part(summary, "limits_sentence") or not text else [_command_for_odds(summary)]),
-        Paragraph(part(summary, "whirl_sentence") or "", "warning"),
+        *([] if summary.limits else [_command_for_odds(summary)]),
+        Paragraph(summary.whirl_sentence, "warning"),
     ]
 
 
-def _role_of_gains(summary: Record, text: str) -> Role:
+def _role_of_gains(gains: Mapping[str, Gain], text: str) -> Role:
     """Good news only where every gain is real; a loss, or no gain at all, is bad news."""
-    verdicts = {gain.get("verdict") for gain in (part(summary, "gains") or {}).values()} or {"better"}
+    verdicts = {gain.verdict for gain in gains.values()} or {"better"}
     if "worse" in verdicts or LOSS in text or "better" not in verdicts or (NOISE in text and REAL not in text):
         return "warning"
     return "" if "within error" in verdicts or NOISE in text else "statement"
 
 
-def _reasons(summary: Record) -> list[Block]:
+def _reasons(summary: Summary) -> list[Block]:
     """Why this point and no other one, what limits it, and where it lies."""
-    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     search = part(summary, "adaptive", "sentences") or [""]
     return [
-        Paragraph(f"Why this point: {reason}." if reason else ""),
+        Paragraph(f"Why this point: {summary.confirmation['pick'].reason}."),
         Paragraph(search[0]),
-        *(Paragraph(sentence) for sentence in part(summary, "rivals_sentences") or []),
+        *map(Paragraph, summary.rivals_sentences),
         Paragraph(part(summary, "adaptive", "held") or ""),
-        Paragraph(_edge(summary)),
+        Paragraph(_edge(summary.edge)),
     ]
 
 
-def _edge(summary: Record) -> str:
+def _edge(edge: Edge) -> str:
     """Where the pick lies in the region; the change beyond a bound is in the section of the confirmation."""
     bounds = [
-        f"the {bound['side']} bound of {name}, {shown(bound['bound'])} {quantity(name)[1]}".rstrip()
-        for name, bound in (part(summary, "edge", "factors") or {}).items()
+        f"the {bound.side} bound of {name}, {shown(bound.bound)} {quantity(name)[1]}".rstrip()
+        for name, bound in edge.factors.items()
     ]
-    whole = part(summary, "edge", "sentence") or ""
     if bounds:
         return f"The pick is at {' and '.join(bounds)}: a wider design may find more."
-    return f"{whole.partition('; ')[0].rstrip('.')}." if whole else ""
+    return f"{edge.sentence.partition('; ')[0].rstrip('.')}."
 
 
-def _parts_to_make(summary: Record) -> list[Block]:
+def _parts_to_make(summary: Summary) -> list[Block]:
     """Parts of every dimension chain, and what a refused one takes and needs; all else is in a section of its own."""
     chains = part(summary, "chains") or {}
     parts = {name: sizes(chain, "parts") or sizes(chain) for name, chain in chains.items()}
@@ -178,65 +161,56 @@ def _parts_to_make(summary: Record) -> list[Block]:
     ]
 
 
-def _clearances(summary: Record) -> list[Block]:
+def _clearances(summary: Summary) -> list[Block]:
     """The pick with its tolerances next to the baseline, the meaning of its clearances, and the class of the bearing."""
-    pick = part(summary, "pick") or {}
-    tiles = [_tile(summary, factor, pick) for factor in factors(summary) if factor.name in pick]
-    plays = [CLEARANCES[factor.key] for factor in factors(summary) if factor.key in CLEARANCES]
-    meaning = f"Clearances: {', '.join(plays)}." if tiles and plays else ""
-    if meaning and part(summary, "operating_clearances_mm"):
+    inputs = [factor for factor in summary.asked.factors if factor.name in summary.pick]
+    plays = [CLEARANCES[factor.key] for factor in inputs if factor.key in CLEARANCES]
+    meaning = f"Clearances: {', '.join(plays)}." if plays else ""
+    if meaning and summary.operating_clearances_mm:
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
         meaning += least_words(summary)
-    sentence = part(summary, "tolerances_sentence")
+    widest = summary.tolerances_sentence
     return [
-        Tiles("Chosen clearances", "pick", tiles),
-        Paragraph(part(summary, "clearance_class") or ""),
+        Tiles("Chosen clearances", "pick", [_tile(summary, factor) for factor in inputs]),
+        Paragraph(summary.clearance_class),
         Paragraph(meaning, "small"),
-        *_temperatures(summary),
-        Paragraph(
-            "" if part(summary, "obstacles", "tolerances") else part(summary, "tolerances_warning") or "", "warning"
-        ),
-        Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(sentence)[:2])}" if sentence else ""),
+        *_temperatures(summary.confirmation),
+        Paragraph("" if summary.obstacles.tolerances else summary.tolerances_warning or "", "warning"),
+        Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(widest)[:2])}" if widest else ""),
     ]
 
 
-def _temperatures(summary: Record) -> list[Block]:
+def _temperatures(points: Mapping[str, ConfirmedPoint]) -> list[Block]:
     """Steady temperatures at baseline and pick, and what the inputs of the heat balance leave open; nothing without a balance."""
-    baseline, pick = (part(summary, "confirmation", name, "temperatures_C") or {} for name in ("baseline", "pick"))
-    ranges = part(summary, "confirmation", "pick", "thermal", "ranges")
+    baseline, pick = points["baseline"].temperatures_C, points["pick"].temperatures_C
+    if baseline is None or pick is None:
+        return []
+    balance = points["pick"].thermal
+    ranges = None if balance is None else balance.ranges
     rows = [
-        (
-            quantity(name)[0],
-            _plain(baseline.get(name)),
-            _plain(figure),
-            range_ends(ranges[TEMPERATURES[name]]) if ranges else "",
-        )
+        (quantity(name)[0], baseline[name].text, figure.text, range_ends(ranges[TEMPERATURES[name]]) if ranges else "")
         for name, figure in pick.items()
     ]
     header = ("steady state [°C]", "baseline", "pick", "pick over inputs (90 %)")
     note = "Inputs: unknown conductances, shares of the heat and level of the loss. Errors: of the simulation (95 %)."
     others = [Paragraph(f"The pick {other_ranges(ranges)}.", "small")] if ranges else []
-    return [Table("Temperatures", header, rows, note), *others] if rows else []
+    return [Table("Temperatures", header, rows, note), *others]
 
 
-def _plain(figure: Record | None) -> str:
-    return with_error(figure["value"], figure["error"]) if figure else ""
-
-
-def _robust_points(summary: Record) -> Table:
+def _robust_points(summary: Summary) -> Table:
     """Pick and points of the robust front: the gain that holds over the unknown inputs, and in how many cases there is one."""
-    names = [response["name"] for response in responses(summary)]
+    names, inputs = summary.asked.names, summary.asked.factors
     front = summary.robust and summary.robust.front
     rows = [
         [
             point.name.removeprefix("robust "),
-            *(factor.text(point.factors[factor.name], 1) for factor in factors(summary)),
+            *(factor.text(point.factors[factor.name], 1) for factor in inputs),
             *(_gain_and_share(point.gains.get(name), point.better.gains.get(name)) for name in names),
             _gain_and_share(None, point.better.all),
         ]
         for point in (front.confirmed if front else ())
     ]
-    header = ("", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names), "all")
+    header = ("", *(label(factor.name) for factor in inputs), *(quantity(name)[0] for name in names), "all")
     note = "Gain over the baseline that holds over the unknown inputs, and in how many of 100 cases there is a gain."
     return Table("Over the unknown inputs", header, rows, note)
 
@@ -246,78 +220,63 @@ def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
     return "" if share is None else f"{gain_text}{of_hundred(share)}"
 
 
-def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
-    before = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors") or {}
+def _tile(summary: Summary, factor: Factor) -> Tile:
     tolerance = tolerance_of(summary, factor)
     further = {
         "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
-        "baseline": factor.text(before.get(factor.name)),
+        "baseline": factor.text(summary.confirmation["baseline"].factors[factor.name]),
         "in operation": factor.text(in_operation(summary, factor, "pick")[0]),
         "baseline in operation": factor.text(in_operation(summary, factor, "baseline")[0]),
     }
     entries = [entry for entry in further.items() if entry[1]]
-    grade = part(summary, "made", factor.name, "grade") or part(summary, "tolerances", factor.name, "grade")
+    grade = next((width.grade for width in _widths(summary, factor) if width.grade), None)
     remarks = [("grade of the parts", grade)] if grade else []
-    return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, entries, remarks)
+    return Tile(factor.words, factor.text(summary.pick[factor.name]), factor.unit, entries, remarks)
 
 
-def tolerance_of(summary: Record, factor: Factor) -> float | None:
+def _widths(summary: Summary, factor: Factor) -> list[Made | FactorTolerance]:
+    """What the parts of a factor are made to, and its widest tolerance."""
+    widths = (summary.made.get(factor.name), (summary.tolerances or {}).get(factor.name))
+    return [width for width in widths if width is not None]
+
+
+def tolerance_of(summary: Summary, factor: Factor) -> float | None:
     """Half-width of the tolerance of a factor: that its parts are made to, else the widened one of the pick, else as stated."""
-    return (
-        part(summary, "made", factor.name, "half_width")
-        or part(summary, "tolerances", factor.name, "half_width")
-        or factor.tolerance
-    )
+    return next((width.half_width for width in _widths(summary, factor) if width.half_width), factor.tolerance)
 
 
-def gains_statement(summary: Record) -> str:
-    """Whether the gain is real, in words."""
-    if summary.statement:
-        return str(summary.statement)
-    verdicts = [gain.get("verdict") for gain in (part(summary, "gains") or {}).values()]
-    if not verdicts:
-        return ""
-    counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in VERDICTS if verdict in verdicts]
-    return f"Of {len(verdicts)} responses, compared with their 95 % errors: {', '.join(counts)}."
-
-
-def _gains(summary: Record) -> Table:
-    gains = part(summary, "gains") or {}
-    before, after = (part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick"))
-    rows = [
-        (label(name), value_text(before.get(name)), value_text(after.get(name)), signed(gain))
-        for name, gain in gains.items()
-    ]
+def _gains(summary: Summary) -> Table:
+    before, after = (summary.confirmation[name].responses for name in ("baseline", "pick"))
+    rows = [(label(name), before[name].text, after[name].text, signed(gain)) for name, gain in summary.gains.items()]
     header = ("response", "baseline", "pick", "change")
-    where = " over the duty" if part(summary, "duty") else ""
+    where = " over the duty" if summary.duty else ""
     return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
 
 
-def limits(summary: Record) -> Table:
+def limits(summary: Summary) -> Table:
     """Limits judged by simulation at every confirmed point."""
     rows = [
-        (point_words(name), _bound(limit), with_error(limit.get("value"), limit.get("error")), *_verdict(limit))
-        for name, point in (part(summary, "confirmation") or {}).items()
-        for limit in _limits_of(point)
+        (point_words(name), _bound(limit), with_error(limit.value, limit.error), *_verdict(limit))
+        for name, point in summary.confirmation.items()
+        for limit in point.every_limit
     ]
     header = ("point", "limit", "simulated", "verdict", "probability")
     return Table("Limits judged by simulation, every point", header, rows, LIMITS_NOTE, text_columns=(1, 3))
 
 
-def _limits_judged(summary: Record) -> Table:
+def _limits_judged(summary: Summary) -> Table:
     """Every limit at the baseline and at the pick, and the odds that the pick keeps all those of a response."""
-    before, after = (_limits_of(part(summary, "confirmation", name) or {}) for name in ("baseline", "pick"))
+    before, after = (summary.confirmation[name].every_limit for name in ("baseline", "pick"))
     rows = []
-    for place, limit in enumerate(after):
-        base = before[place] if place < len(before) else {}
-        odds = part(summary, "limits", str(limit["response"]), "odds")
+    for limit, base in zip(after, before, strict=True):
+        odds = summary.limits[limit.response].odds
         rows.append(
             (
                 _bound(limit),
-                with_error(limit.get("value"), limit.get("error")),
+                with_error(limit.value, limit.error),
                 *_verdict(limit),
-                of_hundred(odds) if odds else "",
-                f"{_verdict(base)[0][:1]} {with_error(base.get('value'), base.get('error'))}".strip(),
+                odds.of_hundred if odds else "",
+                f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}",
             )
         )
     shares = "kept in 100 cases of unknown inputs"
@@ -325,25 +284,18 @@ def _limits_judged(summary: Record) -> Table:
     return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 
 
-def _limits_of(point: Record) -> list[Record]:
-    """Limits at a confirmed point, the lower and the upper one of a response apart where the record has both."""
-    every: list[Record] | None = point.get("every_limit")
-    return every or [{"response": name, **limit} for name, limit in (point.get("limits") or {}).items()]
+def _bound(limit: Limit) -> str:
+    return f"{label(limit.response)} {SENSES[limit.sense]} {shown(limit.bound)}"
 
 
-def _bound(limit: Record) -> str:
-    return f"{label(str(limit['response']))} {SENSES.get(str(limit.get('sense')), '')} {shown(limit.get('bound'))}"
-
-
-def _verdict(limit: Record) -> tuple[str, str]:
+def _verdict(limit: Limit) -> tuple[str, str]:
     """The verdict with its sign, and the probability of keeping the limit."""
-    probability = limit.get("probability")
-    return LIMITS.get(str(limit.get("verdict")), ""), "" if probability is None else chance(probability)
+    return LIMITS[limit.verdict], "" if limit.probability is None else chance(limit.probability)
 
 
-def settings(summary: Record, motion: Mapping[str, Any]) -> Section:
+def settings(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Factors, responses and scene as the study states them."""
-    asked: Settings = summary.asked
+    asked = summary.asked
     effort = (
         f"{shown(asked.replicates)} replicates per design run, {shown(asked.turns)} counted shaft turns per replicate, "
         f"{shown(asked.confirmation_replicates)} replicates per confirmed point"
@@ -388,158 +340,77 @@ def _goal(response: Response) -> tuple[str, str, str, str]:
     return goal, ", ".join(limits), shown(response.weight), response.model
 
 
-def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def confirmation(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Simulated responses at every confirmed point compared with those that the surfaces predicted."""
-    points = part(summary, "confirmation")
-    if not points:
-        return None
-    inputs = [
-        factor
-        for factor in factors(summary)
-        if any(part(point, "factors", factor.name) is not None for point in points.values())
-    ]
-    names = [response["name"] for response in responses(summary)]
-    header = ["point", *(label(factor.name) for factor in inputs), *map(label, names)]
+    points, asked = summary.confirmation, summary.asked
+    header = ["point", *map(label, asked.columns), *map(label, asked.names)]
     rows = [
         [
             point_words(name),
-            *(factor.text(part(point, "factors", factor.name)) for factor in inputs),
-            *(value_text(part(point, "responses", response)) for response in names),
+            *(factor.text(point.factors[factor.name]) for factor in asked.factors),
+            *(point.responses[response].text for response in asked.names),
         ]
         for name, point in points.items()
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
     if predictions := part(summary, "front", "predicted_gains"):
         # The surfaces predict the gains of their own pick, which another may have overtaken.
-        name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
-        simulated = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
+        places = {name: {"factors": point.factors} for name, point in points.items()}
+        name = nearest(summary, part(summary, "front", "pick", "factors"), places) or "pick"
+        simulated = points[name].gains or {}
         rows = [
             [
                 label(response),
                 change(gain),
-                change(simulated.get(response) or {}),
-                sign_of(simulated.get(response) or {}),
+                *((change(simulated[response]), sign_of(simulated[response])) if response in simulated else ("", "")),
             ]
             for response, gain in predictions.items()
         ]
         columns = ("response", "on the surfaces", "simulated", "verdict")
         caption = f"Gains predicted by the surfaces and simulated, {point_words(name)}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
-    blocks += [changes(summary), limits(summary), Paragraph(part(summary, "edge", "sentence") or "")]
-    reasons = [(point_words(name), point["reason"]) for name, point in points.items() if point.get("reason")]
+    blocks += [changes(summary), limits(summary), Paragraph(summary.edge.sentence)]
+    reasons = [(point_words(name), point.reason) for name, point in points.items() if point.reason]
     blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
     return Section("confirmation", "Confirmation", blocks)
 
 
-def changes(summary: Record) -> Table:
+def changes(summary: Summary) -> Table:
     """Gains over the baseline at every confirmed point that has any."""
-    names = [response["name"] for response in responses(summary)]
+    asked = summary.asked
     rows = [
         [
             point_words(name),
-            *(factor.text(part(point, "factors", factor.name)) for factor in factors(summary)),
-            *(signed(point["gains"].get(response)) for response in names),
+            *(factor.text(point.factors[factor.name]) for factor in asked.factors),
+            *(signed(point.gains[response]) if response in point.gains else "" for response in asked.names),
         ]
-        for name, point in (part(summary, "confirmation") or {}).items()
-        if point.get("gains")
+        for name, point in summary.confirmation.items()
+        if point.gains
     ]
     caption = "Changes from the baseline at every confirmed point"
-    header = ("point", *(label(factor.name) for factor in factors(summary)), *(quantity(name)[0] for name in names))
+    header = ("point", *map(label, asked.columns), *(quantity(name)[0] for name in asked.names))
     return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
 
 
-def tolerances(summary: Record) -> Table:
+def tolerances(summary: Summary) -> Table:
     """The widest tolerances that keep the gain."""
-    widths = part(summary, "tolerances") or {}
-    names = {factor.name for factor in factors(summary)}
     rows = [
         (
             label(name),
-            f"± {rounded_down(width.get('half_width') or 0.0)}",
-            ""
-            if width.get("probability") is None
-            else share_with_interval(width["probability"], width.get("interval")),
-            _grade(width),
-            label(width.get("limited_by") or ""),
+            f"± {rounded_down(width.half_width or 0.0)}",
+            "" if width.probability is None else share_with_interval(width.probability, width.interval),
+            width.parts_words,
+            label(width.limited_by),
         )
-        for name, width in widths.items()
-        if name in names and isinstance(width, Mapping)
+        for name, width in (summary.tolerances or {}).items()
     ]
     header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
     return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))
 
 
-def _grade(width: Record) -> str:
-    """'IT6: guide land 16 µm, cage outside 16 µm' of a tolerance."""
-    parts = [f"{label(name)} {shown(1e3 * size['width_mm'])} µm" for name, size in (width.get("parts") or {}).items()]
-    return ": ".join(filter(None, (width.get("grade") or "", ", ".join(parts))))
-
-
-def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
-    """Every confirmed point by name, with its gains over the baseline and whether they are real."""
-    return {
-        name: {
-            "factors": outcome.study.by_factor(point.point),
-            "reason": point.reason,
-            "responses": _quantities(outcome.study, point),
-            "power_terms_W": dict(point.power_terms),
-            "limits": limits_record(limits_of(outcome.study, point)),
-            "every_limit": [
-                {"response": limit.response, **_limit(limit)} for limit in every_limit(outcome.study, point)
-            ],
-        }
-        | ({} if point.friction_check is None else {"friction_check": dict(point.friction_check)})
-        | (
-            {}
-            if point.temperatures is None
-            else {"temperatures_C": temperatures_record(point), "thermal": {"ranges": point.temperature_ranges}}
-        )
-        | {
-            key: record(outcome.gains[name])
-            for key, record in (("gains", gains_record), ("statement", statement))
-            if name in outcome.gains
-        }
-        for name, point in outcome.confirmed.items()
-    }
-
-
-def temperatures_record(point: Confirmed) -> dict[str, Any]:
-    """Steady temperatures by response, each with its value and its 95 % error."""
-    figures = point.temperatures or {}
-    return {
-        name: {"value": figures[node].value, "error": figures[node].stated_error} for name, node in TEMPERATURES.items()
-    }
-
-
-def judged_limits_record(outcome: StudyResult) -> dict[str, Any]:
-    """Limits at the pick, each with the ``odds`` [p, low, high] that the pick keeps all limits of that response over the unknown
-    inputs; None where that was not asked for."""
-    odds = {} if outcome.robust is None else outcome.robust.odds
-    record = limits_record(outcome.limits)
-    return {name: {**limit, "odds": list(odds[name]) if name in odds else None} for name, limit in record.items()}
-
-
-def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
-    """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
-    return {limit.response: _limit(limit) for limit in limits}
-
-
-def _limit(limit: Limit) -> dict[str, Any]:
-    values = {key: getattr(limit, key) for key in ("bound", "sense", "value", "verdict")}
-    return values | {"error": finite(limit.error), "probability": finite(limit.probability)}
-
-
-def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
-    """JSON of gains, simulated or predicted, by response."""
+def gains_record(gains: Sequence[PredictedGain]) -> dict[str, Any]:
+    """JSON of predicted gains by response."""
     return {gain.response: gain.as_dict() for gain in gains}
-
-
-def _quantities(study: Problem, confirmed: Confirmed) -> Mapping[str, Any]:
-    columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
-    return {
-        response: {"value": value, "statistical_error": finite(statistical), "numerical_error": finite(numerical)}
-        for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
-    }
 
 
 def point_record(study: Problem, point: Array, values: Array, errors: Array) -> dict[str, Any]:

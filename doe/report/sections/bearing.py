@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.sections.record import Record, part
 from doe.report.still import COLOURS, FONT, GUIDE, SMALL, Still, name_marks
+from doe.report.summary import Summary
+from doe.workflow.confirmation import ConfirmedPoint
 from rbdyn.base.blocks import Block, Figures, Section, Table, Widget
 
 if TYPE_CHECKING:
@@ -15,35 +17,29 @@ if TYPE_CHECKING:
 ROW = 34.0  # height of the bars of a term [pt]
 
 
-def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def power(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Power by term at the confirmed points, baseline and pick as bars."""
-    points = {
-        name.replace("_", " "): point["power_terms_W"]
-        for name, point in (part(summary, "confirmation") or {}).items()
-        if point.get("power_terms_W")
-    }
-    if not points:
-        return None
+    confirmed = {name.replace("_", " "): point for name, point in summary.confirmation.items()}
+    points = {name: point.power_terms_W for name, point in confirmed.items() if point.power_terms_W}
     every = list(dict.fromkeys(term for terms in points.values() for term in terms))
     # Terms of laws that the scene leaves out are zero everywhere.
     terms = [term for term in every if any(watts.get(term) for watts in points.values())]
-    first = next(iter(points.values()))
-    terms.sort(key=lambda term: -abs(first.get(term) or 0.0))
+    terms.sort(key=lambda term: -abs(next(iter(points.values())).get(term, 0.0)))
     rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in points.values())] for term in terms]
     notes = ["Terms that are zero everywhere are left out."] if len(terms) < len(every) else []
-    notes += _maker(part(summary, "confirmation") or {})
-    blocks: list[Block] = []
-    bars = {name: points[name] for name in ("baseline", "pick") if name in points}
-    if bars:
-        blocks.append(Figures([power_bars(terms, bars).svg], "Power loss by cause."))
-    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in points)], rows, " ".join(notes)))
+    notes += _maker(confirmed)
+    bars: dict[str, dict[str, float]] = {name: points[name] for name in ("baseline", "pick") if name in points}
+    blocks: list[Block] = [
+        *([Figures([power_bars(terms, bars).svg], "Power loss by cause.")] if bars else []),
+        Table("Power loss by term", ["term", *(f"{name} [W]" for name in points)], rows, " ".join(notes)),
+    ]
     return Section("power", "Power by term", blocks)
 
 
-def _maker(confirmed: Mapping[str, Any]) -> list[str]:
+def _maker(confirmed: Mapping[str, ConfirmedPoint]) -> list[str]:
     """A sentence on the friction by the maker's model, where the scene states a designation."""
-    checks = {name: point.get("friction_check") or {} for name, point in confirmed.items()}
-    shares = [f"{name.replace('_', ' ')} {check['ratio']:.2f}" for name, check in checks.items() if check.get("ratio")]
+    checks = {name: point.friction_check or {} for name, point in confirmed.items()}
+    shares = [f"{name} {ratio:.2f}" for name, check in checks.items() if (ratio := check.get("ratio"))]
     if not shares:
         return []
     power = next(check["skf_power_W"] for check in checks.values() if check)

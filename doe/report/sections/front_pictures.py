@@ -11,9 +11,10 @@ from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.record import Record, half_width, part
+from doe.report.sections.record import Record
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
 from doe.workflow.asked import Factor
+from doe.workflow.confirmation import ConfirmedPoint
 from rbdyn.base.words import label, quantity, shown
 
 if TYPE_CHECKING:
@@ -114,13 +115,11 @@ def pair_still(
     two: tuple[int, str],
     sets: Sequence[Front],
     marks: Mapping[str, Record],
-    confirmed: Mapping[str, Record],
+    confirmed: Mapping[str, ConfirmedPoint],
     limits: Mapping[str, Sequence[float]],
 ) -> Still:
     """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
-    simulated = {
-        name: pair for name, point in confirmed.items() if (pair := _simulated(point, one[1], two[1])) is not None
-    }
+    simulated = {name: _simulated(point, one[1], two[1]) for name, point in confirmed.items()}
     points = [*marks.values(), *(point for front in sets for point in front.points)]
     axes, drawn = [], dict[str, list[float]]()
     for along, (place, name) in enumerate((one, two)):
@@ -132,11 +131,10 @@ def pair_still(
     return replace(still, data={"front": _data("pair", axes, still)})
 
 
-def _simulated(point: Record, one: str, two: str) -> tuple[Point, tuple[float | None, float | None]] | None:
-    """Two responses of a confirmed point with the half-widths of their intervals; None where one of them failed."""
-    pair = [part(point, "responses", name) or {} for name in (one, two)]
-    x, y = (response.get("value") for response in pair)
-    return None if x is None or y is None else ((x, y), (half_width(pair[0]), half_width(pair[1])))
+def _simulated(point: ConfirmedPoint, one: str, two: str) -> tuple[Point, tuple[float | None, float | None]]:
+    """Two responses of a confirmed point with the half-widths of their intervals."""
+    x, y = (point.responses[name] for name in (one, two))
+    return (x.value, y.value), (x.error, y.error)
 
 
 def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:

@@ -14,7 +14,7 @@ from doe.pareto.manufacture import Interval, percent
 from doe.workflow.asked import Asked, Factor
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, says
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.words import improvement, label, quantity, shown, with_error
+from rbdyn.base.words import improvement, label, quantity, shown
 
 # A record of a study, or a part of it.
 Record = Any
@@ -178,36 +178,19 @@ def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
     return f"{percent(share)} %{ends}"
 
 
-def half_width(record: Mapping[str, Any]) -> float | None:
-    """95 % half-width of a quantity: its error, or its statistical and numerical error together.
-
-    None where the statistical error is unknown, as for ``Quantity.stated_error``.
-    """
-    if record.get("error") is not None:
-        return float(record["error"])
-    statistical = record.get("statistical_error")
-    return None if statistical is None else math.hypot(statistical, record.get("numerical_error") or 0.0)
-
-
 def sign_of(gain: Record) -> str:
     """The verdict of a gain with a sign that needs no colour."""
-    return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
+    return VERDICTS[part(gain, "verdict")]
 
 
-def signed(gain: Record | None) -> str:
+def signed(gain: Record) -> str:
     """A gain with the sign of its verdict."""
-    return f"{sign_of(gain)[:1]} {change(gain)}" if gain else ""
+    return f"{sign_of(gain)[:1]} {change(gain)}"
 
 
-def value_text(quantity: Record | None) -> str:
-    """A quantity with its 95 % half-width; nothing where there is none."""
-    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
-
-
-def change(gain: Mapping[str, Any]) -> str:
-    """'11.16 ± 0.65 % less' of a gain; nothing where it is unknown."""
-    value = gain.get("percent")
-    return "" if value is None else improvement(value, gain.get("error_percent"), gain.get("goal", "min"))
+def change(gain: Record) -> str:
+    """'11.16 ± 0.65 % less' of a gain."""
+    return improvement(part(gain, "percent"), part(gain, "error_percent"), part(gain, "goal") or "min")
 
 
 def moved(part: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from doe.report.sections.record import SENSES, of_hundred, part
+from doe.report.sections.record import SENSES
 from doe.report.sections.unknown import input_sheet
 from doe.report.summary import Summary
 from doe.unknown.propagation import Share
@@ -74,13 +74,9 @@ def _odds(robust: Robust) -> Table:
 def _limits(summary: Summary) -> Table:
     """Odds that each limit is kept over the unknown inputs."""
     rows = [
-        (
-            quantity(name)[0],
-            f"{SENSES[part(limit, 'sense')]} {shown(part(limit, 'bound'))}",
-            of_hundred(part(limit, "odds")),
-        )
+        (quantity(name)[0], f"{SENSES[limit.limit.sense]} {shown(limit.limit.bound)}", limit.odds.of_hundred)
         for name, limit in summary.limits.items()
-        if part(limit, "odds")
+        if limit.odds
     ]
     return Table("Limits over the unknown inputs", ("response", "limit", "kept in 100 cases"), rows, text_columns=(1,))
 

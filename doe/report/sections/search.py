@@ -187,7 +187,7 @@ def search_sentences(outcome: StudyResult) -> list[str]:
 
 def _answer(outcome: StudyResult) -> str:
     places = [_place(*value) for value in outcome.study.by_factor(outcome.pick.point).items()]
-    gains = [f"{gain.response} {improvement(gain.percent, None, gain.goal)}" for gain in outcome.gains["pick"]]
+    gains = [f"{name} {improvement(gain.percent, None, gain.goal)}" for name, gain in outcome.gains["pick"].items()]
     return f"The pick has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
 
 
