@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 STUDY_FILES = (
     "report.html", "answer.txt", "summary.json", "tables.xlsx", "design_runs.csv", "anova.csv", "coefficients.csv",
     "runs.csv", "front.csv", "confirmation.csv", "part_dimensions.csv", "duty_points.csv", "unknown_inputs.csv", "decides.csv",
-    "beside_reference.csv", "surface_*.png", "pareto_front.png", "robust_front.png", "adaptive_search.png", "duty_gains.png",
+    "published_comparisons.csv", "surface_*.png", "pareto_front.png", "robust_front.png", "adaptive_search.png", "duty_gains.png",
     "cage_orbit.png", "pocket_forces.png",
 )  # fmt: skip
 

@@ -79,7 +79,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
             sheet.file: sheet.records for sheet in (robust_input_sheet(outcome.robust), decider_sheet(outcome.robust))
         }
     if outcome.reference_values is not None:
-        tables["beside_reference.csv"] = _reference_table(outcome)
+        tables["published_comparisons.csv"] = _reference_table(outcome)
     for name, rows in tables.items():
         save_table(rows, folder / name)
     pictures = []
@@ -168,7 +168,7 @@ def summary(outcome: StudyResult) -> Summary:
         chains={name: chain.as_dict() for name, chain in outcome.chains.items()},
         made=outcome.made,
         missed_chains=outcome.missed_chains,
-        beside_reference=outcome.published_comparisons,
+        published_comparisons=outcome.published_comparisons,
         notes=list(outcome.every_note),
         failures=grouped(outcome.failures),
         cost=dict(outcome.cost),

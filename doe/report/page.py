@@ -205,7 +205,7 @@ def _surfaces(summary: Summary) -> list[dict[str, Any]]:
 def reference(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Levels, effects and ranks compared with a published table, with the reasons for what differs."""
     levels, effects, words = [], [], []
-    for name, row in summary.beside_reference.items():
+    for name, row in summary.published_comparisons.items():
         levels.append((f"{label(name)}, ours", *map(shown, row.ours_min_mean_max), shown(row.rank_correlation, 2)))
         levels.append((f"{label(name)}, theirs", *map(shown, row.theirs_min_mean_max), ""))
         for factor, effect in row.linear_effects.items():

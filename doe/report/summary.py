@@ -50,7 +50,7 @@ class Summary(Record, kw_only=True):
     chains: Any
     made: dict[str, Made]
     missed_chains: dict[str, str]
-    beside_reference: dict[str, PublishedComparison]
+    published_comparisons: dict[str, PublishedComparison]
     notes: list[Note]
     failures: Any
     cost: dict[str, float]

@@ -431,7 +431,7 @@ class ModelError(Record):
 
     variance: float
     dof: int
-    source: Source = keyed("told_by")
+    source: Source
     standard_deviation: float = derived(lambda self: math.sqrt(self.variance))
 
 

@@ -53,7 +53,7 @@ cruise,0.7,24000,1300
 LONG, SHOWN = 6, 2  # lists and tables of more entries than LONG show SHOWN at either end
 DATE = re.compile(r"\b20\d\d-\d\d-\d\d\b(?:[T ]\d\d:\d\d(?::\d\d)?)?")
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")  # as text, whatever its sign
-DIGEST = re.compile(r"\b(?=[a-f]*\d)[0-9a-f]{12,64}\b")
+DIGEST = re.compile(r"(?<![\w.])(?=[a-f]*\d)[0-9a-f]{12,64}\b")
 DURATION = re.compile(r"\btook [\d.]+ (s|min|h)\b")
 MASKED = ("versions", "machine", "seconds")
 

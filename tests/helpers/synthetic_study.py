@@ -203,7 +203,7 @@ def summary() -> dict[str, Any]:
                 "status": "ok: deviations allocated",
             }
         },
-        "beside_reference": {
+        "published_comparisons": {
             RESPONSES[0]: {
                 "ours_min_mean_max": [77.0, 92.0, 114.0], "theirs_min_mean_max": [145.0, 203.0, 278.0],
                 "linear_effects": {FACTORS[0]: {"ours": 0.3, "theirs": 23.0, "same_sign": True}},

@@ -109,7 +109,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     assert not any("--adaptive" in note["text"] for note in record["notes"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == found["foretold_points"]
+    assert len(rows) == found["predicted_front_points"]
     assert {"radial_clearance_mm", "power_loss_W", "power_loss_W_error"} <= set(rows[0])
     assert "adaptive_search.png" in record["files"] and (tmp_path / "adaptive_search.png").stat().st_size > 10_000
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -292,7 +292,7 @@ def adaptive_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     front : its points by their fresh runs, with 95 % half widths
     runs, fresh : numbers of runs of design and search, and of fresh ones
     hypervolume : of the predicted front, on the scale of its own ideal and nadir
-    ``foretold`` : the 200 points of the predicted front that have most of its hypervolume
+    predicted_front : the 200 points of the predicted front that have most of its hypervolume
     points : every run of design and search, with its replicates and its reason
     """
     search, front = adaptive.search, adaptive.search.front
@@ -339,8 +339,8 @@ def adaptive_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
             {"factors": _factors(study, point, rounded=why != "design"), "replicates": int(count), "why": why}
             for point, count, why in zip(search.searched.points, search.spent, search.why, strict=True)
         ],
-        "foretold_points": len(search.archive),
-        "foretold": archive_table(study, adaptive, search.representatives),
+        "predicted_front_points": len(search.archive),
+        "predicted_front": archive_table(study, adaptive, search.representatives),
         "missed": {
             name: {"bias": float(bias), "spread": float(spread)}
             for name, bias, spread in zip(study.responses, search.bias, search.spread, strict=True)
