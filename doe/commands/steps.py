@@ -27,11 +27,10 @@ def design(
         from doe.report.sections.design import print_csv
 
         answer, detail = design(path, out, force), Detail.of(quiet, verbose)
-        record = answer.as_dict()
         hand_over(
-            lambda: record,
+            answer.as_dict,
             as_json,
-            lambda: print_csv(record) if as_csv else show(answer.screen(), detail),
+            lambda: print_csv(answer.result) if as_csv else show(answer.screen(), detail),
             None if as_csv else answer.folder,
             answer.files,
         )

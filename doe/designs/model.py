@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from doe.designs.design import Region, replicate_groups
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 
 Model = Literal["linear", "interaction", "pure_quadratic", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)
@@ -97,6 +98,82 @@ RADII = 11  # of the variance dispersion graph
 SAMPLE = 12  # base-2 logarithm of the size of the quasi-random sample of a region
 
 
+class Span(Record):
+    """Where predictions count: a "ball" of radius or a "box" of half-width ``reach``."""
+
+    shape: Region
+    reach: float
+
+
+class PredictionVariance(Record):
+    """n var(prediction)/sigma^2: at the centre, its mean (exact) and maximum (over a lattice and 4096 points) in the region, and
+    the maximum in the box as wide as the design."""
+
+    centre: float
+    mean: float
+    max: float
+    box_max: float
+
+
+class Shell(Record):
+    """Scaled prediction variance over 3^k - 1 directions at a radius."""
+
+    radius: float
+    min: float
+    mean: float
+    max: float
+
+
+class DesignSpace(Record):
+    """Scaled prediction ``variance`` that ``percent`` of the region do not exceed."""
+
+    percent: float
+    variance: float
+
+
+class Blocking(Record):
+    """Runs of each block, and whether blocks are orthogonal to the terms: the largest cosine between the two."""
+
+    sizes: list[int]
+    orthogonal: bool
+    largest_cosine: float
+
+
+class Power(Record):
+    """Power [%] of a 5 % t test of a change by one and two sigma; None without residual degrees of freedom.
+
+    The change is from -1 to +1 for a slope or product, from the centre to +-1 for a square.
+    """
+
+    one_sigma: float | None
+    two_sigma: float | None
+
+
+class Evaluation(Record, kw_only=True):
+    """How good a design is for a model, with X the model matrix of p terms and n runs.
+
+    - ``efficiency_percent``, with factors scaled to -1..+1 over the design: d = |X'X|^(1/p)/n, a = p/(n trace (X'X)^-1).
+      g and i are p over the largest and the mean scaled prediction variance in the region; i may exceed 100.
+    - ``leverage`` by run; ``condition_number`` of X with columns of unit length
+    - ``blocks``: None for one block
+    """
+
+    model: str | None = None
+    terms: list[str]
+    runs: int
+    region: Span
+    efficiency_percent: dict[str, float]
+    scaled_prediction_variance: PredictionVariance
+    by_radius: list[Shell]
+    fraction_of_design_space: list[DesignSpace]
+    vif: dict[str, float]
+    leverage: list[float]
+    condition_number: float
+    degrees_of_freedom: dict[str, int]
+    blocks: Blocking | None
+    power_percent: dict[str, Power]
+
+
 def evaluate(
     coded: ArrayLike,
     terms: Sequence[str],
@@ -104,7 +181,7 @@ def evaluate(
     *,
     region: Region | None = None,
     reach: float | None = None,
-) -> dict[str, Any]:
+) -> Evaluation:
     """Evaluate a design for a model.
 
     coded : points in coded units, shape (n, k).
@@ -112,20 +189,6 @@ def evaluate(
     block : block of each run (n,); block effects are estimated too, and predictions are means over the blocks.
     region, reach : where predictions count, a "ball" of radius or a "box" of half-width ``reach``. By default the box as
         wide as the design if a run is in a corner of it, else the ball through the outermost runs.
-
-    Returns a record for JSON, with X the model matrix of p terms and n runs:
-
-    - ``efficiency_percent``, with factors scaled to -1..+1 over the design: d = |X'X|^(1/p)/n, a = p/(n trace (X'X)^-1).
-      g and i are p over the largest and the mean scaled prediction variance in the region; i may exceed 100.
-    - ``scaled_prediction_variance``, n var(prediction)/sigma^2: ``centre``, ``mean`` (exact) and ``max`` (over a lattice and
-      4096 points) of the region, and ``box_max`` of the box as wide as the design
-    - ``by_radius``: ``min``, ``mean`` and ``max`` of this variance over 3^k - 1 directions
-    - ``fraction_of_design_space``: ``variance`` that ``percent`` of the region do not exceed
-    - ``vif`` by term
-    - ``power_percent`` by term, of a 5 % t test of a change by one and two sigma; None without residual degrees of freedom.
-      The change is from -1 to +1 for a slope or product, from the centre to +-1 for a square.
-    - ``leverage`` by run; ``condition_number`` of X with columns of unit length; ``degrees_of_freedom``
-    - ``blocks``: ``sizes``, whether ``orthogonal``, ``largest_cosine`` between blocks and terms; None for one block
 
     Raises MethodError naming the terms that the runs cannot separate.
 
@@ -147,18 +210,18 @@ def evaluate(
     covariance = np.asarray(np.linalg.inv(whole.T @ whole)[:size, :size], float)
     freedom = _degrees_of_freedom(points, groups, size, contrasts.shape[1])
     orthogonal = np.linalg.qr(whole)[0]
-    return {
-        "terms": list(terms),
-        "runs": runs,
-        "region": {"shape": region, "reach": reach},
+    return Evaluation(
+        terms=list(terms),
+        runs=runs,
+        region=Span(region, reach),
         **_precision(points, terms, covariance, region, reach),
-        "vif": _inflation(matrix, covariance, terms),
-        "leverage": (orthogonal**2).sum(axis=1).tolist(),
-        "condition_number": float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0))),
-        "degrees_of_freedom": freedom,
-        "blocks": _blocks(matrix, contrasts, groups),
-        "power_percent": _power(covariance, terms, freedom["residual"]),
-    }
+        vif=_inflation(matrix, covariance, terms),
+        leverage=(orthogonal**2).sum(axis=1).tolist(),
+        condition_number=float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0))),
+        degrees_of_freedom=freedom,
+        blocks=_blocks(matrix, contrasts, groups),
+        power_percent=_power(covariance, terms, freedom["residual"]),
+    )
 
 
 def _where(points: Array, region: Region | None, reach: float | None) -> tuple[Region, float]:
@@ -193,18 +256,18 @@ def _precision(points: Array, terms: Sequence[str], covariance: Array, region: R
             "g": 100.0 * size / largest,
             "i": 100.0 * size / mean,
         },
-        "scaled_prediction_variance": {
-            "centre": float(variances(np.zeros(factors))),
-            "mean": mean,
-            "max": largest,
-            "box_max": float(variances(lattice(factors, reach if region == "box" else half_width)).max()),
-        },
+        "scaled_prediction_variance": PredictionVariance(
+            centre=float(variances(np.zeros(factors))),
+            mean=mean,
+            max=largest,
+            box_max=float(variances(lattice(factors, reach if region == "box" else half_width)).max()),
+        ),
         "by_radius": [
-            {"radius": radius, "min": float(shell.min()), "mean": float(shell.mean()), "max": float(shell.max())}
+            Shell(radius, float(shell.min()), float(shell.mean()), float(shell.max()))
             for radius, shell in zip(radii.tolist(), shells, strict=True)
         ],
         "fraction_of_design_space": [
-            {"percent": share, "variance": float(np.percentile(spread, share))} for share in range(0, 101, 5)
+            DesignSpace(share, float(np.percentile(spread, share))) for share in range(0, 101, 5)
         ],
     }
 
@@ -239,28 +302,25 @@ def _degrees_of_freedom(points: Array, groups: Rows, terms: int, blocks: int) ->
     return {"model": terms - 1, "blocks": blocks, "residual": residual, **missed}
 
 
-def _blocks(matrix: Array, contrasts: Array, groups: Rows) -> dict[str, Any] | None:
+def _blocks(matrix: Array, contrasts: Array, groups: Rows) -> Blocking | None:
     if contrasts.shape[1] == 0:
         return None
     unit = matrix / np.linalg.norm(matrix, axis=0)
     cosine = float(np.abs(unit.T @ (contrasts / np.linalg.norm(contrasts, axis=0))).max())
-    return {"sizes": np.bincount(groups).tolist(), "orthogonal": cosine < 1e-9, "largest_cosine": cosine}
+    return Blocking(np.bincount(groups).tolist(), cosine < 1e-9, cosine)
 
 
-def _power(covariance: Array, terms: Sequence[str], residual: int) -> dict[str, dict[str, float | None]]:
+def _power(covariance: Array, terms: Sequence[str], residual: int) -> dict[str, Power]:
     from scipy import stats
 
-    power: dict[str, dict[str, float | None]] = {}
-    for term, variance in zip(terms, np.diag(covariance).tolist(), strict=True):
-        if term == "1":
-            continue
-        power[term] = {"one_sigma": None, "two_sigma": None}
-        for name, change in (("one_sigma", 1.0), ("two_sigma", 2.0)):
-            if residual > 0:
-                limit = stats.f.isf(SIGNIFICANCE, 1, residual)
-                shift = ((1.0 if "^2" in term else 0.5) * change) ** 2 / variance
-                power[term][name] = 100.0 * float(stats.ncf.sf(limit, 1, residual, shift))
-    return power
+    def power(term: str, variance: float, change: float) -> float | None:
+        if residual <= 0:
+            return None
+        shift = ((1.0 if "^2" in term else 0.5) * change) ** 2 / variance
+        return 100.0 * float(stats.ncf.sf(stats.f.isf(SIGNIFICANCE, 1, residual), 1, residual, shift))
+
+    variances = zip(terms, np.diag(covariance).tolist(), strict=True)
+    return {term: Power(power(term, v, 1.0), power(term, v, 2.0)) for term, v in variances if term != "1"}
 
 
 def moment_matrix(terms: Sequence[str], factors: int, region: Region, reach: float) -> Array:

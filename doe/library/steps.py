@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
     from doe.response_surface.statistics import Fit
     from doe.workflow.asked import Asked
+    from doe.workflow.design import DesignResult
     from doe.workflow.problem import Problem
 
 
@@ -29,30 +30,30 @@ def notes_record(notes: Notes) -> dict[str, Any]:
     return {"notes": plain(notes)} if notes else {}
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class DesignAnswer(Answer):
     """The runs of a design and its quality. Tables: "runs" (actual values in the units of the factors), "coded", "terms"."""
+
+    result: "DesignResult" = field(kw_only=True)
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.design import design_blocks
 
-        return with_notes(self.record.get("notes", ()), design_blocks(self.as_dict()), judged=False)
+        return with_notes(self.result.notes or (), design_blocks(self.result), judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
-        runs, evaluation = self.record["runs"], self.record["evaluation"]
-        marks = ("run", "standard", "kind", "block", "seed")
-        power = evaluation["power_percent"]
+        from doe.report.sections.design import coded_sheet, power_sheet
+
+        runs, marks = self.result.runs, ("run", "standard", "kind", "block", "seed")
         return {
-            "runs": [{**{key: run[key] for key in marks}, **run["factors"]} for run in runs],
-            "coded": [{"run": run["run"], "kind": run["kind"], **run["coded"]} for run in runs],
-            "terms": [
-                {"term": term, "vif": inflation, **{f"power_{key}_percent": power[term][key] for key in power[term]}}
-                for term, inflation in evaluation["vif"].items()
-            ],
+            "runs": [{**{key: getattr(run, key) for key in marks}, **run.factors} for run in runs],
+            "coded": coded_sheet(self.result.factors, runs).records,
+            "terms": power_sheet(self.result.evaluation).records,
         }
 
     def brief(self) -> str:
-        factors = ", ".join(self.record["factors"])
-        return f"{self.record['kind'].replace('_', ' ')}, {counted(len(self.record['runs']), 'run')} of {factors}"
+        runs, factors = counted(len(self.result.runs), "run"), ", ".join(self.result.factors)
+        return f"{self.result.kind.replace('_', ' ')}, {runs} of {factors}"
 
 
 def design(path: Path | str, out: Path | str | None = None, force: bool = False) -> DesignAnswer:
@@ -65,8 +66,8 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     Raises InputError with all faults of the study.
     """
     from doe.report.identity import study_identity
-    from doe.report.sections.design import design_record, design_tables
-    from doe.workflow.design import evaluation
+    from doe.report.sections.design import design_sheet
+    from doe.workflow.design import DesignResult
     from doe.workflow.problem import Problem
     from doe.workflow.region import region_that_runs
     from doe.workflow.whole import check_study
@@ -80,11 +81,11 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
             with Effort().folder(folder) as store:
                 study, notes = region_that_runs(study, store)
             check_study(study)
-        points = study.design
         output.claim(path)
-        record = design_record(study, points, evaluation(study, points)) | notes_record(notes)
-        answer = DesignAnswer(record, folder, identity=study_identity("doe design", study))
-        return replace(answer, files=saved(output, "design.json", answer, partial(design_tables, record)))
+        result = DesignResult.of(study, study.design, notes)
+        answer = DesignAnswer(result.as_dict(), folder, identity=study_identity("doe design", study), result=result)
+        sheet = design_sheet(study.factors, result.runs)
+        return replace(answer, files=saved(output, "design.json", answer, lambda: {sheet.file: sheet.records}))
 
 
 @dataclass(frozen=True, repr=False, eq=False)

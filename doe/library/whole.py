@@ -69,13 +69,13 @@ class StudyAnswer(Answer):
             "pick": self._factors(),
             "runs": [
                 {
-                    "run": run["run"],
-                    "kind": run["kind"],
-                    **run["factors"],
-                    **{name: value["value"] for name, value in run["responses"].items()},
-                    **{f"{name}_error": value["error"] for name, value in run["responses"].items()},
+                    "run": run.run,
+                    "kind": run.kind,
+                    **run.factors,
+                    **{name: measured.value for name, measured in run.responses.items()},
+                    **{f"{name}_error": measured.error for name, measured in run.responses.items()},
                 }
-                for run in record["design"]["points"]
+                for run in self.summary.design.points
             ],
             "front": [point_row(point) for point in self._front()],
             "confirmation": [

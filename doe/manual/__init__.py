@@ -8,6 +8,7 @@ from typer.main import get_command
 from doe.cli import app
 from doe.commands.keys import kinds
 from doe.manual.drawings import drawings
+from doe.report.sections.design import run_sheet
 from doe.report.sections.fit import ANOVA, RUNS, TERMS
 from rbdyn.base.table import Sheet
 from rbdyn.scene.keys import Part
@@ -20,4 +21,4 @@ def part() -> Part:
 
 def tables() -> dict[str, list[Sheet[Any]]]:
     """The files of tables that the commands write."""
-    return {"Tables of a study": [ANOVA, TERMS, RUNS]}
+    return {"Tables of a study": [run_sheet(["{factor}"], ["{response}"]), ANOVA, TERMS, RUNS]}

@@ -13,7 +13,7 @@ from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
 from doe.report.sections.answer import changes, first_screen
 from doe.report.sections.chain import chain_tables, chains
-from doe.report.sections.design import runs_record
+from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_record, front_tables, predicted_record
@@ -33,14 +33,13 @@ from doe.running.store import grouped
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
-from doe.workflow.design import evaluation
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.pick import SearchedPick
-from doe.workflow.runs import RUNS_TABLE
+from doe.workflow.runs import StudyDesign
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail, Verdict
-from rbdyn.base.records import finite, save_table
+from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
@@ -63,8 +62,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     study = outcome.study
     record = summary(outcome).as_dict()
     result = restored(record)
+    runs = run_sheet(study.factors, study.responses, result.design.points)
     tables = {
-        RUNS_TABLE: _runs_table(record),
+        runs.file: runs.records,
         **fit_files(outcome.surfaces),
         "front.csv": front_tables(record["front"])["front.csv"]
         if outcome.adaptive is None
@@ -151,7 +151,7 @@ def summary(outcome: StudyResult) -> Summary:
         tried=outcome.tries,
         edge=outcome.edge,
         asked=Settings.of_runs(study),
-        design=study_design_record(outcome),
+        design=StudyDesign.of(study, outcome.design, outcome.runs),
         fit=fits_of(outcome.surfaces),
         front=front_record(study, outcome.surfaces, outcome.front),
         pick_on_surfaces=predicted_record(study, outcome.surfaces, outcome.pick.point),
@@ -220,50 +220,6 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
         "share": float(pick.shares[pick.row]),
         "next": {"row": rival, "share": float(others[rival])} if others[rival] > 0.0 else None,
     }
-
-
-def study_design_record(outcome: StudyResult) -> dict[str, Any]:
-    """Points with their results, the quality of the design, and failed runs."""
-    study, design, runs = outcome.study, outcome.design, outcome.runs
-    rows = {place: row for row, place in enumerate(runs.places)}
-    return {
-        "kind": study.file.design.kind,
-        "runs": len(design.coded),
-        "factors": study.factors,
-        "responses": study.responses,
-        "points": [
-            {**run, "responses": _responses(outcome, rows.get(place))}
-            for place, run in enumerate(runs_record(study, design))
-        ],
-        "evaluation": evaluation(study, design),
-        "failures": grouped(runs.failures),
-    }
-
-
-def _responses(outcome: StudyResult, row: int | None) -> dict[str, Any]:
-    """Results of a run by response; none of a failed one."""
-    if row is None:
-        return {}
-    runs = outcome.runs
-    return {
-        name: {"value": float(value), "error": finite(error)}
-        for name, value, error in zip(outcome.study.responses, runs.values[row], runs.errors[row], strict=True)
-    }
-
-
-def _runs_table(record: dict[str, Any]) -> list[dict[str, Any]]:
-    """The runs with results."""
-    return [
-        {
-            **{key: run[key] for key in ("run", "kind", "block")},
-            **{f"coded_{name}": x for name, x in run["coded"].items()},
-            **run["factors"],
-            **{name: quantity["value"] for name, quantity in run["responses"].items()},
-            **{f"{name}_error": quantity["error"] for name, quantity in run["responses"].items()},
-        }
-        for run in record["design"]["points"]
-        if run["responses"]
-    ]
 
 
 def _reference_table(outcome: StudyResult) -> list[dict[str, Any]]:

@@ -115,11 +115,11 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
         "surfaces": _surfaces(summary),
         "runs": [
             {
-                "run": point.get("run"),
-                "factors": [part(point, "factors", factor.name) for factor in inputs],
-                "values": {name: part(point, "responses", name, "value") for name in names},
+                "run": run.run,
+                "factors": list(run.factors.values()),
+                "values": {name: run.responses[name].value if run.responses else None for name in names},
             }
-            for point in part(summary, "design", "points") or []
+            for run in summary.design.points
         ],
         "marks": {
             name: [part(point, "factors", factor.name) for factor in inputs]

@@ -6,6 +6,7 @@ from typing import Any
 
 from doe.report.sections.record import drop_undefined
 from doe.response_surface.statistics import Fits
+from doe.running.store import Cause
 from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
 from doe.workflow.duty import DutyAnswer
@@ -13,6 +14,7 @@ from doe.workflow.judgement import Robust
 from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
+from doe.workflow.runs import StudyDesign
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
 from rbdyn.base.identity import Identity
@@ -35,7 +37,7 @@ class Summary(Record, kw_only=True):
     tried: int
     edge: Edge
     asked: Settings
-    design: Any
+    design: StudyDesign
     fit: Fits
     front: Any
     pick_on_surfaces: Any
@@ -52,7 +54,7 @@ class Summary(Record, kw_only=True):
     missed_chains: dict[str, str]
     published_comparisons: dict[str, PublishedComparison]
     notes: list[Note]
-    failures: Any
+    failures: list[Cause]
     cost: dict[str, float]
     versions: dict[str, str]
     inputs: str

@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
+from rbdyn.base import records
 from rbdyn.base.digests import user_cache
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.lock import free_lock, is_busy, is_locked, seize_lock
@@ -57,15 +58,23 @@ class StoppedError(RunError):
         return "{}; finished runs are kept: {}".format(*self.args)
 
 
-def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
-    """Failures by cause, the most frequent first: ``{"cause", "runs", "labels"}``.
+class Cause(records.Record):
+    """A cause of failures, with their runs, numbered from 1, and their labels."""
+
+    cause: str
+    runs: list[int]
+    labels: list[str]
+
+
+def grouped(failures: Iterable[Failure]) -> list[Cause]:
+    """Failures by cause, the most frequent first.
 
     Causes that differ only in their numbers are one, under the first of them.
     """
     groups = []
     for group in sorted(alike(failures, lambda failure: failure.cause), key=len, reverse=True):
         runs = [failure.run for failure in group if failure.run is not None]
-        groups.append({"cause": group[0].cause, "runs": runs, "labels": [failure.label for failure in group]})
+        groups.append(Cause(group[0].cause, runs, [failure.label for failure in group]))
     return groups
 
 
@@ -79,7 +88,7 @@ def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
 
 def sentence(failures: Sequence[Failure]) -> str:
     """All failures in one sentence: each cause once, with its points."""
-    return "; ".join(f"{', '.join(group['labels'])}: {group['cause']}" for group in grouped(failures))
+    return "; ".join(f"{', '.join(group.labels)}: {group.cause}" for group in grouped(failures))
 
 
 FORMAT, VERSION = "doe.store", "2"

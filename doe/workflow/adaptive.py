@@ -131,7 +131,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
             raise
         except MethodError as error:
             if evaluator.failures:
-                causes = "; ".join(group["cause"] for group in grouped(evaluator.failures))
+                causes = "; ".join(group.cause for group in grouped(evaluator.failures))
                 raise RunError(f"adaptive front: {error} ({causes})") from None
             raise InputError([f"{study.path}: adaptive.{error}"]) from None
     ends = np.column_stack([search.region.low, search.region.high])

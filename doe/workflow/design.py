@@ -1,21 +1,23 @@
 """The design of a study: its points, and what its models need of them."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from doe import designs
 from doe.designs import Design
-from doe.designs.model import Model, Terms, lost_terms, model_terms
+from doe.designs.model import Evaluation, Model, Terms, evaluate, lost_terms, model_terms
 from doe.study_file import Study
 from doe.study_file.sections import KEYS_OF
 from doe.study_file.sections import Design as DesignSettings
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, refuse
+from rbdyn.base.notes import Note
+from rbdyn.base.records import Record
 from rbdyn.base.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
@@ -134,16 +136,74 @@ def check_runs(study: Study, design: Design) -> None:
     refuse(faults)
 
 
-def evaluation(study: Study, design: Design) -> dict[str, Any]:
-    """Quality of the design for the largest model of a response, with the name of the model as ``model``.
-
-    See `doe.designs.model.evaluate`. Raises InputError if the runs are too few.
-    """
-    from doe.designs.model import evaluate
-
+def evaluation(study: Study, design: Design) -> Evaluation:
+    """Quality of the design for the largest model of a response, with the name of the model. Raises InputError if the runs are too few."""
     check_runs(study, design)
     model = max(
         (response.model for response in study.file.response), key=lambda candidate: len(terms_of(study, candidate))
     )
     figures = evaluate(design.coded, terms_of(study, model), design.block, region=design.region, reach=design.extent)
-    return {"model": model, **figures}
+    return replace(figures, model=model)
+
+
+class DesignRun(Record):
+    """A run of a design, numbered in its order from 1, in coded and in actual units."""
+
+    run: int
+    kind: str
+    block: int
+    coded: dict[str, float]
+    factors: dict[str, float]
+    seed: int
+
+
+class StandardRun(DesignRun):
+    """A run with its place in the standard order, from 1."""
+
+    standard: int
+
+
+class DesignResult(Record, kw_only=True):
+    """A design of the ``factors``, whose coded values ``reach`` so far, and how good it is."""
+
+    kind: str
+    factors: list[str]
+    reach: float
+    runs: list[StandardRun]
+    evaluation: Evaluation
+    notes: list[Note] | None = None
+
+    @property
+    def is_blocked(self) -> bool:
+        """Whether there are several blocks."""
+        return self.evaluation.blocks is not None
+
+    @classmethod
+    def of(cls, study: Study, design: Design, notes: Sequence[Note] = ()) -> Self:
+        """The design of a study. Raises InputError if its runs are too few."""
+        runs = zip(design_runs(study, design), design.order.tolist(), strict=True)
+        return cls(
+            kind=study.file.design.kind,
+            factors=study.factors,
+            reach=design.reach,
+            runs=[StandardRun(**vars(run), standard=place + 1) for run, place in runs],
+            evaluation=evaluation(study, design),
+            notes=list(notes) or None,
+        )
+
+
+def design_runs(study: Study, design: Design) -> list[DesignRun]:
+    """Runs in their order."""
+    actual = study.actual(design.coded)
+    rows = zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True)
+    return [
+        DesignRun(
+            number,
+            kind,
+            block,
+            coded=study.by_factor(coded),
+            factors=study.by_factor(values),
+            seed=study.file.design.seed + place,
+        )
+        for number, (place, kind, block, coded, values) in enumerate(rows, 1)
+    ]

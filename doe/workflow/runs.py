@@ -12,18 +12,19 @@ import numpy as np
 from doe import clearance
 from doe.designs import Design
 from doe.designs.design import SAME_POINT
-from doe.designs.model import lattice, lost_terms
+from doe.designs.model import Evaluation, lattice, lost_terms
 from doe.designs.remaining import Remaining, added_points
 from doe.duty import DutyResult
 from doe.running.runner import AgendaKeeper, Progress
-from doe.running.store import Failure, Store, alike, sentence
+from doe.running.store import Cause, Failure, Store, alike, grouped, sentence
 from doe.study_file.duty import at_point
 from doe.study_file.table import read_table
-from doe.workflow.design import all_terms, check_runs, realised, terms_of
+from doe.workflow.design import DesignRun, all_terms, check_runs, design_runs, evaluation, realised, terms_of
 from doe.workflow.problem import Problem, RunPlan
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes
+from rbdyn.base.records import Record, finite
 from rbdyn.base.words import are, counted
 from rbdyn.result import SimulationResult
 
@@ -214,3 +215,52 @@ def read_runs(study: Problem, path: Path) -> Runs:
     table = read_table(path, study.factors, study.responses, study.path)
     coded = study.coded(table.actual)
     return Runs(coded, table.actual, table.values, table.errors, table.notes, table.replicates, table.block)
+
+
+class RunResponse(Record):
+    """A response of a run with the half width of its 95 % interval, None where that is unknown."""
+
+    value: float
+    error: float | None
+
+
+class StudyRun(DesignRun):
+    """A run with its responses by name, none of a failed one."""
+
+    responses: dict[str, RunResponse]
+
+
+class StudyDesign(Record, kw_only=True):
+    """The design of a study with the results of its runs, how good it is, and what failed."""
+
+    kind: str
+    runs: int
+    factors: list[str]
+    responses: list[str]
+    points: list[StudyRun]
+    evaluation: Evaluation
+    failures: list[Cause]
+
+    @classmethod
+    def of(cls, study: Problem, design: Design, runs: Runs) -> Self:
+        """The design with its ``runs``. Raises InputError if these are too few."""
+        rows = zip(runs.values.tolist(), runs.errors.tolist(), strict=True)
+        results = {
+            place: {
+                name: RunResponse(value, finite(error))
+                for name, value, error in zip(study.responses, values, errors, strict=True)
+            }
+            for place, (values, errors) in zip(runs.places, rows, strict=True)
+        }
+        return cls(
+            kind=study.file.design.kind,
+            runs=len(design.coded),
+            factors=study.factors,
+            responses=study.responses,
+            points=[
+                StudyRun(**vars(run), responses=results.get(place, {}))
+                for place, run in enumerate(design_runs(study, design))
+            ],
+            evaluation=evaluation(study, design),
+            failures=grouped(runs.failures),
+        )

@@ -24,6 +24,7 @@ from doe.workflow.region import region_in_store
 from doe.workflow.runs import STORE
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
+from rbdyn.base.records import plain
 from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.base.tables.workbook import split_path
 from rbdyn.result import read_json, versions
@@ -309,7 +310,7 @@ def _record(
         "stopped_by": "" if answered or alive else agenda.fault,
         "stages": [_stage(agenda, place, answered) for place in range(len(agenda.stages))],
         "points": dict(counts),
-        "failures": grouped(failures),
+        "failures": plain(grouped(failures)),
         "running": [_running(run) for run in content.running],
         "other": dict(other_counts),
         "spent_s": sum(run.seconds or 0.0 for run in content.ended),

@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.dimension_chain import read_chains
-from doe.report.files import study_design_record as summary_design
-from doe.report.sections.design import design_record
+from doe.report.sections.design import run_sheet
 from doe.study_file.table import read_table
-from doe.workflow.design import evaluation
+from doe.workflow.design import DesignResult
 from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs, StudyDesign
 from rbdyn.base.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.sweep import keys_of_texts
@@ -257,23 +257,16 @@ def test_a_study_without_a_front_is_refused_before_it_runs(tmp_path, change, wor
 
 def test_blocks_are_numbered_from_one_everywhere(tmp_path):
     """Design, its CSV, the summary and the table of runs number the blocks of a design alike."""
-    from types import SimpleNamespace
-
-    from doe.report.files import _runs_table
-    from doe.workflow.runs import Runs
-
     path = study(tmp_path, ('alpha = "rotatable"', 'alpha = "orthogonal_blocks"\nblocks = true'))
     path.write_text(path.read_text(encoding="utf-8").partition("[reference]")[0], encoding="utf-8")
     loaded = Problem.load(path)
     design = loaded.design
     expected = [1] * 12 + [2] * 8
-    record = design_record(loaded, design, evaluation(loaded, design))
-    assert [run["block"] for run in record["runs"]] == expected
+    assert [run.block for run in DesignResult.of(loaded, design).runs] == expected
     values = np.ones((20, 3))
-    outcome = SimpleNamespace(study=loaded, design=design, runs=Runs(design.coded, design.coded, values, values))
-    summary = summary_design(outcome)
-    assert [row["block"] for row in _runs_table({"design": summary})] == expected
-    assert [point["block"] for point in summary["points"]] == expected
+    runs = StudyDesign.of(loaded, design, Runs(design.coded, design.coded, values, values)).points
+    assert [run.block for run in runs] == expected
+    assert [row["block"] for row in run_sheet(loaded.factors, loaded.responses, runs).records] == expected
     lines = CliRunner().invoke(app, ["design", str(path), "--csv"]).stdout.splitlines()
     assert [int(line.split(",")[1]) for line in lines[1:]] == expected
 

@@ -148,16 +148,22 @@ def summary() -> dict[str, Any]:
             "factors": FACTORS,
             "responses": RESPONSES,
             "points": [
-                {"run": run + 1, "kind": "cube" if run < 8 else "centre", "block": 0, "seed": run + 1,
-                 "factors": point(coded)["factors"],
+                {"run": run + 1, "kind": "cube" if run < 8 else "centre", "block": 1, "seed": run + 1,
+                 "coded": dict(zip(FACTORS, coded, strict=True)), "factors": point(coded)["factors"],
                  "responses": {name: {"value": predicted(name, coded), "error": 0.2} for name in RESPONSES}}
                 for run, coded in enumerate(runs)
             ],
-            "evaluation": {"efficiency_percent": {"d": 68.2, "g": 71.0}, "condition_number": 3.4, "terms": ["1", "A", "B"],
-                           "vif": {"A": 1.0, "B": 1.0, "C": 1.02}, "power_percent": {t: {"one_sigma": 30.0} for t in "ABC"},
-                           "by_radius": [{"radius": r, "min": 1 + r, "mean": 2 + r, "max": 3 + r} for r in (0.0, 1.0)],
-                           "fraction_of_design_space": [{"percent": p, "variance": 3 + p / 50} for p in (0, 50, 100)]},
-            "failures": [{"cause": "step budget used up", "runs": [13]}, {"cause": "step budget used up", "runs": [15]}],
+            "evaluation": {
+                "model": "quadratic", "terms": ["1", "A", "B", "C"], "runs": len(runs), "region": {"shape": "ball", "reach": REACH},
+                "efficiency_percent": {"d": 68.2, "g": 71.0},
+                "scaled_prediction_variance": {"centre": 3.0, "mean": 8.0, "max": 14.0, "box_max": 20.0},
+                "by_radius": [{"radius": r, "min": 1 + r, "mean": 2 + r, "max": 3 + r} for r in (0.0, 1.0)],
+                "fraction_of_design_space": [{"percent": p, "variance": 3 + p / 50} for p in (0, 50, 100)],
+                "vif": {"A": 1.0, "B": 1.0, "C": 1.02}, "leverage": [0.3] * len(runs), "condition_number": 3.4,
+                "degrees_of_freedom": {"model": 3, "residual": 8}, "blocks": None,
+                "power_percent": {term: {"one_sigma": 30.0, "two_sigma": 80.0} for term in "ABC"},
+            },
+            "failures": [{"cause": "step budget used up", "runs": [13], "labels": ["run 13"]}],
         },
         "fit": {"responses": {name: fitted(name, runs) for name in RESPONSES}},
         "front": {
@@ -211,7 +217,7 @@ def summary() -> dict[str, Any]:
             }
         },
         "notes": [{"level": "note", "code": "traction-law", "text": "traction: one set of constants"}],
-        "failures": [{"cause": "step budget used up", "runs": [13, 15]}],
+        "failures": [{"cause": "step budget used up", "runs": [13, 15], "labels": ["run 13", "run 15"]}],
         "cost": {"design_s": 31.5, "total_s": 36.1},
         "versions": {"rbdyn": "0.1.0"},
         "seeds": {"design": 1},

@@ -94,7 +94,7 @@ def test_literature_nine_runs_in_two_factors():
     design = optimal(2, criterion="d", runs=9)
     assert sorted(map(tuple, design.coded)) == sorted(map(tuple, full_factorial(2).coded))
     found = evaluate(design.coded, QUADRATIC, region=design.region, reach=design.extent)
-    assert found["efficiency_percent"]["d"] == pytest.approx(46.2, abs=0.05)
+    assert found.efficiency_percent["d"] == pytest.approx(46.2, abs=0.05)
 
 
 def test_literature_six_runs_in_two_factors():
@@ -126,8 +126,8 @@ def test_oracle_free_optimisation_finds_nothing_better(criterion):
 def test_each_criterion_wins_at_its_own(runs):
     d, i = (optimal(3, criterion=criterion, runs=runs) for criterion in ("d", "i"))
     found = [evaluate(each.coded, model_terms(3, "quadratic"), region="box", reach=1.0) for each in (d, i)]
-    assert found[0]["efficiency_percent"]["d"] > 1.05 * found[1]["efficiency_percent"]["d"]
-    assert found[0]["scaled_prediction_variance"]["mean"] > 1.05 * found[1]["scaled_prediction_variance"]["mean"]
+    assert found[0].efficiency_percent["d"] > 1.05 * found[1].efficiency_percent["d"]
+    assert found[0].scaled_prediction_variance.mean > 1.05 * found[1].scaled_prediction_variance.mean
 
 
 @pytest.mark.parametrize("criterion", ["d", "i"])

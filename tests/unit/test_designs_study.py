@@ -80,8 +80,8 @@ def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach
     assert design.coded.shape == (runs, factors)
     assert design.reach == pytest.approx(reach)
     found = evaluation(study, design)
-    assert found["region"]["shape"] == ("box" if reach == 1.0 and factors == 3 else "ball")
-    assert 0.0 < found["efficiency_percent"]["g"] <= 100.0
+    assert found.region.shape == ("box" if reach == 1.0 and factors == 3 else "ball")
+    assert 0.0 < found.efficiency_percent["g"] <= 100.0
 
 
 @pytest.mark.parametrize(

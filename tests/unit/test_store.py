@@ -396,7 +396,7 @@ def test_causes_that_differ_in_numbers_are_one_and_the_most_frequent_comes_first
         Failure("pick", "no oil"),
         Failure("design run 7", "seed 7 stopped at t = 3 s: frozen", 7),
     ]
-    assert grouped(failures) == [
+    assert [group.as_dict() for group in grouped(failures)] == [
         {
             "cause": "seed 2 stopped at t = 1.5e-05 s: frozen",
             "runs": [2, 7],
