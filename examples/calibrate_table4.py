@@ -28,11 +28,13 @@ from scipy.stats import spearmanr
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.sections.calibration import blocks, files_of, record_of, write
+from doe.report.identity import scene_identity
+from doe.report.sections.calibration import blocks, files_of, signed, write
 from doe.running.store import Failure, Store
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
-from doe.workflow.calibration import Calibration, Question, find_calibration, question_of, read_question
+from doe.workflow.calibration import Question, find_calibration, read_question
+from doe.workflow.identification import Evidence
 from rbdyn.base.terminal import show
 from rbdyn.scene.unknown import put
 
@@ -115,13 +117,16 @@ def told(frame: pd.DataFrame) -> list[str]:
     return lines
 
 
-def simulated_sets(found: Calibration) -> np.ndarray:
+def simulated_sets(found: Evidence) -> np.ndarray:
     """Outputs (n, 15, 3) of every input set that ran at all designs."""
-    batches = [found.match.batch.values, *([] if found.match.tried is None else [found.match.tried.values])]
+    batches = [
+        found.match.batch.values,
+        *([] if found.match.posterior_runs is None else [found.match.posterior_runs.values]),
+    ]
     return np.exp(np.concatenate(batches)).reshape(-1, len(table()[0]), len(RESPONSES))
 
 
-def survival(found: Calibration, simulations: Simulations) -> list[str]:
+def survival(found: Evidence, simulations: Simulations) -> list[str]:
     """Whether the pick beats the baseline over the posterior: both at the same input sets."""
     quantiles = found.quantiles[:: max(1000 // PAIRS, 1)][:PAIRS]
     values = unknown.table_of({each.key: each.law for each in found.inputs}, quantiles)
@@ -157,17 +162,18 @@ def main(arguments: list[str] | None = None) -> None:
     with Store(given.out / "study.sqlite", "Table 4") as store:
         simulations = Simulations(store, None, None, False, lambda title: lambda done, total: None)
         found = find_calibration(asked, simulations)
-        record = record_of(found, question_of(asked))
-        write(found, record, given.out)
-        show(blocks(record))
-        frame = agreement(simulated_sets(found))
+        evidence = found.evidence
+        assert evidence is not None
+        write(signed(found), given.out, scene_identity("doe calibrate", given.out / "scene.toml", ()))
+        show(blocks(found))
+        frame = agreement(simulated_sets(evidence))
         frame.to_csv(given.out / "agreement.csv", index=False)
         print("\nof all input sets that were simulated at the 15 designs:")
         print("\n".join(told(frame)))
-        if found.match.sampled is not None:
+        if found.posterior:
             print("\nover the posterior, which is no calibration unless the verdict says so:")
-            print("\n".join(survival(found, simulations)))
-    print(f"written to {given.out}: {', '.join([*files_of(record), 'agreement.csv'])}")
+            print("\n".join(survival(evidence, simulations)))
+    print(f"written to {given.out}: {', '.join([*files_of(found), 'agreement.csv'])}")
 
 
 if __name__ == "__main__":

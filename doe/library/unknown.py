@@ -16,6 +16,7 @@ from rbdyn.base.pace import Notice
 from rbdyn.base.words import counted, quantity, shown
 
 if TYPE_CHECKING:
+    from doe.workflow.identification import Calibration
     from doe.workflow.uncertainty import Uncertainty
     from rbdyn.base.table import Sheet
 
@@ -127,57 +128,32 @@ def _points_faults(points: Any) -> list[str]:
     return no_power_of_two("--points ", int(points))
 
 
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class CalibrationAnswer(Answer):
     """What measurements on a rig say about the unknown inputs. Tables: "inputs", "outputs", "cells" (measured, predicted)."""
+
+    calibration: "Calibration"
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.calibration import blocks
 
-        return blocks(self.as_dict())
+        return blocks(self.calibration)
 
     def rows(self) -> Mapping[str, Rows]:
-        learned = self.record["learned"]
-        return {
-            "inputs": [
-                {"input": key, "contraction": learned[key], **_input_row(row)}
-                for key, row in self.record["inputs"].items()
-            ],
-            "outputs": [
-                {
-                    "output": name,
-                    **{key: row[key] for key in ("explained", "allowed", "accuracy_percent", "evidence", "resolution")},
-                }
-                for name, row in self.record["outputs"].items()
-            ],
-            "cells": [
-                {
-                    **{key: cell[key] for key in ("row", "output", "measured", "sd", "held", "as_the_scene_says")},
-                    **_ends("before", cell["before"]),
-                    **_ends("after", cell["after"]),
-                    "residual": cell["residual"],
-                }
-                for cell in self.record["cells"]
-            ],
+        from doe.report.sections.calibration import cell_sheet, input_sheet, output_sheet
+
+        sheets: dict[str, Sheet[Any]] = {
+            "inputs": input_sheet(self.calibration),
+            "outputs": output_sheet(self.calibration),
+            "cells": cell_sheet(self.calibration),
         }
+        return {name: sheet.records for name, sheet in sheets.items()}
 
     def brief(self) -> str:
         from doe.report.sections.calibration import verdict_words
 
-        return f"{one_line(verdict_words(self.record), 4 * LONGEST_NAME)}, {counted(self.record['runs'], 'run')}"
-
-
-def _input_row(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Densest 90 % of an input with its median and its range before, or the shares of its choices."""
-    if "shares" in row:
-        return {f"share_{value}": share for value, share in row["shares"].items()} | {"seen": row["seen"]}
-    before_low, before_high = row["before"]
-    ends = {key: row[key] for key in ("low", "median", "high")}
-    return {**ends, "before_low": before_low, "before_high": before_high, "seen": row["seen"]}
-
-
-def _ends(name: str, quantiles: Sequence[float] | None) -> dict[str, float | None]:
-    """5, 50 and 95 % of the predictions."""
-    return dict(zip((f"{name}_low", f"{name}_median", f"{name}_high"), quantiles or (None,) * 3, strict=True))
+        words = one_line(verdict_words(self.calibration), 4 * LONGEST_NAME)
+        return f"{words}, {counted(self.calibration.runs, 'run')}"
 
 
 def calibrate(
@@ -207,9 +183,10 @@ def calibrate(
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
     from doe.report.identity import scene_identity
-    from doe.report.sections.calibration import FILES, RECORD, cost_of, files_of, record_of, stored, write
+    from doe.report.sections.calibration import FILES, RECORD, files_of, signed, stored, write
     from doe.running.runner import ANSWER
     from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
+    from doe.workflow.identification import Cost
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
@@ -221,8 +198,10 @@ def calibrate(
     with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)
         identity, scene = question_of(question), scene_identity("doe calibrate", path, assignments, table)
-        if not retry and (record := stored(folder, identity)) is not None:
-            return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
+        if not retry and (result := stored(folder, identity)) is not None:
+            return CalibrationAnswer(
+                result.as_dict(), folder, tuple(files_of(result)), identity=scene, calibration=result
+            )
         output.claim(path)
         inputs = content_digest(path)
         with effort.agenda(folder, "doe calibrate", inputs=inputs, question=identity) as agenda:
@@ -233,7 +212,7 @@ def calibrate(
                 result = find_calibration(question, simulations)
                 turns, took_s = simulations.turns, agenda.elapsed_s
             agenda.enter(ANSWER)
-            record = record_of(result, identity) | {"cost": cost_of(result.runs, turns, took_s)}
-            output.write(lambda stage: write(result, record, stage, scene), last=RECORD)
-            agenda.finish(files_of(record))
-    return CalibrationAnswer(record, folder, tuple(files_of(record)), identity=scene)
+            result = signed(replace(result, cost=Cost(result.runs, turns, took_s)))
+            output.write(lambda stage: write(result, stage, scene), last=RECORD)
+            agenda.finish(files_of(result))
+    return CalibrationAnswer(result.as_dict(), folder, tuple(files_of(result)), identity=scene, calibration=result)

@@ -40,8 +40,9 @@ from doe.unknown.posterior import (
     joint,
     sampled,
 )
-from doe.unknown.width import Scores, Width, prequential, scores_of, width
+from doe.unknown.width import Power, Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole
+from rbdyn.base.records import Record, keyed
 
 # Implausibility from which an input set is ruled out.
 RULED_OUT = 3.0
@@ -266,13 +267,12 @@ class Prediction(NamedTuple):
     residuals: Array
 
 
-@dataclass(frozen=True)
-class Trial:
-    """How well the cells of a prediction were predicted."""
+class Trial(Record):
+    """How well the cells of a prediction were predicted, of rows "held out" or of "each condition in turn"."""
 
-    validation: bool
-    cells: int
-    inside: int
+    rows: str
+    cells: int = keyed("values")
+    inside: int = keyed("inside_90_percent")
     crps: float
     crps_before: float
     width: Width
@@ -375,13 +375,13 @@ def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
         yield scores_of(draws, measured.values[targets], measured.output[targets])
 
 
-def trial(prediction: Prediction, particles: Particles, seed: int, *, validation: bool) -> Trial:
+def trial(prediction: Prediction, particles: Particles, rows: str, seed: int, power: Power | None) -> Trial:
     """How well cells were predicted."""
     truth = particles.measured.values[prediction.places]
     low, high = np.quantile(prediction.after, [0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE], axis=0)
     inside = int(((truth >= low) & (truth <= high)).sum())
     after, before = (_crps(draws, truth) for draws in (prediction.after, prediction.before))
-    return Trial(validation, truth.size, inside, after, before, width(list(sequential_scores(particles, seed))))
+    return Trial(rows, truth.size, inside, after, before, width(list(sequential_scores(particles, seed)), power))
 
 
 def _crps(draws: Array, truth: Array) -> float:
@@ -437,8 +437,8 @@ class Judgement:
     particles: Particles
 
 
-def judge(match: Matched, names: Sequence[str], seed: int) -> Judgement:
-    """Judge a calibration that has a sample; ``names`` are those of the outputs."""
+def judge(match: Matched, names: Sequence[str], seed: int, power: Power | None = None) -> Judgement:
+    """Judge a calibration that has a sample; ``names`` are those of the outputs, ``power`` is that of the design."""
     assert match.sampled is not None
     measured, points = match.measured, match.sampled.points
     particles = Particles.of(match.sampled, match.joint, measured)
@@ -451,9 +451,9 @@ def judge(match: Matched, names: Sequence[str], seed: int) -> Judgement:
         residuals[part.places] = part.residuals
     beyond = match.errors(points).beyond
     outputs = explanations(names, match, points, seed)
-    return Judgement(
-        trial(parts[-1], particles, seed, validation=enough), outputs, joint_factor(beyond), residuals, particles
-    )
+    rows = "held out" if enough else "each condition in turn"
+    result = trial(parts[-1], particles, rows, seed, power)
+    return Judgement(result, outputs, joint_factor(beyond), residuals, particles)
 
 
 def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[str]:

@@ -14,13 +14,13 @@ Resampling-based multiple testing (1993), section 2.3, for the smallest of sever
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy import special
 
 from rbdyn.base.arrays import Array, Mask, Whole
+from rbdyn.base.records import Record, keyed, outside_json, spread
 
 # Probability of a rejection, of either side, if predictions are right.
 LEVEL = 0.05
@@ -40,20 +40,38 @@ class Scores(NamedTuple):
     output: Whole
 
 
-@dataclass(frozen=True)
-class Width:
+class Power(Record):
+    """What a design shows of the width of its predictions.
+
+    cells : number of cells that are predicted
+    wide, narrow : probabilities of rejecting predictions that are twice too wide, and twice too narrow
+    """
+
+    wide: float = keyed("power_too_wide")
+    narrow: float = keyed("power_too_narrow")
+    cells: int = outside_json(default=0)
+
+    @property
+    def enough(self) -> bool:
+        """Whether both are found in half of such tables."""
+        return min(self.wide, self.narrow) >= OFTEN
+
+
+class Width(Record):
     """The width of predictions of ``cells`` many cells.
 
     ratio : scatter of the residuals over the predicted scatter
     chance : probability of as much in either direction if predictions are right
+    power : what the design shows of it, where that is known
     output, worst : place of the output that shows it most (None: all together), and its own ratio
     """
 
-    cells: int
+    cells: int = keyed("values")
     ratio: float
     chance: float
-    output: int | None
-    worst: float
+    power: Power | None = spread(default=None)
+    output: int | None = outside_json(default=None)
+    worst: float = outside_json(default=1.0)
 
     @property
     def rejected(self) -> bool:
@@ -74,7 +92,7 @@ def scores_of(draws: Array, measured: Array, output: Whole) -> Scores:
     return Scores(independent[0], independent[1:], output)
 
 
-def width(parts: Sequence[Scores]) -> Width:
+def width(parts: Sequence[Scores], power: Power | None = None) -> Width:
     """The width of predictions, from the scores of all predicted rows."""
     output = np.concatenate([row.output for row in parts])
     squares = np.hstack([np.vstack([row.measured, row.draws]) for row in parts]) ** 2
@@ -89,7 +107,7 @@ def width(parts: Sequence[Scores]) -> Width:
     ratios = np.sqrt(sums[0] / groups.sum(axis=0))
     chance = (1.0 + float(np.searchsorted(least, observed.min(), "right"))) / (len(least) + 1.0)
     name = None if worst == 0 else int(names[worst - 1])
-    return Width(output.size, float(ratios[0]), chance, name, float(ratios[worst]))
+    return Width(output.size, float(ratios[0]), chance, power, name, float(ratios[worst]))
 
 
 def _chances(sorted_sums: Array, sums: Array) -> Array:
@@ -112,24 +130,6 @@ def prequential(row: Whole, validation: Mask, random: np.random.Generator) -> tu
     return [*training, *held], (len(training) + 1) // 2
 
 
-@dataclass(frozen=True)
-class Power:
-    """What a design shows of the width of its predictions.
-
-    cells : number of cells that are predicted
-    wide, narrow : probabilities of rejecting predictions that are twice too wide, and twice too narrow
-    """
-
-    cells: int
-    wide: float
-    narrow: float
-
-    @property
-    def enough(self) -> bool:
-        """Whether both are found in half of such tables."""
-        return min(self.wide, self.narrow) >= OFTEN
-
-
 def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
     """The power of a design by the output, the row and the use of each cell (c,); ``seed`` is that of the calibration."""
     order, start = prequential(row, validation, np.random.default_rng(seed))
@@ -140,7 +140,7 @@ def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
     limit = least[int(LEVEL * TABLES)]
     # Measured values that scatter half as much as predicted, or twice.
     wide, narrow = (float((_exact_chances(freedom, by * sums) <= limit).mean()) for by in (TWICE**-2, TWICE**2))
-    return Power(int(counts.sum()), wide, narrow)
+    return Power(wide, narrow, int(counts.sum()))
 
 
 def _exact_chances(freedom: Array, sums: Array) -> Array:

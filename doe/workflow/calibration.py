@@ -7,7 +7,6 @@ import copy
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,22 +19,10 @@ from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
-from doe.unknown.calibration import (
-    FAR,
-    MISSED,
-    TRIED,
-    Batch,
-    Judgement,
-    Matched,
-    Unknowns,
-    judge,
-    matched,
-    objections,
-    reweighed,
-    sets_a_wave,
-)
-from doe.unknown.posterior import Learnt, Measured, contraction, densest_intervals, learnt
-from doe.unknown.width import OFTEN, Power, power_of
+from doe.unknown.calibration import TRIED, Batch, Unknowns, matched, sets_a_wave
+from doe.unknown.posterior import Measured
+from doe.unknown.width import OFTEN, power_of
+from doe.workflow.identification import BEFORE, Calibration, Design, Evidence, identified
 from doe.workflow.input_sets import (
     NORMAL,
     Case,
@@ -56,19 +43,12 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import code_version, digest_of
-from rbdyn.base.words import counted, quantity
+from rbdyn.base.words import counted
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented
-from rbdyn.scene.unknown import Input, put, value_of
-
-
-class Design(NamedTuple):
-    """The power of a design to judge predictions, and a sentence on one that cannot; empty for another."""
-
-    power: Power
-    doubt: str
+from rbdyn.scene.unknown import Input, put
 
 
 class Question(NamedTuple):
@@ -225,101 +205,8 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
 
 # Most runs of a calibration: of 200 conditions and eight unknown inputs in two waves, or some 80 conditions in four.
 MOST_RUNS = 50_000
-# Verdicts on a calibration.
-CALIBRATED, NOT_CALIBRATED, UNDECIDABLE = "calibrated", "not calibrated", "cannot be judged by this design"
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
-# Rows of the posterior sample, and input sets of the prior.
-SAMPLE, BEFORE = 1000, 2000
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """Everything a report needs.
-
-    ``case``: the scene with its unknown inputs; ``inputs``: the targets; ``screened``: inputs kept at their values.
-    ``cells``: (row, output) of each measurement; ``nominal`` (c,): their logarithms at the scene's own inputs.
-    ``design``: what the design can judge.
-    ``before`` and ``after`` (n, c): cells over the prior and the posterior. ``after`` and all that follows from it are None
-    if no input set fits the measurements; ``without``: contraction by key without the outliers among the cells.
-    """
-
-    case: Case
-    rig: Rig
-    inputs: list[Input]
-    screened: dict[str, float]
-    cells: list[tuple[int, str]]
-    nominal: Array
-    match: Matched
-    before: Array
-    runs: int
-    notes: Notes
-    design: Design
-    after: Array | None = None
-    learnt: Learnt | None = None
-    judgement: Judgement | None = None
-    without: dict[str, float] | None = None
-    objections: tuple[str, ...] = ()
-
-    @property
-    def verdict(self) -> str:
-        """ "calibrated", "not calibrated", or that the design cannot judge it."""
-        return NOT_CALIBRATED if self._contradictions else UNDECIDABLE if self.design.doubt else CALIBRATED
-
-    @property
-    def reasons(self) -> list[str]:
-        """Sentences on why the inputs are not calibrated, or not known to be; none if they are."""
-        return [*self._contradictions, *([self.design.doubt] if self.design.doubt else [])]
-
-    @property
-    def _contradictions(self) -> list[str]:
-        cells = [self.cells[place] for place in self.match.refuted]
-        cell_names = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
-        return [
-            *(
-                [f"refuted: no input set within the laws predicts these within the allowed discrepancy: {cell_names}"]
-                if cells
-                else []
-            ),
-            *self.objections,
-        ]
-
-    @property
-    def quantiles(self) -> Array:
-        """Quantiles (n, d) of the inputs, drawn from the posterior."""
-        if self.match.sampled is None:
-            raise RunError("calibration: no input set is left to sample")
-        points = self.match.sampled.points
-        return self.match.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
-
-    @property
-    def ends(self) -> Array:
-        """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie, or more where it is flat."""
-        if self.match.sampled is None:
-            raise RunError("calibration: no input set is left to sample")
-        return densest_intervals(self.match.quantiles(self.match.sampled.points))
-
-    @cached_property
-    def sample(self) -> list[dict[str, Any]]:
-        """Values of each input, and of each key that multiplies one, in the input sets of ``quantiles``."""
-        inputs = [unknown_input.key for unknown_input in self.inputs]
-        tied_keys = [
-            unknown_input.key
-            for unknown_input in self.case.every
-            if unknown_input.key not in inputs and unknown_input.law.times in inputs
-        ]
-        rows = unknown.table_of(laws_of(self.inputs), self.quantiles)
-        scenes = self.case.scenes(self.inputs, rows, 0)
-        # A set may be possible at the rig's conditions and impossible in the scene itself.
-        return [
-            {key: value_of(scene, key) for key in (*inputs, *tied_keys)}
-            for scene in scenes
-            if not isinstance(scene, str)
-        ]
-
-    def outliers(self) -> list[int]:
-        """Places of the cells that the others predict badly."""
-        return [] if self.judgement is None else np.flatnonzero(np.abs(self.judgement.residuals) > FAR).tolist()
 
 
 @dataclass
@@ -393,7 +280,8 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     prior_cells = match.cells.mean(
         match.unknowns.quantiles(np.random.default_rng(0).standard_normal((BEFORE, len(inputs))))
     )
-    calibration = Calibration(
+    evidence = Evidence(
+        made_of=question_of(question),
         case=case,
         rig=rig,
         inputs=inputs,
@@ -406,7 +294,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
         notes=notes,
         design=design_of(question),
     )
-    return calibration if match.sampled is None else _with_judgement(calibration)
+    return identified(evidence)
 
 
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
@@ -491,62 +379,6 @@ def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
         return quantiles
 
     return Unknowns(len(inputs), quantiles_at)
-
-
-def _with_judgement(calibration: Calibration) -> Calibration:
-    """The calibration with its posterior, the judgement of its predictions, and the objections."""
-    match, seed = calibration.match, calibration.case.scene.calibrate.seed
-    assert match.sampled is not None
-    points = match.sampled.points
-    judgement = judge(match, [quantity(name)[0] for name in calibration.rig.outputs], seed)
-    quantiles = match.quantiles(points)
-    prior = match.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(calibration.inputs))))
-    gained = learnt(quantiles, _logarithms(calibration.inputs, quantiles), _logarithms(calibration.inputs, prior))
-    objection_list = objections(judgement, anything=gained.anything, emulated=match.misfit < MISSED)
-    rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
-    posterior_cells = match.cells.mean(quantiles[rows])
-    notes = (
-        *calibration.notes,
-        *(
-            Note(
-                "inputs",
-                f"{calibration.inputs[place].key}: the posterior lies at an end of its range, which may be too narrow",
-            )
-            for place in gained.narrow
-        ),
-    )
-    result = replace(
-        calibration,
-        after=posterior_cells,
-        learnt=gained,
-        judgement=judgement,
-        objections=tuple(objection_list),
-        notes=notes,
-    )
-    return replace(result, without=_contraction_without_outliers(result))
-
-
-def _contraction_without_outliers(calibration: Calibration) -> dict[str, float] | None:
-    """Contraction by key without the outliers among the cells; None without outliers or without other cells."""
-    match = calibration.match
-    assert calibration.judgement is not None
-    cells = np.setdiff1d(match.measured.learnt, calibration.outliers())
-    if cells.size in (0, match.measured.learnt.size):
-        return None
-    points = reweighed(calibration.judgement.particles, cells, calibration.case.scene.calibrate.seed)
-    shares = contraction(match.quantiles(points)).tolist()
-    return dict(zip((unknown_input.key for unknown_input in calibration.inputs), shares, strict=True))
-
-
-def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
-    """Logarithms (n, d) of inputs that are positive numbers; NaN of the others."""
-    logarithms = np.full(quantiles.shape, np.nan)
-    for place, unknown_input in enumerate(inputs):
-        if unknown_input.law.law != "choices":
-            values = np.array(unknown.values_of(unknown_input.law, quantiles[:, place]))
-            if (values > 0.0).all():
-                logarithms[:, place] = np.log(values)
-    return logarithms
 
 
 def calibration_stages(question: Question) -> list[Stage]:

@@ -149,26 +149,21 @@ def simulated_rig(folder: Path, kind: str, number: int) -> tuple[Path, Path, dic
 def simulated(folder: Path, kind: str, number: int) -> Answer:
     """Calibrate a rig of the example bearing; rigs in one folder share the runs of the first wave."""
     from doe.clearance import Simulations
-    from doe.report.sections.calibration import record_of
     from doe.running.store import Store
-    from doe.workflow.calibration import find_calibration, question_of, read_question
+    from doe.workflow.calibration import find_calibration, read_question
 
     scene, rig, truth = simulated_rig(folder, kind, number)
     question = read_question(scene, rig, (), ())
     with Store(folder / "study.sqlite", "rigs") as store:
         simulations = Simulations(store, 1, None, False, lambda title: lambda done, total: None)
-        record = record_of(find_calibration(question, simulations), question_of(question))
-    (folder / f"record_{kind}_{number}.json").write_text(json.dumps({**record, "truth": truth}, indent=1), "utf-8")
-    ranges = record["inputs"]
-    covered = [ranges[key]["low"] <= value <= ranges[key]["high"] for key, value in truth.items() if ranges]
-    return Answer(
-        kind,
-        number,
-        record["verdict"],
-        record["reasons"],
-        covered,
-        [each["resolution"] for each in record["outputs"].values()],
+        found = find_calibration(question, simulations)
+    (folder / f"record_{kind}_{number}.json").write_text(
+        json.dumps({**found.as_dict(), "truth": truth}, indent=1), "utf-8"
     )
+    ranges = found.inputs
+    covered = [ranges[key].low <= value <= ranges[key].high for key, value in truth.items() if ranges]
+    resolutions = [output.resolution for output in found.outputs.values()]
+    return Answer(kind, number, found.verdict, found.reasons, covered, resolutions)
 
 
 # A bearing in closed form: impact, loss and cage speed in eight conditions of speed and load, of a bar's stiffness, the oil's

@@ -15,8 +15,9 @@ from typer.testing import CliRunner
 import doe
 from doe.cli import app
 from doe.report.identity import scene_identity
-from doe.report.sections.calibration import blocks, files_of, record_of, stored, write
+from doe.report.sections.calibration import blocks, files_of, signed, stored, write
 from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
+from doe.workflow.identification import Calibration
 from doe.workflow.rig import read_rig
 from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
@@ -292,9 +293,9 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     question = read_question(Path(scene), Path(rig), (), ())
     simulations = _Simulations()
     found = find_calibration(question, simulations)  # type: ignore[arg-type]
-    record = record_of(found, "made of this")
-    assert json.loads(json.dumps(record)) == record
-    assert record["verdict"] == "calibrated", record["reasons"]
+    record = found.as_dict()
+    assert json.loads(json.dumps(record)) == record and type(found).from_dict(record).as_dict() == record
+    assert found.verdict == "calibrated", found.reasons
     assert record["runs"] == simulations.runs <= 8 * (1 + 4 * 64 + 2 * 50)
     for key, value in HIDDEN.items():
         assert record["inputs"][key]["low"] < value < record["inputs"][key]["high"]
@@ -310,34 +311,31 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert [each["accuracy_percent"] for each in record["outputs"].values()] == [10.0, 3.0]
     # The reader first hears which offset could hide, and what it does to the input that the output shows.
     impact = record["outputs"]["impact_force_N"]
-    first = text(blocks(record)).split("\n\n")[0].replace("\n", " ")
+    first = text(blocks(found)).split("\n\n")[0].replace("\n", " ")
     assert (
         first.startswith("calibrated: an offset of the impact force below") and "would not be seen and moves" in first
     )
     assert max(impact["moves_sd"], key=impact["moves_sd"].get) == "model.pocket_bar_stiffness_N_m"
     assert impact["moves"]["model.pocket_bar_stiffness_N_m"] > 0.0 and impact["resolution"] > 0.2
-    assert "absorbed" not in text(blocks(record))
+    assert "absorbed" not in text(blocks(found))
     assert set(record["discrepancy"]) == {"impact_force_N", "power_loss_W"}
-    shown = text(blocks(record))
+    shown = text(blocks(found))
     assert shown.startswith("calibrated") and "identified combination lubricant.oil_fraction^1" in shown
 
-    write(found, record, tmp_path, scene_identity("doe calibrate", Path(scene), ()))
-    assert all((tmp_path / name).stat().st_size > 0 for name in files_of(record))
-    assert stored(tmp_path, "made of this") == record and stored(tmp_path, "made of that") is None
-    with (tmp_path / "posterior.csv").open(encoding="utf-8") as file:
+    assert found.made_of == question_of(question)
+    out, whole = tmp_path / "out", signed(found)
+    out.mkdir()
+    write(whole, out, scene_identity("doe calibrate", Path(scene), ()))
+    assert all((out / name).stat().st_size > 0 for name in files_of(found))
+    again = stored(out, found.made_of)
+    assert again is not None and again.as_dict() == whole.as_dict() and stored(out, "made of that") is None
+    with (out / "posterior.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 1000 and set(rows[0]) == {each.key for each in question.targets}
-
-    made = record_of(found, question_of(question))
-    (tmp_path / "out").mkdir()
-    write(found, made, tmp_path / "out", scene_identity("doe calibrate", Path(scene), ()))
-    answer = doe.calibrate(scene, rig, out=tmp_path / "out")
-    assert (
-        answer.as_dict()
-        == made
-        == json.loads(_run([scene, "--data", rig, "--out", str(tmp_path / "out"), "--json"]).stdout)
-    )
-    assert answer.files == tuple(files_of(made)) and repr(answer).startswith("<CalibrationAnswer: calibrated: an")
+    answer = doe.calibrate(scene, rig, out=out)
+    command = _run([scene, "--data", rig, "--out", str(out), "--json"])
+    assert answer.as_dict() == whole.as_dict() == json.loads(command.stdout)
+    assert answer.files == tuple(files_of(found)) and repr(answer).startswith("<CalibrationAnswer: calibrated: an")
     inputs = answer.table().set_index("input")
     assert (inputs["low"] < inputs["median"]).all() and inputs["contraction"].between(-1.0, 1.0).all()
     assert answer.table("cells").shape == (16, 13) and set(answer.table("outputs")["output"]) == set(record["outputs"])
@@ -345,22 +343,20 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path) -> None:
     assert base.changed({key: float(value) for key, value in rows[0].items()}).cage.mass_g == float(
         rows[0]["cage.mass_g"]
     )
-    assert json.loads((tmp_path / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
+    assert json.loads((out / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
 
 
 @pytest.mark.slow
 def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path) -> None:
     scene, _, rig, *_ = _own_rig(tmp_path, reads=1.2)
     found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
-    record = record_of(found, "made of this")
-    assert json.loads(json.dumps(record)) == record
-    assert record["verdict"] == "not calibrated"
-    impact, loss = (record["outputs"][name] for name in ("impact_force_N", "power_loss_W"))
-    assert impact["explained"] and not loss["explained"] and loss["evidence"] > 10.0
+    impact, loss = (found.outputs[name] for name in ("impact_force_N", "power_loss_W"))
+    assert found.verdict == "not calibrated"
+    assert impact.explained and not loss.explained and loss.evidence > 10.0
     # A tenth of what the unknown inputs do to each output is allowed by default.
-    assert 0.005 < loss["allowed"] < 0.05 < 0.2 < loss["discrepancy"][2]
-    assert any(reason.startswith("power loss is not explained") for reason in record["reasons"])
-    assert "power loss: not explained" in text(blocks(record))
+    assert 0.005 < loss.allowed < 0.05 < 0.2 < loss.discrepancy[2]
+    assert any(reason.startswith("power loss is not explained") for reason in found.reasons)
+    assert "power loss: not explained" in text(blocks(found))
 
 
 def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) -> None:
@@ -373,9 +369,10 @@ def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) 
     Path(rig).write_text("\n".join(text), "utf-8")
     found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
     assert any("intervals are far too narrow" in note for note in found.notes)
-    assert all(each["evidence"] is None for each in record_of(found, "made of this")["outputs"].values())
+    assert all(each.evidence is None for each in found.outputs.values())
     # Two replicates of 40 turns err by 1 %, one measurement of 20 turns by twice that.
-    impact = found.match.measured.variances[found.match.measured.output == 0]
+    measured = found.evidence.match.measured
+    impact = measured.variances[measured.output == 0]
     assert np.sqrt(impact) == pytest.approx(0.02, rel=0.1)
 
 
@@ -393,7 +390,7 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     assert design_of(question).doubt == doubt and f"note: {doubt}" in " ".join(first.stderr.split())
     low, high = map(int, re.match(r"note: (\d+) to (\d+) runs \(", first.stderr).groups())
     assert low <= record["cost"]["runs"] <= high and record["cost"]["seconds"] > 0.0
-    assert "shaft turns in all took" in text(blocks(record))
+    assert "shaft turns in all took" in text(blocks(Calibration.from_dict(record)))
     store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
     assert json.loads(_run(command).stdout) == record
     assert (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns == store

@@ -422,7 +422,12 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     against, judgement = _against(found)
     assert not against and taught.anything
     result = judgement.trial
-    assert result.validation and result.cells == 6 and result.inside >= 4 and result.crps < 0.3 * result.crps_before
+    assert (
+        result.rows == "held out"
+        and result.cells == 6
+        and result.inside >= 4
+        and result.crps < 0.3 * result.crps_before
+    )
     assert result.width.cells == 4 + 6
     assert held_out(particles, 1).places.tolist() == np.flatnonzero(found.measured.validation).tolist()
     # Without rows to spare each is predicted by the others.

@@ -1,255 +1,209 @@
-"""Calibration by measurements on a rig: what they identify of the inputs, as blocks, JSON, tables and pictures."""
+"""Calibration by measurements on a rig: what they identify of the inputs, as blocks, tables, files and pictures."""
 
 import csv
-from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from doe.unknown import inputs
-from doe.unknown.calibration import allowance_words
-from doe.unknown.offsets import Unseen
-from doe.unknown.posterior import contraction_words
-from doe.workflow.calibration import CALIBRATED, Calibration
+from doe.unknown.calibration import Trial, allowance_words
+from doe.workflow.identification import (
+    CALIBRATED,
+    SAMPLE_FILE,
+    Calibration,
+    Cell,
+    Combination,
+    Cost,
+    Evidence,
+    InputAnswer,
+    OutputAnswer,
+    Quantiles,
+)
 from doe.workflow.input_sets import NORMAL
-from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Bullets, Paragraph, Table, with_notes
+from rbdyn.base.blocks import Block, Bullets, Paragraph, with_notes
 from rbdyn.base.identity import Identity
 from rbdyn.base.pace import duration
 from rbdyn.base.page import REPORT, with_report
-from rbdyn.base.records import plain, save_table
 from rbdyn.base.storage import digest_of, intact, sign
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
-FORMAT, POSTERIOR = "doe.calibration/2", "doe.posterior/1"
-RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
+POSTERIOR = "doe.posterior/1"
+RECORD, SAMPLE, OF_SAMPLE = "calibration.json", SAMPLE_FILE, "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
 FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
-ENDS = (0.05, 0.5, 0.95)
-TAUS = (0.5, 0.05, 0.95)
 # Least move of an input by an unseen offset that is named next to the largest, in standard deviations; most of them.
 MOVED, MOST_MOVED = 0.5, 3
 # Most inputs of a corner plot, those that contract most; share of their ranges that it omits at either end.
 SHOWN, END = 8, 1e-3
 
 
-def record_of(calibration: Calibration, made_of: str) -> dict[str, Any]:
-    """JSON record of ``doe calibrate``; ``made_of`` states the question that it answers."""
-    keys = [entry.key for entry in calibration.inputs]
-    posterior = calibration.match.sampled
-    learnt, judgement = calibration.learnt, calibration.judgement
-    trial = None if judgement is None else judgement.trial
-    taus = (
-        []
-        if posterior is None
-        else np.quantile(calibration.match.errors(posterior.points).level, TAUS, axis=0).T.tolist()
-    )
-    return {
-        "format": FORMAT,
-        "made_of": made_of,
-        "scene": calibration.case.source,
-        "data": str(calibration.rig.path),
-        "verdict": calibration.verdict,
-        "reasons": calibration.reasons,
-        "learned": {} if learnt is None else dict(zip(keys, learnt.contraction.tolist(), strict=True)),
-        "combinations": [
-            {
-                "powers": {keys[place]: power for place, power in combination.powers.items()},
-                "sd_percent": 100.0 * combination.after,
-                "sd_percent_before": 100.0 * combination.before,
-            }
-            for combination in (learnt.combinations if learnt else ())
-        ],
-        "discrepancy": dict(zip(calibration.rig.outputs, taus, strict=False)),
-        "outputs": _outputs(calibration),
-        "held_out": None if trial is None else {
-            "rows": "held out" if trial.validation else "each condition in turn",
-            "values": trial.cells,
-            "inside_90_percent": trial.inside,
-            "crps": trial.crps,
-            "crps_before": trial.crps_before,
-            "width": {
-                "values": trial.width.cells,
-                "ratio": trial.width.ratio,
-                "chance": trial.width.chance,
-                "power_too_wide": calibration.design.power.wide,
-                "power_too_narrow": calibration.design.power.narrow,
-            },
-        },
-        "posterior": None if posterior is None else SAMPLE,
-        "inputs": {} if posterior is None else _inputs(calibration),
-        "outliers": [_cell(calibration, place) for place in calibration.outliers()],
-        "without_outliers": calibration.without,
-        "cells": [_cell(calibration, place) for place in range(len(calibration.cells))],
-        "log_evidence": None if posterior is None else posterior.log_evidence,
-        "volumes": calibration.match.volumes,
-        "screened": calibration.screened,
-        "runs": calibration.runs,
-        "seed": calibration.case.scene.calibrate.seed,
-        "notes": plain(calibration.notes),
-    }  # fmt: skip
+class InputRow(NamedTuple):
+    """An input by its key, its contraction and its posterior."""
+
+    key: str
+    contraction: float
+    answer: InputAnswer
+
+    @property
+    def after(self) -> str:
+        """Its densest 90 %, or the shares of its choices."""
+        answer = self.answer
+        shares = ", ".join(f"{value} {100.0 * share:.0f} %" for value, share in (answer.shares or {}).items())
+        return shares or f"{shown(answer.low)} to {shown(answer.high)}"
+
+    @property
+    def before(self) -> str:
+        """Its range before; empty for choices."""
+        return " to ".join(map(shown, self.answer.before or ()))
 
 
-def cost_of(runs: int, turns: float, seconds: float) -> dict[str, Any]:
-    """Runs, shaft turns and wall time [s] until the files are written."""
-    return {"runs": runs, "turns": turns, "seconds": seconds}
+class OutputRow(NamedTuple):
+    """An output by its name."""
+
+    name: str
+    answer: OutputAnswer
 
 
-def _cost_words(cost: dict[str, Any]) -> str:
-    """What the calibration took."""
-    return f"{counted(cost['runs'], 'run')} of {shown(cost['turns'], 3)} shaft turns in all took {duration(cost['seconds'])}."
+INPUTS: tuple[Column[InputRow], ...] = (
+    Column("input", at="key", meaning="key of the input"),
+    Column("", words="before", at="before", form=str, text=True),
+    Column("", words="after", at="after", form=str, text=True),
+    Column("median", at=("answer", "median"), meaning="median of the posterior"),
+    Column("contraction", ".2f", meaning="1 - sd after / sd before"),
+    Column("seen", words="", at=("answer", "seen"), form=str, text=True, meaning="whether it was learned"),
+    Column("low", at=("answer", "low"), screen=False, meaning="densest 90 % after"),
+    Column("high", at=("answer", "high"), screen=False),
+    Column("before_low", at=lambda row: (row.answer.before or (None, None))[0], screen=False, meaning="range before"),
+    Column("before_high", at=lambda row: (row.answer.before or (None, None))[1], screen=False),
+)
+OUTPUTS: tuple[Column[OutputRow], ...] = (
+    Column("output", at="name", meaning="figure"),
+    Column("explained", at=("answer", "explained"), meaning="whether the simulation explains it"),
+    Column("allowed", at=("answer", "allowed"), meaning="allowed error of the simulation"),
+    Column("accuracy_percent", at=("answer", "accuracy_percent"), meaning="accuracy of the sensor"),
+    Column("evidence", at=("answer", "evidence"), meaning="Bayes factor of a larger error"),
+    Column("resolution", at=("answer", "resolution"), meaning="largest offset that would not be seen"),
+)
+CELLS: tuple[Column[Cell], ...] = (
+    Column("row", meaning="row of the table"),
+    Column("output", meaning="figure"),
+    Column("measured", meaning="measured value with its standard deviation"),
+    Column("sd"),
+    Column("held", meaning="whether its row is held out"),
+    Column("as_the_scene_says", meaning="simulated as the scene says"),
+    Column("residual", meaning="distance from its prediction by the others, in standard deviations"),
+)
 
 
-def _outputs(calibration: Calibration) -> dict[str, Any]:
-    """Whether the model explains each output: discrepancy of its level, allowed scales, evidence, and what could hide."""
-    refuted = {calibration.cells[place][1] for place in calibration.match.refuted}
-    outputs = calibration.judgement.outputs if calibration.judgement else [None] * len(calibration.rig.outputs)
-    return {
-        name: {
-            "explained": name not in refuted and explanation is not None and explanation.explained,
-            "discrepancy": None if explanation is None else np.expm1(explanation.bias).tolist(),
-            "allowed": None if explanation is None else explanation.allowed,
-            "accuracy_percent": 100.0 * calibration.rig.accuracies[name],
-            "evidence": None if explanation is None else explanation.evidence,
-            **_unseen(calibration, None if explanation is None else explanation.unseen),
-        }
-        for name, explanation in zip(calibration.rig.outputs, outputs, strict=True)
-    }
+def _end(when: str, place: int, cell: Cell) -> float:
+    """5, 50 or 95 % of a prediction."""
+    ends: Quantiles = getattr(cell, when)
+    return ends[place]
 
 
-def _unseen(calibration: Calibration, unseen: Unseen | None) -> dict[str, Any]:
-    """The largest offset that would not be seen, and by how much it moves each number among the inputs.
-
-    ``moves``: in the units of the scene; ``moves_sd``: in standard deviations of the posterior."""
-    match, posterior = calibration.match, calibration.match.sampled
-    if unseen is None or posterior is None:
-        return {"resolution": None, "moves": {}, "moves_sd": {}}
-    scores = posterior.points[:, : len(calibration.inputs)]
-    centre, sds = scores.mean(axis=0), scores.std(axis=0)
-    quantiles = match.quantiles(np.array([centre, centre + unseen.moves]))
-    moves, shares = dict[str, float](), dict[str, float]()
-    for place, entry in enumerate(calibration.inputs):
-        if entry.law.law != "choices":
-            low, high = _between(calibration, place, quantiles[:, place])
-            moves[entry.key], shares[entry.key] = high - low, float(unseen.moves[place] / sds[place])
-    return {"resolution": float(np.expm1(unseen.offset)), "moves": moves, "moves_sd": shares}
-
-
-def _inputs(calibration: Calibration) -> dict[str, Any]:
-    listed, values, ends = dict[str, dict[str, Any]](), calibration.sample, calibration.ends
-    for place, entry in enumerate(calibration.inputs):
-        column = [row[entry.key] for row in values]
-        if entry.law.law == "choices":
-            listed[entry.key] = {
-                "shares": {str(value): count / len(column) for value, count in Counter(column).items()}
-            }
-        else:
-            low, high = _between(calibration, place, ends[:, place])
-            listed[entry.key] = {"low": low, "median": float(np.median(column)), "high": high}
-            listed[entry.key]["before"] = list(_between(calibration, place, np.array([ENDS[0], ENDS[-1]])))
-        assert calibration.learnt is not None
-        listed[entry.key]["seen"] = contraction_words(float(calibration.learnt.contraction[place]))
-    return listed
-
-
-def _between(calibration: Calibration, place: int, quantiles: Array) -> tuple[float, float]:
-    """Values of the scene at two quantiles of an input's law."""
-    entry = calibration.inputs[place]
-    low, high = (calibration.case.unit(entry) * value for value in inputs.values_of(entry.law, quantiles))
-    return low, high
-
-
-def _cell(calibration: Calibration, place: int) -> dict[str, Any]:
-    (row, name), measured = calibration.cells[place], calibration.match.measured
-    value = float(np.exp(measured.values[place]))
-    return {
-        "row": row,
-        "output": name,
-        "measured": value,
-        "sd": value * float(np.sqrt(measured.variances[place])),
-        "held": bool(measured.validation[place]),
-        "as_the_scene_says": float(np.exp(calibration.nominal[place])),
-        "before": _ends(calibration.before[:, place]),
-        "after": None if calibration.after is None else _ends(calibration.after[:, place]),
-        "residual": None if calibration.judgement is None else float(calibration.judgement.residuals[place]),
-    }
-
-
-def _ends(logarithms: Array) -> list[float]:
-    return np.exp(np.quantile(logarithms, ENDS)).tolist()
-
-
-def blocks(record: dict[str, Any]) -> list[Block]:
-    """The verdict with its reasons, inputs, identified combinations, outputs, the quality of predictions, and notes."""
-    calibrated = record["verdict"] == CALIBRATED
-    inputs = [
-        (key, *_interval(row), f"{record['learned'][key]:.2f}", row["seen"])
-        for key, row in sorted(record["inputs"].items(), key=lambda pair: -record["learned"][pair[0]])
-    ]
-    caption = "Inputs: 5 to 95 % before, the densest 90 % or more after, which may reach an end of the range"
-    header = ("input", "before", "after", "median", "contraction", "")
-    outputs = [
-        _output_words(quantity(name)[0], explanation)
-        for name, explanation in record["outputs"].items()
-        if explanation["evidence"] is not None
-    ]
-    answer: list[Block] = [
-        Paragraph(verdict_words(record), "statement" if calibrated else "warning"),
-        Bullets([] if calibrated else _hidden(record)),
-        Table(caption, header, inputs, text_columns=(1, 2, 5)),
-        Bullets([*map(_combination, record["combinations"]), *outputs]),
-        Bullets([*_prediction_quality(record["held_out"]), *_outliers(record)]),
-        Paragraph(_screened(record["screened"])),
-        Paragraph(_cost_words(record["cost"]) if "cost" in record else "", "small"),
-    ]
-    return with_notes(record["notes"], answer, judged=False)
-
-
-def verdict_words(record: Mapping[str, Any]) -> str:
-    """The verdict with its reasons, or with what could hide from a calibration that nothing contradicts."""
-    sentences = "; ".join(_hidden(record) if record["verdict"] == CALIBRATED else record["reasons"])
-    return f"{record['verdict']}{': ' if sentences else ''}{sentences}"
-
-
-def _combination(combination: dict[str, Any]) -> str:
-    """The accuracy of a product of powers of inputs."""
-    powers = " · ".join(f"{key}^{power:.2g}" for key, power in combination["powers"].items())
-    return f"identified combination {powers}: known to {combination['sd_percent']:.2g} % (before {combination['sd_percent_before']:.2g} %)"
-
-
-def _prediction_quality(trial: dict[str, Any] | None) -> list[str]:
-    """How well values are predicted that were not learned from."""
-    if not trial:
-        return []
-    inside = f"{trial['inside_90_percent']} of {trial['values']} values in their 90 % interval"
-    width = trial["width"]
+def prediction_columns(when: str) -> list[Column[Cell]]:
+    """Columns of the predictions "before" or "after" the calibration."""
     return [
-        f"{trial['rows']}: {inside}, CRPS {trial['crps']:.2g} (before {trial['crps_before']:.2g})",
-        f"width of predictions: residuals of {counted(width['values'], 'value')} scatter {width['ratio']:.2g} times the predicted "
-        f"scatter (chance {100.0 * width['chance']:.2g} %)",
+        Column(f"{when}_{end}", at=partial(_end, when, place), meaning=f"predicted {when} the calibration")
+        for place, end in enumerate(("5_percent", "median", "95_percent"))
     ]
 
 
-def _outliers(record: dict[str, Any]) -> list[str]:
+def input_sheet(calibration: Calibration) -> Sheet[InputRow]:
+    """A row an input, those that contract most first."""
+    learned, answers = calibration.learnt.learned, calibration.inputs
+    rows = sorted(
+        (InputRow(key, learned[key], answer) for key, answer in answers.items()), key=lambda row: -row.contraction
+    )
+    choices = dict.fromkeys(value for answer in answers.values() for value in answer.shares or ())
+    shares = Column[InputRow]("share_{}", at=("answer", "shares", "{}"), screen=False, meaning="share of a choice").of(
+        choices
+    )
+    caption = "Inputs: 5 to 95 % before, the densest 90 % or more after, which may reach an end of the range"
+    return Sheet(caption, (*INPUTS, *shares), rows)
+
+
+def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
+    """A row an output."""
+    return Sheet("", OUTPUTS, [OutputRow(name, answer) for name, answer in calibration.outputs.items()])
+
+
+def cell_sheet(calibration: Calibration) -> Sheet[Cell]:
+    """A row a measured value, with its predictions before and after the calibration."""
+    moments = ("before", "after") if calibration.posterior else ("before",)
+    columns = [*CELLS, *(column for when in moments for column in prediction_columns(when))]
+    content = "A row a measured value: measured, simulated and predicted."
+    return Sheet("", columns, calibration.cells, file=MEASURED, content=content)
+
+
+def blocks(calibration: Calibration) -> list[Block]:
+    """The verdict with its reasons, inputs, identified combinations, outputs, the quality of predictions, and notes."""
+    calibrated = calibration.verdict == CALIBRATED
+    answer: list[Block] = [
+        Paragraph(verdict_words(calibration), "statement" if calibrated else "warning"),
+        Bullets([] if calibrated else _hidden(calibration)),
+        input_sheet(calibration).block,
+        Bullets(
+            [
+                *map(_combination, calibration.learnt.combinations),
+                *(_output_words(*item) for item in calibration.outputs.items() if item[1].evidence is not None),
+            ]
+        ),
+        Bullets([*_prediction_quality(calibration.held_out), *_outliers(calibration)]),
+        Paragraph(_screened(calibration.screened)),
+        Paragraph(_cost_words(calibration.cost), "small"),
+    ]
+    return with_notes(calibration.notes, answer, judged=False)
+
+
+def verdict_words(calibration: Calibration) -> str:
+    """The verdict with its reasons, or with what could hide from a calibration that nothing contradicts."""
+    calibrated = calibration.verdict == CALIBRATED
+    sentences = "; ".join(_hidden(calibration) if calibrated else calibration.reasons)
+    return f"{calibration.verdict}{': ' if sentences else ''}{sentences}"
+
+
+def _combination(combination: Combination) -> str:
+    """The accuracy of a product of powers of inputs."""
+    powers = " · ".join(f"{key}^{power:.2g}" for key, power in combination.powers.items())
+    known = f"known to {combination.sd_percent:.2g} % (before {combination.sd_percent_before:.2g} %)"
+    return f"identified combination {powers}: {known}"
+
+
+def _prediction_quality(trial: Trial | None) -> list[str]:
+    """How well values are predicted that were not learned from."""
+    if trial is None:
+        return []
+    width = trial.width
+    return [
+        f"{trial.rows}: {trial.inside} of {trial.cells} values in their 90 % interval, CRPS {trial.crps:.2g} "
+        f"(before {trial.crps_before:.2g})",
+        f"width of predictions: residuals of {counted(width.cells, 'value')} scatter {width.ratio:.2g} times the predicted "
+        f"scatter (chance {100.0 * width.chance:.2g} %)",
+    ]
+
+
+def _outliers(calibration: Calibration) -> list[str]:
     """Outliers among the measured values, and the contraction without them."""
     sentences = [
-        f"{quantity(cell['output'])[0]} of row {cell['row']} is {cell['residual']:.1f} standard deviations off its prediction by the others"
-        for cell in record["outliers"]
+        f"{quantity(cell.output)[0]} of row {cell.row} is {cell.residual:.1f} standard deviations off its prediction by the others"
+        for cell in calibration.outliers
     ]
-    if record["without_outliers"]:
-        learned = ", ".join(f"{key} {share:.2f}" for key, share in record["without_outliers"].items())
+    if calibration.without_outliers:
+        learned = ", ".join(f"{key} {share:.2f}" for key, share in calibration.without_outliers.items())
         sentences.append(f"contraction without these: {learned}")
     return sentences
 
 
-def _screened(screened: dict[str, float] | None) -> str:
+def _screened(screened: Mapping[str, float]) -> str:
     if not screened:
         return ""
     most = max(screened, key=lambda key: screened[key])
@@ -259,70 +213,66 @@ def _screened(screened: dict[str, float] | None) -> str:
     )
 
 
-def _output_words(name: str, explanation: dict[str, Any]) -> str:
-    """The discrepancy of an output, and what is allowed."""
-    median, low, high = (100.0 * value for value in explanation["discrepancy"])
-    words = "explained" if explanation["explained"] else "not explained"
-    allowed = allowance_words(explanation["allowed"], 0.01 * explanation["accuracy_percent"])
-    off = f"{name}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {allowed}"
-    return f"{off}, Bayes factor {explanation['evidence']:.3g}"
+def _cost_words(cost: Cost | None) -> str:
+    """What the calibration took."""
+    if cost is None:
+        return ""
+    return f"{counted(cost.runs, 'run')} of {shown(cost.turns, 3)} shaft turns in all took {duration(cost.seconds)}."
 
 
-def _hidden(record: Mapping[str, Any]) -> list[str]:
+def _output_words(name: str, output: OutputAnswer) -> str:
+    """The discrepancy of an output that has one, and what is allowed."""
+    assert output.discrepancy is not None and output.allowed is not None
+    median, low, high = (100.0 * value for value in output.discrepancy)
+    words = "explained" if output.explained else "not explained"
+    allowed = allowance_words(output.allowed, 0.01 * output.accuracy_percent)
+    off = f"{quantity(name)[0]}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {allowed}"
+    return f"{off}, Bayes factor {output.evidence:.3g}"
+
+
+def _hidden(calibration: Calibration) -> list[str]:
     """What could hide in each output."""
+    outputs = calibration.outputs.items()
     return [
-        _hidden_words(quantity(name)[0], output) for name, output in record["outputs"].items() if output["resolution"]
+        _hidden_words(quantity(name)[0], output, output.resolution) for name, output in outputs if output.resolution
     ]
 
 
-def _hidden_words(name: str, output: Mapping[str, Any]) -> str:
+def _hidden_words(name: str, output: OutputAnswer, resolution: float) -> str:
     """The offset of an output's sensor that would not be seen, and the inputs that it moves most."""
-    shares = sorted(output["moves_sd"].items(), key=lambda pair: -abs(pair[1]))
+    shares = sorted(output.moves_sd.items(), key=lambda pair: -abs(pair[1]))
     named = [key for place, (key, share) in enumerate(shares[:MOST_MOVED]) if place == 0 or abs(share) >= MOVED]
-    moves = " and ".join(f"{key} by {shown(output['moves'][key], 2)}" for key in named)
-    words = f"an offset of the {name} below {shown(100.0 * output['resolution'], 2)} % would not be seen"
+    moves = " and ".join(f"{key} by {shown(output.moves[key], 2)}" for key in named)
+    words = f"an offset of the {name} below {shown(100.0 * resolution, 2)} % would not be seen"
     return f"{words} and moves {moves}" if moves else words
 
 
-def _interval(row: dict[str, Any]) -> tuple[str, str, str]:
-    if "shares" in row:
-        return "", ", ".join(f"{value} {100.0 * share:.0f} %" for value, share in row["shares"].items()), ""
-    before, after = row["before"], (row["low"], row["high"])
-    ranges = [f"{shown(low)} to {shown(high)}" for low, high in (before, after)]
-    return ranges[0], ranges[1], shown(row["median"])
-
-
-def write(calibration: Calibration, record: dict[str, Any], folder: Path, identity: Identity) -> None:
+def write(calibration: Calibration, folder: Path, identity: Identity) -> None:
     """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
-    with_report(folder, identity, partial(blocks, record), partial(_write_parts, calibration, record))
+    with_report(folder, identity, partial(blocks, calibration), partial(_write_parts, calibration))
     # Last, as it marks the folder as complete.
+    write_json(folder / RECORD, calibration.as_dict())
+
+
+def signed(calibration: Calibration) -> Calibration:
+    """The calibration with the digest by which a folder's record is recognized as unchanged."""
+    record = calibration.as_dict()
     sign(record)
-    write_json(folder / RECORD, record)
+    return replace(calibration, sha256=record["sha256"])
 
 
-def _write_parts(calibration: Calibration, record: dict[str, Any], folder: Path) -> list[str]:
+def _write_parts(calibration: Calibration, folder: Path) -> list[str]:
     """measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
-    save_table(map(_measured_row, record["cells"]), folder / MEASURED)
-    draw_compared(record, folder / COMPARED)
-    if calibration.match.sampled is not None:
-        write_sample(calibration.sample, folder / SAMPLE)
+    cell_sheet(calibration).save(folder)
+    draw_compared(calibration.cells, folder / COMPARED)
+    if calibration.evidence is not None and calibration.posterior:
+        write_sample(calibration.evidence.sample, folder / SAMPLE)
+        record = calibration.as_dict()
         origin = {name: record[name] for name in ("verdict", "reasons", "scene", "data", "made_of")}
         sha256 = digest_of((folder / SAMPLE).read_bytes())
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **origin})
-        draw_corner(calibration, record, folder / CORNER)
-    return _parts(record)
-
-
-def _measured_row(cell: Mapping[str, Any]) -> dict[str, Any]:
-    """A measured value with its predictions before and after the calibration, as a row of a table."""
-    alone = {key: value for key, value in cell.items() if key not in ("before", "after")}
-    ends = ("5_percent", "median", "95_percent")
-    predictions = {
-        f"{when}_{end}": value
-        for when in ("before", "after")
-        for end, value in zip(ends, cell[when] or (), strict=False)
-    }
-    return alone | predictions
+        draw_corner(calibration, calibration.evidence, folder / CORNER)
+    return _parts(calibration)
 
 
 def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -331,34 +281,35 @@ def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(row.values() for row in rows)))
 
 
-def _parts(record: dict[str, Any]) -> list[str]:
-    return [MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
+def _parts(calibration: Calibration) -> list[str]:
+    return [MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if calibration.posterior else ()), COMPARED]
 
 
-def files_of(record: dict[str, Any]) -> list[str]:
+def files_of(calibration: Calibration) -> list[str]:
     """Names of the files of a calibration."""
-    return [RECORD, *_parts(record), REPORT, WORKBOOK]
+    return [RECORD, *_parts(calibration), REPORT, WORKBOOK]
 
 
-def stored(folder: Path, made_of: str) -> dict[str, Any] | None:
-    """The record in a folder, if the same code made it for the same question and its files are complete."""
+def stored(folder: Path, made_of: str) -> Calibration | None:
+    """The calibration in a folder, if the same code made it for the same question and its files are complete."""
     try:
         record = read_json(folder / RECORD)
-        complete = intact(record) and record["made_of"] == made_of
-        complete = complete and all((folder / name).exists() for name in files_of(record))
+        calibration = Calibration.from_dict(record)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
-    return dict(record) if complete else None
+    complete = intact(record) and calibration.made_of == made_of
+    return calibration if complete and all((folder / name).exists() for name in files_of(calibration)) else None
 
 
-def draw_corner(calibration: Calibration, record: dict[str, Any], path: Path) -> None:
+def draw_corner(calibration: Calibration, evidence: Evidence, path: Path) -> None:
     """The posterior of the inputs that contract most: each over its range before, each pair as a cloud."""
     from rbdyn.plots.style import BLUE, GREY, plain, plt, save
 
-    ranked = sorted(range(len(calibration.inputs)), key=lambda place: -record["learned"][calibration.inputs[place].key])
-    places = [place for place in ranked if calibration.inputs[place].law.law != "choices"][:SHOWN]
-    columns = [[row[calibration.inputs[place].key] for row in calibration.sample] for place in places]
-    ranges = [_between(calibration, place, np.array([END, 1.0 - END])) for place in places]
+    learned, inputs = calibration.learnt.learned, evidence.inputs
+    ranked = sorted(range(len(inputs)), key=lambda place: -learned[inputs[place].key])
+    places = [place for place in ranked if inputs[place].law.law != "choices"][:SHOWN]
+    columns = [[row[inputs[place].key] for row in evidence.sample] for place in places]
+    ranges = [evidence.values(place, (END, 1.0 - END)) for place in places]
     count = max(len(places), 1)
     figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
     for (down, across), axis in np.ndenumerate(axes):
@@ -366,7 +317,7 @@ def draw_corner(calibration: Calibration, record: dict[str, Any], path: Path) ->
             axis.set_visible(False)
             continue
         plain(axis)
-        key, other = (calibration.inputs[places[place]] for place in (across, down))
+        key, other = (inputs[places[place]] for place in (across, down))
         ticks = _along(key, *ranges[across], 3)
         axis.set(xscale=_scale(key), xlim=ranges[across])
         axis.set_xticks(ticks, [f"{tick:.2g}" for tick in ticks])
@@ -385,7 +336,7 @@ def draw_corner(calibration: Calibration, record: dict[str, Any], path: Path) ->
             axis.set_xlabel(key.key.replace(".", ".\n"), fontsize=6.5)
         if across == 0 and down > 0:
             axis.set_ylabel(other.key.replace(".", ".\n"), fontsize=6.5)
-    title = f"inputs after the measurements, over their ranges before; {record['verdict']}"
+    title = f"inputs after the measurements, over their ranges before; {calibration.verdict}"
     figure.suptitle(title, fontsize=8, color=GREY)
     save(figure, path)
 
@@ -400,28 +351,27 @@ def _along(entry: Input, low: float, high: float, count: int) -> list[float]:
     return values
 
 
-def draw_compared(record: dict[str, Any], path: Path) -> None:
+def draw_compared(cells: Sequence[Cell], path: Path) -> None:
     """A panel for each output: deviations of the simulation before and after, by row, in percent of the measured values."""
     from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, plt, save
 
-    outputs = list(dict.fromkeys(cell["output"] for cell in record["cells"]))
+    outputs = list(dict.fromkeys(cell.output for cell in cells))
     figure, axes = plt.subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
     for axis, name in zip(axes[0], outputs, strict=True):
         plain(axis)
-        own = [cell for cell in record["cells"] if cell["output"] == name]
-        rows, measured = [cell["row"] for cell in own], np.array([cell["measured"] for cell in own])
+        own = [cell for cell in cells if cell.output == name]
+        rows, measured = [cell.row for cell in own], np.array([cell.measured for cell in own])
+        predictions = {"before": [cell.before for cell in own], "after": [cell.after for cell in own if cell.after]}
         for key, colour, width in (("before", GREY, 9.0), ("after", BLUE, 5.0)):
-            if own[0][key] is not None:
-                low, middle, high = 100.0 * (np.array([cell[key] for cell in own]).T / measured - 1.0)
+            if predictions[key]:
+                low, middle, high = 100.0 * (np.array(predictions[key]).T / measured - 1.0)
                 words = f"simulated, 5 to 95 % of the inputs {key}"
                 axis.vlines(rows, low, high, color=colour, linewidth=width, alpha=0.35, label=words)
                 axis.plot(rows, middle, "_", color=colour, markersize=8)
-        nominal = np.array([cell["as_the_scene_says"] for cell in own])
+        nominal = np.array([cell.as_the_scene_says for cell in own])
         axis.plot(rows, 100.0 * (nominal / measured - 1.0), "x", color=ORANGE, markersize=4, label="as the scene says")
         for in_trial, mark, words in ((False, "o", "measured, 95 %"), (True, "s", "measured and held out")):
-            errors = {
-                cell["row"]: 100.0 * NORMAL * cell["sd"] / cell["measured"] for cell in own if cell["held"] is in_trial
-            }
+            errors = {cell.row: 100.0 * NORMAL * cell.sd / cell.measured for cell in own if cell.held is in_trial}
             if errors:
                 axis.errorbar([*errors], [0.0] * len(errors), yerr=[*errors.values()], fmt=mark, color=VERMILION,
                               markersize=3.5, label=words)  # fmt: skip
