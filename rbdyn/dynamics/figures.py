@@ -165,7 +165,13 @@ BEARING = (
         accuracy=0.1,  # of pulses of a wheel
     ),
     # A slip near zero has no useful relative error; the cage speed shows it.
-    Figure("cage_slip", "share that the cage lags", CAGE_SLIP, panel=(1, "slip [%]"), worst="farthest from 0"),
+    Figure(
+        "cage_slip",
+        "1 less cage speed over that of rolling without slip",
+        CAGE_SLIP,
+        panel=(1, "slip [%]"),
+        worst="farthest from 0",
+    ),
     Figure(
         "cage_orbit_radius_share",
         "root mean square distance of the cage's centre from its mean place over the cage's radial play",

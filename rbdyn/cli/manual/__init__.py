@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from rbdyn.base.command import Force, Json, folder_option, guarded, hand_over
 from rbdyn.base.folder import output_folder
-from rbdyn.base.table import Sheet
+from rbdyn.base.table import Column, Sheet
 from rbdyn.scene.keys import AsSchema, Word, run
 
 # Entry points of such packages: functions that return a ``Part``.
@@ -63,6 +63,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     from rbdyn.cli.ball_studies import limit_sheet
     from rbdyn.comparison import difference_sheet, input_sheet
     from rbdyn.dynamics.duty_simulation import points_sheet
+    from rbdyn.dynamics.figures import FIGURES
     from rbdyn.dynamics.motion import history_sheet
     from rbdyn.dynamics.slip_map import map_sheet
     from rbdyn.life.duty import life_sheet
@@ -72,8 +73,12 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     from rbdyn.result import figure_sheet
 
     figures = ("{figure}",)
+    named = [Column[Any](figure.key, meaning=figure.meaning) for figure in FIGURES]
     sheets: list[Sheet[Any]] = [
         figure_sheet({}), history_sheet(("{j}",)), map_sheet((), figures), life_sheet(()), points_sheet((), figures), input_sheet(()),
         difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, limit_sheet({}),
     ]  # fmt: skip
-    return {"Tables of rbdyn": sheets}
+    return {
+        "Tables of rbdyn": sheets,
+        "Figures of a roller bearing": [Sheet("", named, (), file="{figure}", content="Figures of a run, by name.")],
+    }
