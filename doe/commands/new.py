@@ -24,20 +24,13 @@ from rbdyn.base.command import (
     plain_number,
     valued,
 )
+from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
 
-# Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable
-# design lie 1.7 steps out, and none may touch zero.
-CLEARANCES = (
-    ("radial_clearance_mm", "bearing", 0.25),
-    ("guide_clearance_mm", "cage", 0.3),
-    ("pocket_clearance_mm", "cage", 0.2),
-    ("pocket_radial_clearance_mm", "cage", 0.25),
-)
 RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
 FACTOR = """[[factor]]
 name = "{name}"
@@ -236,12 +229,14 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
     """A factor a clearance that the scene's file gives and that something reads."""
     landless = scene["cage"]["guidance"] == "roller" or scene.get("model", {}).get("guide_land") == "off"
     factors = []
-    for name, table, share in CLEARANCES:
+    for clearance in CLEARANCES:
+        table, _, name = clearance.key.partition(".")
         centre = scene[table].get(name)
         if centre is None or (landless and name == "guide_clearance_mm"):
             continue
-        step = max(round(share * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
-        factors.append(Factor(name, table, float(centre), step, "as the scene has it", f"{100.0 * share:g} % of it"))
+        step = max(round(clearance.step * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
+        width = f"{100.0 * clearance.step:g} % of it"
+        factors.append(Factor(name, table, float(centre), step, "as the scene has it", width))
     return factors
 
 

@@ -60,6 +60,7 @@ from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record
+from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
@@ -67,7 +68,7 @@ from rbdyn.scene.notes import catalogue_entry
 
 RADIAL = "bearing.radial_clearance_mm"
 # Clearance of a scene by the key of its value on the drawing.
-CLEARANCES = {RADIAL: "radial", "cage.guide_clearance_mm": "guide", "cage.pocket_clearance_mm": "pocket"}
+NAMES = {clearance.key: clearance.name for clearance in REPORTED}
 
 
 class OperatingClearances(Record):
@@ -87,7 +88,7 @@ def operating_clearances(study: Problem, points: Mapping[str, Scene]) -> Operati
     operating = {
         factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
         for factor in study.file.factor
-        if factor.key in CLEARANCES and all(_changes(scene, factor.key) for scene in points.values())
+        if factor.key in NAMES and all(_changes(scene, factor.key) for scene in points.values())
     }
     radial = any(factor.key == RADIAL for factor in study.file.factor)
     pick = points["pick"]
@@ -123,11 +124,11 @@ def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
 
 
 def _changes(scene: Scene, key: str) -> bool:
-    return scene.mounting is not None and scene.clearances[CLEARANCES[key]] is not None
+    return scene.mounting is not None and scene.clearances[NAMES[key]] is not None
 
 
 def _operating_mm(scene: Scene, key: str) -> float:
-    play = scene.clearances[CLEARANCES[key]]
+    play = scene.clearances[NAMES[key]]
     assert play is not None
     return 1e3 * play.operating
 

@@ -194,23 +194,6 @@ def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]])
     return f"<table><caption>{escape(title)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-# Ranges of a heat balance beside those of its temperatures, in words and with their unit.
-OTHER_RANGES = {
-    "inner_minus_outer_K": ("inner ring over outer ring", "K"),
-    "radial_um": ("clearance", "µm"),
-    "guide_um": ("guide clearance", "µm"),
-    "pocket_um": ("pocket clearance", "µm"),
-}
-
-
 def range_ends(quantiles: Sequence[float]) -> str:
     """First and last of several quantiles."""
     return f"{quantiles[0]:.0f} to {quantiles[-1]:.0f}"
-
-
-def other_ranges(ranges: Mapping[str, Sequence[float]]) -> str:
-    """What the inputs of a heat balance leave open of the difference of the rings and of the clearances in operation."""
-    parts = [
-        f"{words} {range_ends(ranges[name])} {unit}" for name, (words, unit) in OTHER_RANGES.items() if name in ranges
-    ]
-    return f"over these inputs (90 %): {', '.join(parts)}"

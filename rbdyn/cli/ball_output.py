@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_notes
 from rbdyn.base.notes import status_notes
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, other_ranges, range_ends, shown
+from rbdyn.base.words import counted, range_ends, shown
+from rbdyn.clearances import other_ranges
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, ball_sheet
 from rbdyn.scene import BallScene
 

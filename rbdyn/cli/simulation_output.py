@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted, error_alone, label, other_ranges, range_ends, shown, value_alone, with_error
+from rbdyn.base.words import counted, error_alone, label, range_ends, shown, value_alone, with_error
+from rbdyn.clearances import REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, of_kind, repeated
 from rbdyn.result import SimulationResult, figure_sheet
 from rbdyn.scene import Scene
@@ -140,7 +141,8 @@ def _temperatures(result: SimulationResult) -> list[Block]:
 def _clearances(result: SimulationResult) -> list[Block]:
     """Each clearance from the drawing to operation, in a line; without a mounting only in a report."""
     whole = result.clearance_um
-    plays = {"clearance": whole, "guide clearance": whole.get("guide"), "pocket clearance": whole.get("pocket")}
+    # The radial one has its own parts.
+    plays = {clearance.words: whole.get(clearance.name) for clearance in REPORTED} | {REPORTED[0].words: whole}
     sentences = []
     for name, play in plays.items():
         parts = [

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.places import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.losses import POWER_TERMS
@@ -213,7 +214,7 @@ PARTS = (
             source=(name,),
             worst="least",
         )
-        for name in ("radial", "guide", "pocket")
+        for name, *_ in REPORTED
     ),
     # 1/L is damage an hour (Palmgren and Miner).
     Figure("life_h", "life L10r by static loads (ISO/TS 16281)", kind="life", harmonic=True, worst="least"),

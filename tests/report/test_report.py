@@ -18,7 +18,7 @@ from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 
 from doe.report.page import LETTERS, SCRIPTS, html_report, packed
 from doe.report.pictures import response_surface
-from doe.report.sections.answer import CLEARANCES
+from doe.report.sections.answer import MEANINGS
 from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.sections.record import change, scalars
@@ -298,7 +298,7 @@ def test_cards_carry_units_and_say_what_a_clearance_is():
     words = " ".join(Outline(html_report(whole)).words)
     assert len(re.findall(r"baseline [\d.]+ mm", words)) == len(whole["asked"]["factors"])
     keys = [each["key"] for each in whole["asked"]["factors"]]
-    assert ("Clearances: " in words) == any(key in CLEARANCES for key in keys)
+    assert ("Clearances: " in words) == any(key in MEANINGS for key in keys)
 
 
 def test_error_bars_end_at_the_frame():

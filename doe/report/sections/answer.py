@@ -36,16 +36,12 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import identity_line
 from rbdyn.base.records import finite
-from rbdyn.base.words import chance, label, other_ranges, quantity, range_ends, rounded_down, shown, with_error
+from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
+from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
 # Meaning of a clearance of the scene, by its key.
-CLEARANCES = {
-    "bearing.radial_clearance_mm": "diametral in the bearing",
-    "cage.guide_clearance_mm": "diametral between cage and guide",
-    "cage.pocket_clearance_mm": "width of the pocket less the roller diameter",
-    "cage.pocket_radial_clearance_mm": "radial at the lips of the pocket",
-}
+MEANINGS = {clearance.key: clearance.meaning for clearance in CLEARANCES}
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
 SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
@@ -164,7 +160,7 @@ def _parts_to_make(summary: Summary) -> list[Block]:
 def _clearances(summary: Summary) -> list[Block]:
     """The pick with its tolerances next to the baseline, the meaning of its clearances, and the class of the bearing."""
     inputs = [factor for factor in summary.asked.factors if factor.name in summary.pick]
-    plays = [CLEARANCES[factor.key] for factor in inputs if factor.key in CLEARANCES]
+    plays = [MEANINGS[factor.key] for factor in inputs if factor.key in MEANINGS]
     meaning = f"Clearances: {', '.join(plays)}." if plays else ""
     if meaning and summary.operating_clearances_mm:
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
