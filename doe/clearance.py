@@ -19,7 +19,7 @@ import numpy as np
 
 from doe.duty import DutyResult, Run, labelled_scenes, result_of
 from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
-from doe.running.store import Failure, Point, Store
+from doe.running.store import STORE, Failure, Point, Store
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import verdict
@@ -132,11 +132,30 @@ class Simulations:
         for point, result in zip(points, results, strict=True):
             if isinstance(result, SimulationResult):
                 self.turns_of[point.key] = float(result.cost.get("turns", 0.0))
-        rest = zip(points, results, strict=True)
-        return [
-            result_of(run, label, list(islice(rest, len(labelled_scenes(run)))))
-            for run, label in zip(runs, labels, strict=True)
-        ]
+        return _by_run(runs, labels, points, results)
+
+
+def stored(folder: Path, runs: Sequence[Run], labels: Sequence[str]) -> list[Any] | None:
+    """Results or failures of runs in the store of a folder; None unless all of them have ended. Nothing is simulated."""
+    if not (folder / STORE).exists():
+        return None
+    points = points_of(runs, labels)
+    with Store(folder / STORE, read_only=True) as store:
+        outcomes = store.outcomes(points, sound)
+    if any(point.key not in outcomes for point in points):
+        return None
+    return _by_run(runs, labels, points, [_result(point, outcomes[point.key]) for point in points])
+
+
+def _by_run(
+    runs: Sequence[Run], labels: Sequence[str], points: Sequence[Point], results: Sequence[SimulationResult | Failure]
+) -> list[Any]:
+    """Results of runs from those of all their points."""
+    rest = zip(points, results, strict=True)
+    return [
+        result_of(run, label, list(islice(rest, len(labelled_scenes(run)))))
+        for run, label in zip(runs, labels, strict=True)
+    ]
 
 
 def every_scene(runs: Sequence[Run]) -> list[Scene]:

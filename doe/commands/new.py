@@ -96,6 +96,7 @@ def new(
     """Write a commented study of a scene's clearances."""
     with guarded(as_json):
         from doe.study_file.study import StudyFile
+        from doe.workflow.effort import Effort
         from doe.workflow.front import check_goals
         from doe.workflow.problem import Problem
         from doe.workflow.region import region_that_runs
@@ -127,7 +128,7 @@ def new(
         text, study = written(factors)
         check_goals(study)
         with tempfile.TemporaryDirectory() as folder:
-            moved = region_that_runs(study, Path(folder), notice=notice(False), kept=1.0).study
+            moved = region_that_runs(study, Path(folder), Effort(notice=notice(False)), kept=1.0).study
         if moved is not study:
             if (moved.baseline != moved.centre).any():
                 sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))

@@ -48,7 +48,7 @@ Verbose = Annotated[
 @contextmanager
 def keeping_runs(out: Path | None) -> Iterator[None]:
     """On Ctrl-C a sentence says that the store in ``out`` keeps the finished runs."""
-    from doe.workflow.runs import STORE
+    from doe.running.store import STORE
 
     with checkpoint_message(None if out is None else out / STORE):
         yield

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import Effort, Follow, path_given, registered, saved, step_folder, texts_given
+from doe.library.effort import path_given, registered, saved, step_folder, texts_given
+from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Paragraph, with_notes
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
@@ -79,7 +80,7 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
         notes: Notes = ()
         if study.file.scene and study.path_of(study.scene.file).exists():
             with Effort().folder(folder) as store:
-                study, notes = region_that_runs(study, store)
+                study, notes = region_that_runs(study, store, Effort())
             check_study(study)
         output.claim(path)
         result = DesignResult.of(study, study.design, notes)
@@ -224,13 +225,11 @@ def _surfaces(
         runs = read_runs(study, data)
         return study, fit_surfaces(study, runs), runs.notes
     with effort.folder(out) as folder:
-        study, notes = region_that_runs(
-            study, folder, effort.workers, effort.scheduler, effort.retry, effort.progress, effort.notice
-        )
+        study, notes = region_that_runs(study, folder, effort)
         if effort.notice is not None:
             effort.notice(f"{counted(len(study.design.coded), 'design run')}, {effort.threads} at once")
-        progress = effort.progress("design runs")
-        runs = run_design(study, folder, effort.workers, progress, effort.scheduler, effort.retry)
+        with effort.simulations(folder, study.path) as simulations:
+            runs = run_design(study, simulations, simulations.progress("design runs"))
         return with_remaining(study, runs), fit_surfaces(study, runs), notes
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import Effort, Follow, path_given, registered, texts_given
+from doe.library.effort import path_given, registered, texts_given
+from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
 from rbdyn.base.folder import output_folder

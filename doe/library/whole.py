@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import Effort, Follow, path_given, registered
+from doe.library.effort import path_given, registered
 from doe.library.steps import part_rows, point_row
+from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
 from rbdyn.base.pace import Notice
@@ -177,8 +178,7 @@ def study(
                 notice(sentence)
         options = {"adaptive": adaptive, "robust": robust}
         with effort.agenda(folder, "doe study", options, digest) as agenda:
-            bars = agenda.announced(effort.progress)
-            outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
+            outcome = run_study(loaded, folder, effort, **options, agenda=agenda)
             record = output.write(partial(write, outcome), last="summary.json")
             agenda.finish(record["files"])
     return StudyAnswer(record, folder, tuple(record["files"]))

@@ -91,6 +91,8 @@ def sentence(failures: Sequence[Failure]) -> str:
     return "; ".join(f"{', '.join(group.labels)}: {group.cause}" for group in grouped(failures))
 
 
+# Name of the store in a folder of results.
+STORE = "study.sqlite"
 FORMAT, VERSION = "doe.store", "2"
 SCHEMA = (
     "CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL)",

@@ -11,13 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from doe import clearance
-from doe.clearance import Simulations
-from doe.duty import DutyResult, Run
+from doe.duty import DutyResult
 from doe.running.runner import Progress
-from doe.running.store import Failure, Store
+from doe.running.store import Failure
 from doe.workflow.confirmation import Confirmed, Limit, every_limit
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE
 from doe.workflow.surfaces import standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.pace import Notice
@@ -70,26 +68,12 @@ def first_look(study: Problem, folder: Path, original: Confirmed, progress: Prog
     def watch(done: int, total: int) -> None:
         nonlocal waiting
         progress(done, total)
-        if waiting and len(rows) <= done < total and (results := _stored(folder / STORE, runs, labels)) is not None:
+        if waiting and len(rows) <= done < total and (results := clearance.stored(folder, runs, labels)) is not None:
             waiting = False
             for sentence in unlikely(study, missed, ordered.design.coded[rows], results):
                 notice(sentence)
 
     return watch
-
-
-def _stored(path: Path, runs: Sequence[Run], labels: Sequence[str]) -> Sequence[Outcome] | None:
-    """Results of runs in a store; None until all have ended."""
-    points = clearance.points_of(runs, labels)
-    with Store(path, read_only=True) as store:
-        if len(store.outcomes(points, clearance.sound)) < len({point.key for point in points}):
-            return None
-        stored = Simulations(store, 1, None, False, lambda title: _silent)
-        return stored.run(runs, labels, _silent)
-
-
-def _silent(done: int, total: int) -> None:
-    """Progress that nobody watches."""
 
 
 def unlikely(study: Problem, missed: Sequence[Limit], coded: Array, results: Sequence[Outcome]) -> list[str]:

@@ -17,16 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from doe import clearance
-from doe.clearance import Simulations, points_of
-from doe.running.runner import Progress
-from doe.running.store import Failure, Store
+from doe.running.store import Failure
 from doe.study_file.sections import Factor
+from doe.workflow.effort import Effort
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
-from rbdyn.base.pace import Notice
 from rbdyn.base.words import counted, quantity
 from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
@@ -111,29 +108,19 @@ class Taken(NamedTuple):
         )
 
 
-def region_that_runs(
-    study: Problem,
-    folder: Path,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    retry: bool = False,
-    progress: Callable[[str], Progress] | None = None,
-    notice: Notice = None,
-    kept: float = KEPT,
-) -> Region:
+def region_that_runs(study: Problem, folder: Path, effort: Effort, kept: float = KEPT) -> Region:
     """The region of a study that runs, with a heat balance from the store in ``folder`` or simulated there.
 
-    ``notice(sentence)`` hears of it at once. ``kept``: share of its width that a region keeps at least. Raises InputError for a
-    region that nothing can move, RunError where its centre has no steady temperatures.
+    The notice of the ``effort`` hears of it at once. ``kept``: share of its width that a region keeps at least. Raises InputError
+    for a region that nothing can move, RunError where its centre has no steady temperatures.
     """
+    notice = effort.notice
 
     def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
         if notice is not None:
             notice(f"{counted(len(scenes), 'short run')} for the temperatures of {labels[0].partition(' at ')[0]}")
-        with Store(folder / STORE, study.path.stem) as store:
-            follow = _silent if progress is None else progress
-            simulations = Simulations(store, workers, scheduler, retry, follow)
-            return simulations.run(list(scenes), labels, follow("heat balance"))
+        with effort.simulations(folder, study.path) as simulations:
+            return simulations.run(list(scenes), labels, simulations.progress("heat balance"))
 
     region = moved_region(study, balance, kept)
     if notice is not None:
@@ -150,24 +137,14 @@ def region_in_store(study: Problem, folder: Path) -> Problem:
     """The study with the region that runs, if the runs in the store of ``folder`` tell; nothing is simulated."""
 
     def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
-        points = points_of(scenes, labels)
-        if not (folder / STORE).exists():
+        if (results := clearance.stored(folder, scenes, labels)) is None:
             raise _UnknownError
-        with Store(folder / STORE, read_only=True) as store:
-            outcomes = store.outcomes(points, clearance.sound)
-        if any(point.key not in outcomes for point in points):
-            raise _UnknownError
-        found = [outcomes[point.key] for point in points]
-        return [outcome if isinstance(outcome, Failure) else SimulationResult.from_dict(outcome) for outcome in found]
+        return results
 
     try:
         return moved_region(study, balance).study
     except (_UnknownError, RunError):
         return study
-
-
-def _silent(title: str) -> Progress:
-    return lambda done, total: None
 
 
 def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Region:
@@ -199,10 +176,9 @@ def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Regio
 def _corner(study: Problem, heat: Heat) -> Array:
     """The drawing (k,) with the least clearances of the region, other factors at their centre."""
     corner = study.centre.copy()
-    for _, clearances in _running(study, corner, heat):
-        for running in clearances.values():
-            if (place := _place(study, running.key)) is not None:
-                corner[place] = _ends(study, place)[0]
+    for _, running in _running(study, corner, heat):
+        if (place := _place(study, running.key)) is not None:
+            corner[place] = study.ends[place, 0]
     return corner
 
 
@@ -222,10 +198,9 @@ def _hear_of_corner(
 def _endangered(study: Problem, point: Array, heat: Heat) -> dict[str, RunningClearance]:
     """By point of the duty with a heat balance, the clearance of a drawing (k,) that the fewest kelvin close; of few enough alone."""
     least: dict[str, RunningClearance] = {}
-    for name, clearances in _running(study, point, heat):
-        for running in clearances.values() if heat else ():
-            if running.kelvins_left < min(FEW_K, least[name].kelvins_left if name in least else FEW_K):
-                least[name] = running
+    for name, running in _running(study, point, heat) if heat else ():
+        if running.kelvins_left < min(FEW_K, least[name].kelvins_left if name in least else FEW_K):
+            least[name] = running
     return least
 
 
@@ -255,16 +230,10 @@ def _place(study: Problem, key: str) -> int | None:
     return next((place for place, factor in enumerate(study.file.factor) if factor.key == key), None)
 
 
-def _ends(study: Problem, place: int) -> tuple[float, float]:
-    """Ends of the region of a factor, in its units."""
-    half = study.design.reach * study.step[place]
-    return float(study.centre[place] - half), float(study.centre[place] + half)
-
-
 def _low_mm(study: Problem, taken: Taken) -> float:
     """Lowest value of a clearance on the drawings of the region [mm]."""
     place = _place(study, taken.running.key)
-    return 1e3 * taken.running.play.drawn if place is None else _ends(study, place)[0]
+    return 1e3 * taken.running.play.drawn if place is None else float(study.ends[place, 0])
 
 
 def _scenes(
@@ -276,17 +245,15 @@ def _scenes(
     return {"": run} if isinstance(run, Scene) else run.scenes
 
 
-def _running(study: Problem, point: Array, heat: Heat) -> Iterator[tuple[str, dict[str, RunningClearance]]]:
+def _running(study: Problem, point: Array, heat: Heat) -> Iterator[tuple[str, RunningClearance]]:
     """Clearances in operation of a drawing (k,) by point of the duty, at each of the temperatures found there."""
     for name, scene in _scenes(study, point, kind=DrawnScene).items():
         if (mounting := scene.mounting) is None:
             continue
-        if scene.thermal is None:
-            yield name, scene.running_clearances(mounting)
-            continue
-        for nodes in heat[name]:
-            hot = mounting.model_copy(update=part_temperatures(scene.thermal, nodes))
-            yield name, scene.running_clearances(hot)
+        mountings = [mounting]
+        if (thermal := scene.thermal) is not None:
+            mountings = [mounting.model_copy(update=part_temperatures(thermal, nodes)) for nodes in heat[name]]
+        yield from ((name, running) for hot in mountings for running in scene.running_clearances(hot).values())
 
 
 def _worst(study: Problem, heat: Heat, hotter: Mapping[str, float]) -> dict[str, Taken]:
@@ -294,11 +261,10 @@ def _worst(study: Problem, heat: Heat, hotter: Mapping[str, float]) -> dict[str,
     worst: dict[str, Taken] = {}
     points = np.unique(study.actual(study.design.coded), axis=0)
     for point in points[:: -(-len(points) // MOST_POINTS)]:
-        for name, clearances in _running(study, point, heat):
-            for running in clearances.values():
-                taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
-                if running.key not in worst or taken.needed > worst[running.key].needed:
-                    worst[running.key] = taken
+        for name, running in _running(study, point, heat):
+            taken = Taken(running, name, _floor(study, running), hotter.get(running.key, 0.0))
+            if running.key not in worst or taken.needed > worst[running.key].needed:
+                worst[running.key] = taken
     return worst
 
 
@@ -376,7 +342,7 @@ def _moved(study: Problem, short: Mapping[str, Taken], kept: float) -> Problem:
     for key, taken in short.items():
         place = _place(study, key)
         assert place is not None
-        low, high = _ends(study, place)
+        low, high = study.ends[place].tolist()
         factor, needed = factors[place], 1e3 * taken.target
         top = max(high, needed + kept * (high - low))
         if factor.allowed is not None:
@@ -418,7 +384,7 @@ def _moved_note(before: Problem, after: Problem, key: str, taken: Taken) -> Note
     place = _place(before, key)
     assert place is not None
     words, unit = quantity(before.factors[place])
-    (low, high), (new_low, new_high) = _ends(before, place), _ends(after, place)
+    (low, high), (new_low, new_high) = before.ends[place], after.ends[place]
     verb = "moved" if new_high > high * (1.0 + 1e-9) else "was narrowed"
     return Note(
         "region",
@@ -431,7 +397,7 @@ def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     running, key = taken.running, taken.running.key
     words, _ = quantity(key.rpartition(".")[2])
     stays = _place(study, key) is not None
-    if any(clearances_seize(clearances, key) for _, clearances in _running(study, study.centre, heat)):
+    if any(running.seizes for _, running in _running(study, study.centre, heat) if running.key == key):
         fix = "widen the factor's centre" if stays else f"widen it in {study.scene.file}, or make it a factor"
         raise InputError(
             [f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"]
@@ -444,22 +410,12 @@ def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     )
 
 
-def clearances_seize(clearances: Mapping[str, RunningClearance], key: str) -> bool:
-    """Whether the clearance with this key is lost."""
-    return any(running.seizes for running in clearances.values() if running.key == key)
-
-
 def _with_baseline(
     original: Problem, moved: Problem, balance: Balances, heat: dict[str, list[Temperatures]]
 ) -> tuple[Problem, list[Note]]:
     """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
     point = original.baseline
-    seized = [
-        (running, name)
-        for name, clearances in _running(original, point, heat)
-        for running in clearances.values()
-        if running.seizes
-    ]
+    seized = [(running, name) for name, running in _running(original, point, heat) if running.seizes]
     if not seized:
         ends = _endangered(original, point, heat)
         found = _balanced(original, balance, point, list(ends), "the original design")

@@ -15,8 +15,8 @@ from doe.designs.design import SAME_POINT
 from doe.designs.model import Evaluation, lattice, lost_terms
 from doe.designs.remaining import Remaining, added_points
 from doe.duty import DutyResult
-from doe.running.runner import AgendaKeeper, Progress
-from doe.running.store import Cause, Failure, Store, alike, grouped, sentence
+from doe.running.runner import Progress
+from doe.running.store import Cause, Failure, alike, grouped, sentence
 from doe.study_file.duty import at_point
 from doe.study_file.table import read_table
 from doe.workflow.design import DesignRun, all_terms, check_runs, design_runs, evaluation, realised, terms_of
@@ -28,8 +28,6 @@ from rbdyn.base.records import Record, finite
 from rbdyn.base.words import are, counted
 from rbdyn.result import SimulationResult
 
-# Name of the store in the folder of a study.
-STORE = "study.sqlite"
 RUNS_TABLE = "design_runs.csv"  # of a study, in its folder
 # Times that failed runs are replaced: the last ones may fail too.
 REPLACED = 3
@@ -71,28 +69,14 @@ class Runs:
         return type(self)(coded, actual, values, errors, self.notes, replicates, block)
 
 
-def run_design(
-    study: Problem,
-    folder: Path,
-    workers: int | None,
-    progress: Progress,
-    scheduler: str | None = None,
-    retry: bool = False,
-    agenda: AgendaKeeper | None = None,
-) -> Runs:
-    """Design runs, from the store in ``folder`` or simulated in threads or on a cluster.
+def run_design(study: Problem, simulations: clearance.Simulations, progress: Progress) -> Runs:
+    """Design runs, from the store or simulated; runs that failed are replaced by others where the models need them.
 
     Failed runs are left out. Raises InputError, KeyboardInterrupt, and RunError if too few runs remain.
     """
     ordered = study.plan
     check_runs(study, ordered.design)
-    with Store(folder / STORE, study.path.stem) as store:
-        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress, agenda)
-        return runs_of(study, ordered, simulations, progress)
-
-
-def runs_of(study: Problem, ordered: RunPlan, simulations: clearance.Simulations, progress: Progress) -> Runs:
-    """The same for checked runs; runs that failed are replaced by others where the models need them."""
+    simulations = replace(simulations, turns_of={})
     results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
     planned = len(results)
     for _ in range(REPLACED):

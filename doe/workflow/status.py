@@ -17,11 +17,10 @@ from doe import clearance
 from doe.clearance import every_scene, points_of, work_of
 from doe.duty import Run, main_scene, scenes_of
 from doe.running.runner import ANSWER, Agenda, Stage, agendas_of
-from doe.running.store import CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
+from doe.running.store import STORE, CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file.sections import Front
 from doe.workflow.problem import Problem
 from doe.workflow.region import region_in_store
-from doe.workflow.runs import STORE
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.records import plain

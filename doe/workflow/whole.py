@@ -6,7 +6,7 @@ published table.
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,8 +21,8 @@ from doe.dimension_chain.refusal import allocated_reason
 from doe.duty import Duty, scene_at
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
-from doe.running.runner import ANSWER, AgendaKeeper, Progress
-from doe.running.store import Failure, Store
+from doe.running.runner import ANSWER, AgendaKeeper
+from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
@@ -42,6 +42,7 @@ from doe.workflow.confirmation import (
 from doe.workflow.dangers import worse_notes
 from doe.workflow.design import check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
+from doe.workflow.effort import Effort
 from doe.workflow.first_look import first_look
 from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
 from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
@@ -51,14 +52,13 @@ from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
 from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge
-from doe.workflow.runs import STORE, Runs, run_design, with_remaining
+from doe.workflow.runs import Runs, run_design, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record
 from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
@@ -371,32 +371,28 @@ class StudyResult:
 def run_study(
     study: Problem,
     folder: Path,
-    workers: int | None,
-    progress: Callable[[str], Progress],
-    scheduler: str | None = None,
-    retry: bool = False,
+    effort: Effort,
     adaptive: bool = False,
     robust: bool = False,
     agenda: AgendaKeeper | None = None,
 ) -> StudyResult:
-    """Run the whole study; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster.
+    """Run the whole study, with its runs in ``folder``.
 
-    ``retry``: repeat runs that failed before. ``adaptive``: also search the front of the simulator itself. ``robust``: judge the
-    pick over unknown inputs, as [robust] asks. ``agenda``: counts all runs. Raises InputError, RunError, KeyboardInterrupt.
+    ``adaptive``: also search the front of the simulator itself. ``robust``: judge the pick over unknown inputs, as [robust] asks.
+    ``agenda``: counts all runs. Raises InputError, RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(agenda), inputs_digest(study, adaptive, robust)
     check_goals(study)
     robust = robust or study.asks_robust
-    study, moves = region_that_runs(study, folder, workers, scheduler, retry, progress, clock.notice)
+    study, moves = region_that_runs(study, folder, effort)
     reference = check_study(study, adaptive, robust)
     if agenda is not None:
         agenda.plan(study_stages(study, adaptive, robust), shorter_by(study, adaptive, robust), STEPS_S)
-    with Store(folder / STORE, study.path.stem) as store:
-        simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
+    with effort.simulations(folder, study.path, agenda) as simulations:
         original = simulate_original(study, simulations)
         clock.lap("baseline_s")
-        watched = first_look(study, folder, original, progress(DESIGN), clock.notice)
-        runs = run_design(study, folder, workers, watched, scheduler, retry, agenda)
+        watched = first_look(study, folder, original, simulations.progress(DESIGN), effort.notice)
+        runs = run_design(study, simulations, watched)
         clock.lap("design_s", FRONT)
         study, turns = with_remaining(study, runs), runs.turns
         surfaces, surface_front = _surfaces_and_front(study, runs, clock)
@@ -507,11 +503,6 @@ class _Clock:
         self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
-
-    @property
-    def notice(self) -> Notice:
-        """Receiver of sentences to be said at once; None without an agenda."""
-        return None if self._agenda is None else self._agenda.notice
 
     def lap(self, name: str, next_stage: str = "") -> None:
         """The stage ``name`` ends here, and the ``next_stage`` of the agenda begins."""

@@ -25,11 +25,12 @@ from doe.pareto.front import SimulatedFront
 from doe.pareto.search import spread
 from doe.report.sections.answer import point_record
 from doe.running.runner import Progress
-from doe.running.store import Failure, Store, grouped
+from doe.running.store import STORE, Failure, Store, grouped
 from doe.workflow.adaptive import Evaluator
+from doe.workflow.effort import Effort
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
+from doe.workflow.runs import run_design
 from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
@@ -208,8 +209,9 @@ def share_of_adaptive(study: Problem, front: SimulatedFront, summary: Mapping[st
 def compare(study: Problem, settings: Settings, folder: Path, workers: int | None) -> dict[str, Any]:
     """All of it: runs, searches, comparisons, the file; returns its record. Raises as ``find_direct``."""
     folder.mkdir(parents=True, exist_ok=True)
-    with progress_bar("design runs", False) as progress:
-        surfaces = fit_surfaces(study, run_design(study, folder, workers, progress))
+    effort = Effort(workers)
+    with progress_bar("design runs", False) as progress, effort.simulations(folder, study.path) as simulations:
+        surfaces = fit_surfaces(study, run_design(study, simulations, progress))
     on_surfaces = find_front(study, surfaces)
     with Store(folder / STORE, study.path.stem) as store, progress_bar("direct front", False) as progress:
         simulations = Simulations(store, workers, None, False, lambda title: progress)

@@ -30,8 +30,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from doe.running.store import Store
-from doe.workflow.runs import STORE
+from doe.running.store import STORE, Store
 from rbdyn.cli.app import MAP_POINTS as POINTS
 
 EXAMPLES = Path(__file__).resolve().parents[1]

@@ -11,16 +11,15 @@ from pathlib import Path
 import pytest
 from in_process import in_process
 from instant_runs import instantly
-from short_studies import short_study, silent
+from short_studies import run_design, short_study, silent
 from test_study_status import Killed, killed_in, study_command
 
 from doe import clearance
 from doe.commands.study import status_blocks
 from doe.running import runner
 from doe.running.runner import Ledger, RunOutcome, Stage, agenda_in
-from doe.running.store import Point
+from doe.running.store import STORE, Point
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import notice

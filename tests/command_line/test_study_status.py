@@ -15,16 +15,15 @@ import pytest
 import typer
 from doe_command import doe, doe_process, invoke, loaded_by
 from instant_runs import instantly
-from short_studies import short_study, silent
+from short_studies import run_design, short_study, silent
 from typer.testing import CliRunner
 
 from doe import clearance
 from doe.cli import app
 from doe.commands.study import status_blocks
 from doe.running.runner import Stage, agenda_in
-from doe.running.store import STALE_S, Point, Store, at_work
+from doe.running.store import STALE_S, STORE, Point, Store, at_work
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import content_digest, inputs_digest, scene_status, status_of, study_stages, study_status
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import read_toml

@@ -99,11 +99,12 @@ def unillustrated(patch: Any) -> None:
 
 def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = False) -> None:
     """The program."""
+    from short_studies import run_design
+
     from doe.commands.options import keeping_runs
     from doe.commands.study import study as doe_study
     from doe.library.effort import registered
     from doe.workflow.problem import Problem
-    from doe.workflow.runs import run_design
     from rbdyn.base.command import guarded, print_json
     from rbdyn.base.folder import output_folder
 

@@ -51,3 +51,29 @@ def rows(path: Path) -> dict[str, str]:
         return dict(connection.execute("SELECT key, result FROM runs WHERE status = 'done'"))
     finally:
         connection.close()
+
+
+def run_design(study, folder, workers, progress=silent, scheduler=None, retry=False, agenda=None):
+    """The design runs of a study, stored in a folder."""
+    from doe.workflow import runs
+    from doe.workflow.effort import Effort
+
+    with Effort(workers, scheduler, retry).simulations(folder, study.path, agenda) as simulations:
+        return runs.run_design(study, simulations, progress)
+
+
+def run_study(study, folder, workers=None, progress=lambda title: silent, **options):
+    """A whole study, stored in a folder; ``progress(title)`` gives the progress of a stage."""
+    from doe.workflow import whole
+    from doe.workflow.effort import Effort
+
+    follow = Effort(workers, follow=lambda title, done, total: progress(title)(done, total))
+    return whole.run_study(study, folder, follow, **options)
+
+
+def region_that_runs(study, folder, workers, notice=None):
+    """The region of a study that runs, with its heat balance stored in a folder."""
+    from doe.workflow import region
+    from doe.workflow.effort import Effort
+
+    return region.region_that_runs(study, folder, Effort(workers, notice=notice))

@@ -15,9 +15,8 @@ from short_studies import short_study
 from doe.clearance import points_of
 from doe.commands.study import status_blocks
 from doe.running.runner import NOTE, agenda_in
-from doe.running.store import Store
+from doe.running.store import STORE, Store
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.faults import InputError
 from rbdyn.base.storage import digest_of, sign

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from instant_runs import instantly
-from short_studies import short_study, silent
+from short_studies import run_design, short_study, silent
 
 from doe.workflow.problem import Problem
-from doe.workflow.runs import read_runs, run_design
+from doe.workflow.runs import read_runs
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell, save_table
 from rbdyn.base.tables.sheet import read_sheet
 

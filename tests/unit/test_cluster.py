@@ -18,13 +18,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from doe_command import doe
-from short_studies import SHORT, short_study, silent
+from short_studies import SHORT, run_design, short_study, silent
 
 from doe.running import cluster
 from doe.running.runner import RunOutcome
-from doe.running.store import Store
+from doe.running.store import STORE, Store
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
 from rbdyn.base.faults import InputError, RunError
 
 HERE = Path(__file__).parent

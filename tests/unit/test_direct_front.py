@@ -19,10 +19,10 @@ from short_studies import SHORT, rows, short_study, silent, stored
 
 from doe.clearance import Simulations
 from doe.pareto import Goals
-from doe.running.store import Store
+from doe.running.store import STORE, Store
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, read_runs
+from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError
 

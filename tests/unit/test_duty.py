@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from instant_runs import instant_result, instantly, unillustrated, with_figures
 from scipy import stats
-from short_studies import EXAMPLES, rows, short_study, silent
+from short_studies import EXAMPLES, rows, run_design, run_study, short_study, silent
 
 from doe.clearance import Simulations
 from doe.duty import Duty, DutyResult, Rule, quotient
@@ -20,8 +20,6 @@ from doe.workflow.confirmation import Choice, confirm, every_limit, simulate_ori
 from doe.workflow.duty import study_at
 from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
-from doe.workflow.runs import run_design
-from doe.workflow.whole import run_study
 from rbdyn.base.estimate import Estimate, quantile
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulate_module

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from instant_runs import instant_result, instantly, unillustrated
-from short_studies import short_study, silent
+from short_studies import run_study, short_study, silent
 from test_duty import IDLE_AND_CRUISE
 from test_study_limits import IMPACT, biased, limited_study
 from typer.testing import CliRunner
@@ -22,7 +22,6 @@ from doe.workflow.obstacles import MissedLimit, Obstacles
 from doe.workflow.problem import Problem
 from doe.workflow.status import study_stages
 from doe.workflow.surfaces import reference_runs
-from doe.workflow.whole import run_study
 from rbdyn.base.notes import Level, Note, of_level, ranked
 from rbdyn.dynamics import simulate as module
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from instant_runs import instant_result, instantly, unillustrated
-from short_studies import EXAMPLES, silent
+from short_studies import EXAMPLES, region_that_runs, run_design, run_study, silent
 from typer.testing import CliRunner
 
 from doe.cli import app
@@ -21,10 +21,9 @@ from doe.designs.remaining import Remaining, added_points
 from doe.running.store import Failure
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
-from doe.workflow.region import moved_region, region_in_store, region_that_runs
-from doe.workflow.runs import run_design, with_remaining
+from doe.workflow.region import moved_region, region_in_store
+from doe.workflow.runs import with_remaining
 from doe.workflow.surfaces import fit_surfaces
-from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulation
 from rbdyn.mounting.cage import NEARLY_K, OperatingClearance, RunningClearance

@@ -11,7 +11,7 @@ import pytest
 from coarse_search import coarsely
 from instant_runs import instantly
 from scipy.stats import qmc
-from short_studies import EXAMPLES, SHORT, short_study, silent
+from short_studies import EXAMPLES, SHORT, run_study, short_study, silent
 
 from doe import clearance
 from doe.adaptive.acquisition import Region
@@ -23,7 +23,6 @@ from doe.report.summary import restored
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
 from doe.workflow.problem import Problem
-from doe.workflow.whole import run_study
 from rbdyn.base.blocks import Figures
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '

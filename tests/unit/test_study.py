@@ -15,18 +15,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.image import imread
-from short_studies import SHORT, rows, short_study, silent, stored
+from short_studies import SHORT, rows, run_design, run_study, short_study, silent, stored
 
 from doe.report.files import write
 from doe.report.sections.front import front_record
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
-from doe.workflow.runs import read_runs, run_design
+from doe.workflow.runs import read_runs
 from doe.workflow.status import finished_record as is_finished
 from doe.workflow.status import inputs_digest
 from doe.workflow.surfaces import fit_surfaces, reference_runs
-from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.storage import run_key
 

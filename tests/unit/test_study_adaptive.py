@@ -10,18 +10,16 @@ import pytest
 from coarse_search import coarsely
 from doe_command import doe
 from instant_runs import instantly, unillustrated
-from short_studies import SHORT, short_study, silent
+from short_studies import SHORT, run_design, run_study, short_study, silent
 
 from doe import clearance
 from doe.clearance import Simulations
 from doe.report.files import write
 from doe.report.sections.search import adaptive_record, spent_sentence
-from doe.running.store import Store
+from doe.running.store import STORE, Store
 from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
 from doe.workflow.surfaces import fit_surfaces
-from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from instant_runs import instantly
-from short_studies import SHORT, short_study, silent
+from short_studies import SHORT, run_study, short_study, silent
 
 from doe.report.files import answer_text, summary
 from doe.workflow.problem import Problem
-from doe.workflow.whole import check_study, operating_clearances, run_study, scenes_of
+from doe.workflow.whole import check_study, operating_clearances, scenes_of
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.catalogue import classes_at
 

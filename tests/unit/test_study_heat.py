@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from instant_runs import instant_result
-from short_studies import EXAMPLES, silent
+from short_studies import EXAMPLES, run_study, silent
 from typer.testing import CliRunner
 
 from doe import clearance
@@ -23,7 +23,7 @@ from doe.workflow.confirmation import EVERYWHERE, Choice, confirmed_from
 from doe.workflow.input_sets import read_case
 from doe.workflow.problem import Problem
 from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
-from doe.workflow.whole import check_study, operating_clearances, run_study
+from doe.workflow.whole import check_study, operating_clearances
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics import simulate as simulation
 from rbdyn.result import TEMPERATURES, Quantity

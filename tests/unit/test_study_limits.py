@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from instant_runs import instant_result, instantly, unillustrated
-from short_studies import SHORT, short_study, silent
+from short_studies import SHORT, run_study, short_study, silent
 from typer.testing import CliRunner
 
 from doe import clearance
@@ -19,7 +19,6 @@ from doe.workflow.confirmation import Confirmed, Limit, every_limit, limits_of, 
 from doe.workflow.front import ErrorField, Misses, find_front
 from doe.workflow.pick import edge_of, place_of, share_at_edge
 from doe.workflow.problem import Problem
-from doe.workflow.whole import run_study
 from rbdyn.base.faults import InputError
 
 IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'

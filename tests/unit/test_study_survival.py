@@ -19,14 +19,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from instant_runs import instantly
-from short_studies import SHORT, short_study, silent, stored
+from short_studies import SHORT, run_design, short_study, silent, stored
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.running.store import Store
+from doe.running.store import STORE, Store
 from doe.workflow.confirmation import Choice, Confirmed, confirm, simulate_original
 from doe.workflow.problem import Problem
-from doe.workflow.runs import STORE, run_design
 from doe.workflow.status import study_status
 from doe.workflow.surfaces import reference_runs
 from rbdyn.base.faults import RunError
