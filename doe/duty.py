@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from doe.running.store import Failure, Point, alike
+from doe.running.store import Failure, Point, without_numbers
 from doe.study_file import Study
 from doe.study_file.duty import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError, key_path
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import Notes, merged
 from rbdyn.base.records import finite
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult, arrays_of
@@ -316,13 +316,7 @@ class DutyResult:
     @property
     def notes(self) -> Notes:
         """Notes of all points, each once: those that not every point has name their points."""
-        placed = [(group[0], note) for group in self.groups for note in self.points[group[0]].notes]
-        every = list[Note]()
-        for notes in alike(placed, lambda pair: pair[1]):
-            names = list(dict.fromkeys(name for name, _ in notes))
-            first = notes[0][1]
-            every.append(first if len(names) == len(self.groups) else first.about(f"at {', '.join(names)}"))
-        return tuple(every)
+        return merged({group[0]: self.points[group[0]].notes for group in self.groups}, "at {}", same=without_numbers)
 
     @property
     def power_terms_W(self) -> dict[str, float]:  # noqa: N802

@@ -344,7 +344,7 @@ def _parts(result: Any) -> dict[str, Quantity]:
 
 def _notes(a: Any, b: Any) -> Notes:
     """Dangers and warnings of both, and what makes figures of one unlike those of the other besides the inputs."""
-    found = [*merged({"A": a.notes or (), "B": b.notes or ()}, least=Level.WARNING)]
+    found = [*merged({"A": a.notes or (), "B": b.notes or ()}, "of {}", Level.WARNING)]
     other = [name for name in a.versions if a.versions[name] != b.versions.get(name)]
     if other:
         change = ", ".join(f"{name} {a.versions[name]} and {b.versions.get(name, 'unknown')}" for name in other)

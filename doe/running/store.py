@@ -82,8 +82,13 @@ def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
     """Groups of items whose texts differ only in their numbers."""
     groups: dict[str, list[T]] = {}
     for item in items:
-        groups.setdefault(_NUMBER.sub("#", text(item)), []).append(item)
+        groups.setdefault(without_numbers(text(item)), []).append(item)
     return list(groups.values())
+
+
+def without_numbers(text: str) -> str:
+    """A text with a mark for each number."""
+    return _NUMBER.sub("#", text)
 
 
 def sentence(failures: Sequence[Failure]) -> str:

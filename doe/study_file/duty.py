@@ -4,7 +4,6 @@ Over a duty a response is one figure of all points. Its limits hold at points: e
 without a goal, so that every step of a study treats it like any other limit.
 """
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Literal
@@ -12,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from doe.study_file.sections import Goal
-from rbdyn.scene.duty import DutyPoint, point_faults
+from rbdyn.scene.duty import DutyPoint, point_faults, shares_of_time
 
 Aggregate = Literal["mean", "worst", "worst_relative"]
 
@@ -38,9 +37,8 @@ def alike(points: Sequence[DutyPoint]) -> bool:
 
 
 def shares_of(points: Sequence[DutyPoint]) -> dict[str, float]:
-    """Shares of the time by name of the point, summing to 1, in the order of the names: they do not depend on that of the tables."""
-    total = math.fsum(point.share for point in points)
-    return {point.name: point.share / total for point in sorted(points, key=lambda point: point.name)}
+    """Shares of the time by name of the point, in the order of the names: they do not depend on that of the tables."""
+    return dict(sorted(zip((point.name for point in points), shares_of_time(points), strict=True)))
 
 
 def duty_faults(

@@ -5,7 +5,7 @@ and a colon. Notes of one code that differ in their subjects or figures are merg
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple, Self
 
@@ -150,19 +150,22 @@ def ranked(notes: Iterable[Note]) -> list[Note]:
     return sorted(dict.fromkeys(notes), key=lambda note: (levels.index(note.level), codes.index(note.code)))
 
 
-def merged(notes: Mapping[str, Iterable[Note]], least: Level = NOTE) -> Notes:
+def merged(
+    notes: Mapping[str, Iterable[Note]], place: str, least: Level = NOTE, same: Callable[[str], str] = str
+) -> Notes:
     """Notes of several results by their names: one that all have stands once, any other names those that have it.
 
-    ``least``: level from which notes count.
+    ``place``: such as "at {}", of the names. ``least``: level from which notes count. ``same``: what notes that are one have in
+    common; the first of them stands for all.
     """
-    places: dict[tuple[str, str], list[str]] = {}
+    groups: dict[tuple[str, str], tuple[Note, dict[str, None]]] = {}
     for name, found in notes.items():
         for note in found:
             if list(Level).index(note.level) <= list(Level).index(least):
-                places.setdefault((note.code, str(note)), []).append(name)
+                groups.setdefault((note.code, same(note)), (note, {}))[1][name] = None
     return tuple(
-        Note(code, text if len(names) == len(notes) else f"{', '.join(names)}: {text}")
-        for (code, text), names in places.items()
+        note if len(names) == len(notes) else note.about(place.format(", ".join(names)))
+        for note, names in groups.values()
     )
 
 

@@ -196,5 +196,5 @@ def _notes(results: Mapping[str, SimulationResult | str]) -> Notes:
     reasons = {name: result for name, result in results.items() if isinstance(result, str)}
     return (
         *(Note("point", f"{name} failed: {reason.removeprefix('failed: ')}") for name, reason in reasons.items()),
-        *merged({name: result.notes for name, result in ran.items()}),
+        *merged({name: result.notes for name, result in ran.items()}, "at {}"),
     )

@@ -103,8 +103,8 @@ def in_hours(points: Sequence[DutyPoint]) -> bool:
 
 
 def shares_of_time(points: Sequence[DutyPoint]) -> list[float]:
-    """Shares of the time, which sum to 1 where those of the points are hours."""
-    total = math.fsum(point.share for point in points) if in_hours(points) else 1.0
+    """Shares of the time, which sum to 1, where those of the points are hours too."""
+    total = math.fsum(point.share for point in points)
     return [point.share / total for point in points]
 
 
