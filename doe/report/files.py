@@ -1,9 +1,10 @@
 """The files of a study: summary.json, the report, answer.txt, tables and pictures; and its answer on the terminal."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,17 +36,22 @@ from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.pick import SearchedPick
-from doe.workflow.runs import StudyDesign
+from doe.workflow.problem import Problem
+from doe.workflow.runs import Runs, StudyDesign
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
+from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
 from rbdyn.result import versions, write_json
 
 FORMAT = "doe.study/2"
+# A row of a table by its columns.
+Row = Mapping[str, Any]
 # What the name of a file should not have; a limit at a point of a duty has a name with a colon.
 NO_WORD = re.compile(r"[^\w.-]+")
 # Shaft turns of the motion in the pictures.
@@ -69,7 +75,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "front.csv": front_tables(record["front"])["front.csv"]
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
-        "confirmation.csv": confirmation_table(result.confirmation),
+        "confirmation.csv": confirmation_sheet(study.factors, result.confirmation).records,
         "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
     }
     if outcome.duty is not None:
@@ -79,7 +85,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
             sheet.file: sheet.records for sheet in (robust_input_sheet(outcome.robust), decider_sheet(outcome.robust))
         }
     if outcome.reference_values is not None:
-        tables["published_comparisons.csv"] = _reference_table(outcome)
+        published = _reference_rows(study, outcome.runs, outcome.reference_values)
+        tables["published_comparisons.csv"] = reference_sheet(study.factors, study.responses, published).records
     for name, rows in tables.items():
         save_table(rows, folder / name)
     pictures = []
@@ -222,38 +229,71 @@ def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
     }
 
 
-def _reference_table(outcome: StudyResult) -> list[dict[str, Any]]:
-    study, runs = outcome.study, outcome.runs
-    assert outcome.reference_values is not None
+def reference_sheet(factors: Sequence[str], responses: Sequence[str], rows: Sequence[Row] = ()) -> Sheet[Row]:
+    """A row a run next to that of the published table."""
+    both = "simulated, and published"
+    columns: tuple[Column[Row], ...] = (
+        Column("run", meaning="number of the run"),
+        *Column[Row]("{}", unit="of the name", meaning="its point").of(factors),
+        *Column[Row]("{}_ours", unit="of the response", meaning=both).of(responses),
+        *Column[Row]("{}_theirs", unit="of the response", meaning=both).of(responses),
+    )
+    content = "A row a run, next to the table of a publication."
+    return Sheet("", columns, rows, file="published_comparisons.csv", content=content)
+
+
+def _reference_rows(study: Problem, runs: Runs, published: Array) -> list[Row]:
     return [
         {
             "run": run + 1,
-            **dict(zip(study.factors, runs.actual[run], strict=True)),
+            **study.by_factor(runs.actual[run]),
             **{f"{name}_ours": x for name, x in zip(study.responses, runs.values[run], strict=True)},
             **{f"{name}_theirs": x for name, x in zip(study.responses, theirs, strict=True)},
         }
-        for run, theirs in enumerate(outcome.reference_values)
+        for run, theirs in enumerate(published)
     ]
 
 
-def confirmation_table(points: Mapping[str, ConfirmedPoint]) -> list[dict[str, Any]]:
-    """A row for each point and response."""
-    rows = []
-    for name, point in points.items():
-        for response, value in point.responses.items():
-            gain, limit = (point.gains or {}).get(response), point.limits.get(response)
-            rows.append(
-                {
-                    "point": name,
-                    **point.factors,
-                    "response": response,
-                    **value.as_dict(),
-                    "improvement_percent": None if gain is None else gain.percent,
-                    "improvement_error_percent": None if gain is None else gain.error_percent,
-                    "verdict": "" if gain is None else gain.verdict,
-                    "joint_error": value.joint_error,
-                    "limit": "" if limit is None else f"{limit.sense} {limit.bound:g}",
-                    "limit_verdict": "" if limit is None else limit.verdict,
-                }
-            )
-    return rows
+def confirmation_sheet(
+    factors: Sequence[str], points: Mapping[str, ConfirmedPoint] = MappingProxyType({})
+) -> Sheet[Row]:
+    """A row for each confirmed point and response."""
+    rows = [
+        {
+            "point": name,
+            **point.factors,
+            "response": response,
+            **value.as_dict(),
+            "joint_error": value.joint_error,
+            "gain": (point.gains or {}).get(response),
+            "judged": point.limits.get(response),
+        }
+        for name, point in points.items()
+        for response, value in point.responses.items()
+    ]
+    mean, its_gain = (
+        "mean, and half widths of the 95 % intervals",
+        "gain on the baseline, positive where better, and its half width",
+    )
+    columns: tuple[Column[Row], ...] = (
+        Column("point", meaning="baseline, pick, or the rule that chose the point"),
+        *Column[Row]("{}", unit="of the name", meaning="the point").of(factors),
+        Column("response", meaning="the response of this row"),
+        *Column[Row]("{}", unit="of the response", meaning=mean).of(["value", "statistical_error", "numerical_error"]),
+        Column("improvement_percent", at=("gain", "percent"), meaning=its_gain),
+        Column("improvement_error_percent", at=("gain", "error_percent")),
+        Column(
+            "verdict",
+            at=lambda row: row["gain"].verdict if row["gain"] else "",
+            meaning="better, worse or within error",
+        ),
+        Column("joint_error", unit="of the response", meaning="half width of both errors together"),
+        Column(
+            "limit",
+            at=lambda row: f"{row['judged'].sense} {row['judged'].bound:g}" if row["judged"] else "",
+            meaning="the limit, and kept, broken or undecided",
+        ),
+        Column("limit_verdict", at=lambda row: row["judged"].verdict if row["judged"] else ""),
+    )
+    content = "A row a response of each point that was simulated anew."
+    return Sheet("", columns, rows, file="confirmation.csv", content=content)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import copy
-import re
 
 import pytest
-from conftest import ROOT
 from synthetic_study import FACTORS, RESPONSES, summary
 
 from doe.report.files import answer_text, blocks
@@ -219,13 +217,6 @@ def test_the_table_has_a_row_a_response_at_a_point():
         "pick_error": 0.5, "improvement_percent": 11.16, "improvement_error_percent": 0.65, "verdict": "better",
         "own_pick_percent": 0.5, "own_pick_error_percent": 0.65, "limit_verdict": "kept",
     }  # fmt: skip
-
-
-def test_the_manual_describes_every_column():
-    """Report: the chapter on tables names each column of duty_points.csv."""
-    text = (ROOT / "doe" / "manual" / "67_study_tables.md").read_text(encoding="utf-8")
-    section = text.partition("### duty_points.csv")[2].partition("###")[0]
-    assert set(duty_figures(restored(over_duty())).records[0]) == set(re.findall("`([^`]+)`", section))
 
 
 @pytest.mark.parametrize("width", [80, 60, 40])

@@ -388,7 +388,7 @@ def changes(summary: Summary) -> Table:
     return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
 
 
-def tolerances(summary: Summary) -> Table:
+def tolerances(widths: Mapping[str, FactorTolerance]) -> Table:
     """The widest tolerances that keep the gain."""
     rows = [
         (
@@ -398,7 +398,7 @@ def tolerances(summary: Summary) -> Table:
             width.parts_words,
             label(width.limited_by),
         )
-        for name, width in (summary.tolerances or {}).items()
+        for name, width in widths.items()
     ]
     header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
     return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))

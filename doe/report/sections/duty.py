@@ -284,7 +284,7 @@ class DutyFigure(NamedTuple):
         return None if self.point.own is None else self.point.own.gains_over_pick.get(self.response)
 
 
-FIGURES: tuple[Column[DutyFigure], ...] = (
+DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
     Column("point", at=("point", "name"), meaning="point of operation, and its share of the time"),
     Column("share", at=("point", "share"), screen=False, meaning="point of operation, and its share of the time"),
     Column(
@@ -351,7 +351,7 @@ def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
     ]
     caption = "Simulated figures at every point (95 % intervals)"
     content = "A row a response at each point of a duty."
-    return Sheet(caption, FIGURES, rows, detail=Detail.ALL, file="duty_points.csv", content=content)
+    return Sheet(caption, DUTY_POINTS, rows, detail=Detail.ALL, file="duty_points.csv", content=content)
 
 
 def in_operation(summary: Summary, factor: Factor, end: str) -> tuple[float | None, str]:

@@ -40,7 +40,10 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks = _pictures(summary, names, {name: point for name, point in marks.items() if complete(point, summary)})
     blocks += [_picks(summary, names, marks), _gains(f"Changes on the surfaces {where}", record.get("predicted_gains"))]
     blocks += [Paragraph(record.get("statement") or ""), *_doubt(record)]
-    blocks += [_limits(record.get("constraints"), f"Limits on the surfaces {where}"), tolerances(summary)]
+    blocks += [
+        _limits(record.get("constraints"), f"Limits on the surfaces {where}"),
+        tolerances(part(summary, "tolerances") or {}),
+    ]
     blocks.append(Paragraph(part(summary, "tolerances_sentence") or ""))
     blocks += [*_search(record), *_further_fronts(summary), *_stated_point(record)]
     return Section("front", "Pareto front", blocks)
