@@ -18,7 +18,7 @@ from scipy import special
 from scipy.stats import qmc
 
 from doe.adaptive.acquisition import (
-    DRAWS,
+    FRONT_DRAWS,
     WORTH,
     Levels,
     Region,
@@ -259,7 +259,7 @@ class _Search:
         rows, costs = front_rows(emulators, everything)
         deviations = emulators.predict(everything)[1][:, self.goals.objectives]
         levels = levels_of(costs[rows], (costs - deviations).min(axis=0), random)
-        draws = emulators.draws(DRAWS, random)
+        draws = emulators.draws(FRONT_DRAWS, random)
         front = everything[rows[spread(costs[rows], SHOWN)]]
         by_runs = dominance_of(levels, emulators, draws(emulators.runs.points))
         before = self.fronts[-1] if self.fronts else front[:0]
@@ -387,7 +387,7 @@ class _Search:
             self._check_limits(emulators, points)
         rows, costs = front_rows(emulators, np.vstack([points, before]))
         levels = levels_of(costs[rows], costs[rows].min(axis=0), random)
-        improvable = dominance_of(levels, emulators, emulators.draws(DRAWS, random)(before)).improvable
+        improvable = dominance_of(levels, emulators, emulators.draws(FRONT_DRAWS, random)(before)).improvable
         archive = points[rows[rows < len(points)]]
         return archive[batch(emulators, archive, levels, improvable, count, self.region.apart)[0]]
 

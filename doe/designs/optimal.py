@@ -21,8 +21,8 @@ Criterion = Literal["d", "i"]
 FEWEST, MOST = 4, 40  # random designs from which exchanges start; the best one is the result
 WORK = 30_000  # coordinates times terms of all these designs together, above which there are fewer designs
 MOST_RUNS = 500  # exchanges among more take minutes
-# Coordinates are multiples of the half width of the box over PARTS: a finer grid gains little and separates replicates.
-PARTS = 20
+# Coordinates are multiples of the half width of the box over GRID_STEPS: a finer grid gains little and separates replicates.
+GRID_STEPS = 20
 GRID = np.linspace(-1.0, 1.0, 9)  # of the first exchanges
 MOVES = (2, 1)  # parts by which coordinates move in later exchanges
 SWEEPS = 20  # largest number of passes through all coordinates with one step
@@ -74,7 +74,7 @@ def optimal(
 
 def _on_parts(number: ArrayLike) -> Array:
     """Coordinates of a ``number`` of parts within the box, as quotients, so that equal coordinates have equal bits."""
-    return np.asarray(np.rint(np.asarray(number, float)).clip(-PARTS, PARTS) / PARTS)
+    return np.asarray(np.rint(np.asarray(number, float)).clip(-GRID_STEPS, GRID_STEPS) / GRID_STEPS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class Exchange:
         """Random designs."""
         shape = min(max(WORK // (runs * len(self.levels) * len(self.fixed_information)), FEWEST), MOST), runs
         columns = [
-            _on_parts(random.integers(-PARTS, PARTS, shape, endpoint=True))
+            _on_parts(random.integers(-GRID_STEPS, GRID_STEPS, shape, endpoint=True))
             if values is None
             else random.choice(values, shape)
             for values in self.levels
@@ -127,7 +127,9 @@ class Exchange:
             inverse, improved = np.asarray(np.linalg.inv(self._information(points)), float), False
             for run in range(points.shape[1]):
                 for factor, levels in enumerate(self.levels):
-                    neighbours = _on_parts(PARTS * points[:, run, factor, None] + [-parts, parts]) if parts else GRID
+                    neighbours = (
+                        _on_parts(GRID_STEPS * points[:, run, factor, None] + [-parts, parts]) if parts else GRID
+                    )
                     improved |= self._exchange(points, inverse, (run, factor), neighbours if levels is None else levels)
             if not improved:
                 return

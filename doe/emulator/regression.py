@@ -22,7 +22,7 @@ from sklearn.gaussian_process.kernels import DotProduct, Kernel, Matern
 from rbdyn.base.arrays import Array
 
 # Prior deviation of the level, in root mean squares of the values: wide, so that the runs decide.
-LEVEL = 10.0
+PRIOR_DEVIATION = 10.0
 # Ends of the search: of length scales in half ranges of the points, of variances in mean squares of the values.
 LENGTHS, VARIANCES, NUGGETS, TRENDS = (0.1, 50.0), (1e-3, 1e3), (1e-8, 1.0), (1e-4, 1e2)
 # Normal priors of the logarithms of these variances: mean and deviation. Weak, they decide where the runs do not.
@@ -182,7 +182,7 @@ def mode(
         box=np.log([TREND_BOX, VARIANCE_BOX, *[LENGTH_BOX] * inputs, NUGGET_BOX]) + scale[:, None],
         start=None if start is None else start.theta,
     )
-    kernel = Trended(half, unit, unit, unit, LEVEL**2 * unit if level else 0.0, degree, columns)
+    kernel = Trended(half, unit, unit, unit, PRIOR_DEVIATION**2 * unit if level else 0.0, degree, columns)
     return regression(kernel, points, values, variances, search).kernel_
 
 

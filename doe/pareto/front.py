@@ -276,7 +276,7 @@ def _values(objectives: Objectives, points: Array) -> Array:
     return values
 
 
-DRAWS = 200  # of the noise in a hypervolume, and in a pick
+NOISE_DRAWS = 200  # of the noise in a hypervolume, and in a pick
 
 
 class Samples(NamedTuple):
@@ -349,10 +349,10 @@ def pick_shares(
     random = np.random.default_rng(seed)
     typical = np.median(errors, axis=0)
     counts = np.zeros(len(costs))
-    for _ in range(DRAWS):
+    for _ in range(NOISE_DRAWS):
         noise = random.standard_t(freedom) * errors
         counts[pick(costs + noise, random.standard_normal(typical.size) * typical)] += 1.0
-    return counts / DRAWS
+    return counts / NOISE_DRAWS
 
 
 def noisy_hypervolume(

@@ -30,6 +30,7 @@ from scipy.stats import norm, qmc
 from doe.pareto.goals import NAMES, Goals, Rule, thinning
 from doe.pareto.search import Archive, Barred, Doubt, Judged, barring, check_search, dominates, hypervolume, search
 from rbdyn.base.arrays import Array
+from rbdyn.base.estimate import LEVEL
 
 EXACT_FACTORS = (
     4  # number of factors up to which every face of a box is searched; beyond, corners and lines along factors
@@ -164,7 +165,6 @@ def error_of_share(share: float, count: int) -> float:
     return math.sqrt(max(share * (1.0 - share), 1.0 / count) / count)
 
 
-LEVEL = 0.95
 # Number of shares that represent the distribution of all draws, and least number for one draw.
 SHARES, FEWEST = 4000, 20
 

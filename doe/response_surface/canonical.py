@@ -14,11 +14,11 @@ from doe.designs import to_actual
 from doe.designs.model import Terms, model_matrix, second_order
 from doe.response_surface.least_squares import Data
 from rbdyn.base.arrays import Array
+from rbdyn.base.estimate import LEVEL
 from rbdyn.base.records import Record
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 Nature = Literal["minimum", "maximum", "saddle"]
-SURE = 0.95  # probability of the intervals of the eigenvalues
 
 
 class StationaryPoint(Record):
@@ -107,7 +107,7 @@ def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:
     second = np.array([len(term) > 1 for term in terms])
     slopes = model_matrix(vectors.T, terms) * second
     variance = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)
-    return special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
+    return special.stdtrit(dof, (1 + LEVEL) / 2) * np.sqrt(variance.clip(0.0))
 
 
 def _inside(place: Array, points: Array) -> bool:

@@ -22,6 +22,7 @@ from scipy import linalg, optimize, special, stats
 
 from doe.designs.model import Terms, block_contrasts
 from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.estimate import LEVEL
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, keyed
 from rbdyn.base.words import are, counted
@@ -232,7 +233,6 @@ def _whole(labels: ArrayLike | None, size: int) -> Whole:
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)
-LEVEL = 0.95  # of the interval
 NAMES = {-2.0: "1/y^2", -1.0: "1/y", -0.5: "1/sqrt(y)", 0.0: "ln y", 0.5: "sqrt(y)", 2.0: "y^2"}
 
 

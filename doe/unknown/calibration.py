@@ -252,7 +252,7 @@ ENOUGH, INSIDE = 3, 0.9
 # Standard deviations beyond which a residual is an outlier; the largest Bayes factor that particles resolve.
 FAR, MOST = 3.0, 1e6
 # Draws of a cell, draws of a row for its width, and particles of each power that these are drawn from.
-DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
+PREDICTION_DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
 ENDS = (0.5, 0.05, 0.95)
 
 JointAt = Callable[[Array], Joint]
@@ -355,12 +355,12 @@ def held_out(particles: Particles, seed: int) -> Prediction:
 
 def reweighed(particles: Particles, conditions: Whole, seed: int) -> Array:
     """Particles (s, d) of the posterior by the cells ``conditions`` alone."""
-    return particles.draw(conditions, DRAWS, np.random.default_rng(seed))[0]
+    return particles.draw(conditions, PREDICTION_DRAWS, np.random.default_rng(seed))[0]
 
 
 def _prediction(particles: Particles, conditions: Whole, targets: Whole, random: np.random.Generator) -> Prediction:
-    after = particles.predictions(conditions, targets, DRAWS, random)
-    before = particles.predictions(conditions[:0], targets, DRAWS, random)
+    after = particles.predictions(conditions, targets, PREDICTION_DRAWS, random)
+    before = particles.predictions(conditions[:0], targets, PREDICTION_DRAWS, random)
     residuals = (particles.measured.values[targets] - after.mean(axis=0)) / after.std(axis=0)
     return Prediction(targets, after, before, residuals)
 

@@ -44,11 +44,11 @@ from doe.emulator import Emulator, fit_emulator, leave_one_out
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.estimate import wilson
+from rbdyn.base.estimate import LEVEL, wilson
 from rbdyn.base.records import Record, keyed
 
-# Points of true values for a row and at most, steps of their weights and earlier ones, and the cases that an interval holds.
-POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER, CONFIDENCE = 4, 1024, 100, 25, 0.95
+# Points of true values for a row and at most, steps of their weights and earlier ones.
+POINTS_OF_ROW, MOST_POINTS, STEPS, EARLIER = 4, 1024, 100, 25
 # Resamplings of up to 512 rows; of more rows fewer.
 RESAMPLES, FEWEST_RESAMPLES, USUAL_ROWS = 200, 50, 512
 LEAST_NOISE = 1e-9  # standard deviation over the size of the values; smaller noise is lost in rounding
@@ -85,7 +85,7 @@ def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> li
     resamples = max(RESAMPLES * USUAL_ROWS // max(count, USUAL_ROWS), FEWEST_RESAMPLES)
     drawn = (np.bincount(rows, minlength=count) for rows in random.integers(0, count, (resamples, count)))
     again = [_shares(values, noise, counts, hits, random)[1] for counts in drawn]
-    ends = np.quantile(again, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
+    ends = np.quantile(again, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
     moved = whole - earlier
     ends += [moved.clip(max=0.0), moved.clip(min=0.0)]
     intervals = []
@@ -163,9 +163,9 @@ def odds(values: Array, variances: Array, lower: float, upper: float, seed: int)
 # Slices of an input's range in which the probability is taken; of a pair of inputs, along each.
 BINS, PAIR_BINS = 64, 8
 # Resamplings by half of the rows, the fresh input sets and slices of one, and parts of the fresh sets for the error of averages.
-HALVES, POINTS, FEWER_BINS, PARTS = 200, 2048, 32, 8
+HALVES, POINTS, FEWER_BINS, AVERAGE_PARTS = 200, 2048, 32, 8
 # Share of resamplings in which an input must be worth most to be decisive, and its normal quantile.
-SURE, SURE_Z = 0.95, 1.645
+DECISIVE, DECISIVE_Z = 0.95, 1.645
 # Worth below which no measurement is proposed, and probability of the better choice from which none can be worth much.
 WORTH, NEARLY_ALL = 0.02, 0.9
 # Share of the worth of the best pair below which an input alone is not decisive.
@@ -384,7 +384,7 @@ def decides(
         [fewer.estimate(_chances([gain.of(rows) for gain in few])) for rows in halves],
         [
             _Slices.of(true_sets[rows], readings[rows], FEWER_BINS).estimate(better[rows])
-            for rows in np.split(np.arange(len(fresh)), PARTS)
+            for rows in np.split(np.arange(len(fresh)), AVERAGE_PARTS)
         ],
     )
     measured = _measured(places, by)
@@ -425,7 +425,7 @@ class _Figures(NamedTuple):
     def ends(self) -> Array:
         """Ends (2, i) of the 95 % intervals; a bias lengthens its own side only."""
         finite = np.where(np.isfinite(self.again), self.again, self.values)
-        low, high = np.quantile(finite, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0) - self.values
+        low, high = np.quantile(finite, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0) - self.values
         # Biases add up; scatter is independent of them.
         below, above = (side.sum(axis=0) for side in (self.biases.clip(max=0.0), self.biases.clip(min=0.0)))
         return np.array([self.values - np.hypot(low, below), self.values + np.hypot(high, above)])
@@ -452,7 +452,7 @@ class _Measured:
         worths, flips = self.worths.values.clip(0.0).tolist(), self.flips.values.tolist()
         (low, high), (first, last) = self.worths.ends.clip(0.0).tolist(), self.flips.ends.clip(0.0, 1.0).tolist()
         # A flip is reported only if nearly all resamplings have one.
-        sure = (np.isfinite(self.flips.again).mean(axis=0) >= SURE).tolist()
+        sure = (np.isfinite(self.flips.again).mean(axis=0) >= DECISIVE).tolist()
         return [
             InputWorth(
                 self.places[i],
@@ -472,7 +472,7 @@ class _Measured:
             return None
         best, again = int(self.pairs.values.argmax()), self.pairs.again
         more = again[:, best] > self.worths.again.max(axis=1) + WORTH
-        if ((again.argmax(axis=1) == best) & more).mean() < SURE:
+        if ((again.argmax(axis=1) == best) & more).mean() < DECISIVE:
             return None
         low, high = self.pairs.ends[:, best].clip(0.0).tolist()
         return PairWorth(list(combinations(self.places, 2))[best], float(self.pairs.values[best]), (low, high))
@@ -488,18 +488,18 @@ class _Measured:
         again = np.column_stack([self.worths.again, np.zeros(len(self.worths.again))])
         most = np.bincount(again.argmax(axis=1), minlength=again.shape[1]) / len(again)
         best = self.order[0]
-        rivals = [place for place in self.order if most[place] > 1.0 - SURE or place == best]
+        rivals = [place for place in self.order if most[place] > 1.0 - DECISIVE or place == best]
         value, low, pair = float(self.worths.values[best]), float(self.worths.ends[0][best]), self.pair
         if pair is not None and value < ALONE * pair.worth:
             return "nothing", [], float(count)
-        if most[best] >= SURE and low > 0.0:
+        if most[best] >= DECISIVE and low > 0.0:
             return "decided", [self.places[best]], float(count)
         if max(p, 1.0 - p) >= NEARLY_ALL:
             return "nothing", [], float(count)
         # The error of a difference falls as the root of the rows.
         less = self.worths.values[best] - np.append(self.worths.values, 0.0)
         error = (again[:, [best]] - again).std(axis=0, ddof=1)
-        ratio = np.divide(SURE_Z * error, less, out=np.full(less.size, np.inf), where=less > 0.0)
+        ratio = np.divide(DECISIVE_Z * error, less, out=np.full(less.size, np.inf), where=less > 0.0)
         ratio[[best, *np.flatnonzero(most <= 0.0)]] = 0.0
         if low <= 0.0 < value:
             ratio[-1] = max(float(ratio[-1]), (value - low) / value)

@@ -42,7 +42,7 @@ from rbdyn.base.records import Record
 # An emulator is trusted that predicts this share of what noise leaves to predict.
 TRUSTED = 0.8
 # Ends of the range, and how many resamplings give their errors.
-ENDS, DRAWS = (0.05, 0.5, 0.95), 64
+ENDS, REWEIGHTINGS = (0.05, 0.5, 0.95), 64
 
 
 class Share(NamedTuple):
@@ -189,14 +189,14 @@ def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> t
     # A distribution that the correction makes non-monotonic is sorted (Chernozhukov, Fernandez-Val and Galichon 2010).
     ends = [
         np.interp(levels, np.sort(emulator + weights @ off / count), values)
-        for weights in (np.ones(count), *random.multinomial(count, np.full(count, 1.0 / count), DRAWS))
+        for weights in (np.ones(count), *random.multinomial(count, np.full(count, 1.0 / count), REWEIGHTINGS))
     ]
     ends, *again = fitted.back(np.array(ends))
     return ends, np.std(again, axis=0, ddof=1)
 
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.
-POINTS, POINTS_OF_REFITS, REFITS, CONFIDENCE = 1024, 256, 16, 0.9
+POINTS, POINTS_OF_REFITS, REFITS, SHARE_LEVEL = 1024, 256, 16, 0.9
 # Orders of the inputs over which Shapley's effects are averaged, each with its reverse.
 ORDERS = 8
 
@@ -265,7 +265,7 @@ def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: in
         ours = shares(refit.at_columns, residual_variance(refit.emulator), *by)
         misses.append(ours - shares(simulated, emulator.hyperparameters.nugget, *by))
     middle = whole - np.mean(misses, axis=0)
-    student = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1)
+    student = stats.t.ppf(0.5 + 0.5 * SHARE_LEVEL, REFITS - 1)
     half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
 

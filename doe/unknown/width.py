@@ -23,7 +23,7 @@ from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.records import Record, keyed, outside_json, spread
 
 # Probability of a rejection, of either side, if predictions are right.
-LEVEL = 0.05
+REJECTION_LEVEL = 0.05
 # Predictions this factor too wide or too narrow must be rejected at least this often, else the design cannot judge them.
 TWICE, OFTEN = 2.0, 0.5
 # Tables that a power is counted in, which gives it to 0.005.
@@ -76,7 +76,7 @@ class Width(Record):
     @property
     def rejected(self) -> bool:
         """Whether predictions are too wide or too narrow."""
-        return self.chance <= LEVEL
+        return self.chance <= REJECTION_LEVEL
 
 
 def scores_of(draws: Array, measured: Array, output: Whole) -> Scores:
@@ -137,7 +137,7 @@ def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
     apart = np.random.default_rng(0).chisquare(counts, (TABLES, counts.size))
     sums, freedom = (np.column_stack([parts.sum(axis=1), parts]) for parts in (apart, counts[None]))
     least = np.sort(_exact_chances(freedom, sums))
-    limit = least[int(LEVEL * TABLES)]
+    limit = least[int(REJECTION_LEVEL * TABLES)]
     # Measured values that scatter half as much as predicted, or twice.
     wide, narrow = (float((_exact_chances(freedom, by * sums) <= limit).mean()) for by in (TWICE**-2, TWICE**2))
     return Power(wide, narrow, int(counts.sum()))

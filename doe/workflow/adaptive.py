@@ -18,7 +18,7 @@ from doe.adaptive.acquisition import Region
 from doe.adaptive.search import NEAR, Face, check_budget
 from doe.clearance import Simulations
 from doe.duty import Run, main_scene, scenes_of
-from doe.pareto.front import DRAWS, Samples, SimulatedFront, noisy_hypervolume
+from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.response_surface import Surface
 from doe.running.runner import Progress
@@ -278,7 +278,7 @@ def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> Fr
             [hypervolume(goals.costs(search.emulators.predict(front)[0]), *scale) for front in search.fronts]
         ),
         surfaces=hypervolume(predicted_costs(study, adaptive, on_surfaces), *scale),
-        fresh=noisy_hypervolume(search.front.costs, search.front.cost_errors, *scale, DRAWS, search.front.seed),
+        fresh=noisy_hypervolume(search.front.costs, search.front.cost_errors, *scale, NOISE_DRAWS, search.front.seed),
     )
 
 

@@ -357,13 +357,16 @@ def _scale(prior: Array, noise: Array, misses: Array) -> float:
     return float(SCALES[int(np.argmax(likelihood))]) if likelihood else 1.0
 
 
-DRAWS = 500  # draws of the surfaces of all responses
+SURFACE_DRAWS = 500  # draws of the surfaces of all responses
 # From coded points (n, k) to their responses (d, n, m) on random draws of the surfaces, some draws at a time.
 Draws = Callable[[Array], Iterator[Array]]
 
 
 def draws_of(
-    study: Problem, surfaces: Sequence[Surface], confirmed: Mapping[str, Confirmed] | None = None, draws: int = DRAWS
+    study: Problem,
+    surfaces: Sequence[Surface],
+    confirmed: Mapping[str, Confirmed] | None = None,
+    draws: int = SURFACE_DRAWS,
 ) -> Draws:
     """Draws of the surfaces, conditioned on the ``confirmed`` points."""
     points = list((confirmed or {}).values())

@@ -33,7 +33,7 @@ from doe.workflow.confirmation import (
     limits_of,
     verdict_of,
 )
-from doe.workflow.front import DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
+from doe.workflow.front import SURFACE_DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
@@ -157,8 +157,8 @@ def draws_about(
 
     def draws(coded: Array) -> Iterator[Array]:
         parts, random = coded[:-1], np.random.default_rng(study.file.front.seed)
-        for first in range(0, DRAWS, CHUNK):
-            count = min(CHUNK, DRAWS - first)
+        for first in range(0, SURFACE_DRAWS, CHUNK):
+            count = min(CHUNK, SURFACE_DRAWS - first)
             values = emulator_draws(study, searched, np.vstack([parts, neighbours.points]), count, random)
             change = values[:, :-1] - values[:, -1:]
             levels = [_levels(confirmed, count, random)[:, None] for confirmed in (pick, baseline)]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.pareto.front import DRAWS, Samples, SimulatedFront, noisy_hypervolume
+from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import check_search, dominance, error_aware_dominance, non_dominated, order, ranks, spread
 from rbdyn.base.arrays import Array, Rows
@@ -246,7 +246,7 @@ def relative_hypervolumes(
     both = np.vstack([one[0], other[0]])
     both = both[non_dominated(both)]
     scale = both.min(axis=0), both.max(axis=0)
-    return noisy_hypervolume(*one, *scale, DRAWS, seed), noisy_hypervolume(*other, *scale, DRAWS, seed + 1)
+    return noisy_hypervolume(*one, *scale, NOISE_DRAWS, seed), noisy_hypervolume(*other, *scale, NOISE_DRAWS, seed + 1)
 
 
 def compare_with_surrogate(

@@ -109,7 +109,7 @@ def runge_kutta_4(bearing, y, step, steps, scratch, tally):
             for i in range(n):
                 stage[i] = y[i] + reach * k[max(s - 1, 0), i]
             derivative(bearing, stage, s, k, power, loads, scratch)
-        book(tally, y, state.PARTS * bearing.rollers, loads)
+        book(tally, y, state.ROLLER_STATES * bearing.rollers, loads)
         for i in range(n):
             y[i] += step / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
         for p in range(POWERS):
@@ -146,7 +146,7 @@ def velocity_verlet(bearing, velocity_of, y, step, steps, scratch, tally):
             power[0, p] = power[1, p]
         for force in range(LOADS):
             loads[0, force] = loads[1, force]
-        book(tally, y, state.PARTS * bearing.rollers, loads)
+        book(tally, y, state.ROLLER_STATES * bearing.rollers, loads)
         if not all_finite(y):
             return step_number
     return steps

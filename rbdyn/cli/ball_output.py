@@ -138,13 +138,13 @@ def _fits(fits: dict[str, Any]) -> str:
     return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
 
 
-PARTS = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": "balls"}
+NODE_NAMES = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": "balls"}
 
 
 def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]:
     """Steady temperatures with their ranges, heat and its ways out, clearance and contact angle in operation."""
     spans = thermal["ranges"]
-    parts = ", ".join(f"{part} {nodes[node]:.1f} ({range_ends(spans[node])})" for node, part in PARTS.items())
+    parts = ", ".join(f"{part} {nodes[node]:.1f} ({range_ends(spans[node])})" for node, part in NODE_NAMES.items())
     friction = thermal["friction_W"]
     ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
     clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
@@ -160,10 +160,10 @@ def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]
 
 def _search_table(thermal: dict[str, Any]) -> Table:
     """Temperatures, heat and clearance of the states visited."""
-    header = (*(f"{part} [°C]" for part in PARTS.values()), "heat [W]", "clearance [µm]")
+    header = (*(f"{part} [°C]" for part in NODE_NAMES.values()), "heat [W]", "clearance [µm]")
     states = zip(thermal["path_C"], thermal["path_heat_W"], thermal["path_clearance_um"], strict=True)
     rows = [
-        [*(f"{state[node]:.1f}" for node in PARTS), f"{heat:.4g}", f"{clearance:.4g}"]
+        [*(f"{state[node]:.1f}" for node in NODE_NAMES), f"{heat:.4g}", f"{clearance:.4g}"]
         for state, heat, clearance in states
     ]
     return Table("search for steady temperatures", header, rows)

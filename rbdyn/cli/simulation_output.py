@@ -98,7 +98,7 @@ def _race_sentence(race: str, contact: dict[str, float]) -> str:
 
 
 # Nodes of the heat balance in words.
-PARTS = {
+NODE_NAMES = {
     "oil": "oil",
     "outer": "outer ring and housing",
     "inner": "inner ring and shaft",
@@ -114,7 +114,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     ranges = balance.get("ranges") or {}
     rows = [
         (
-            PARTS[node],
+            NODE_NAMES[node],
             # Where the inputs leave kelvins open, hundredths say nothing.
             value_alone(figure.value, 0.5 * (ranges[node][-1] - ranges[node][0]))
             if node in ranges

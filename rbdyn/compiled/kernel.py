@@ -118,23 +118,23 @@ def _test_once(self_test: Callable[[], None]) -> None:
             write_whole(passed, b"")
 
 
-PARTS, WHY_STOCK = working_parts()
+OWN_COMPILER, WHY_STOCK = working_parts()
 # In the name of what is kept on disk, for each way takes its own.
-WAY = "parts" if PARTS else "stock"
+WAY = "parts" if OWN_COMPILER else "stock"
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
 # arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
-INLINED: dict[str, Any] = {**OPTIONS, **(PARTS.INLINED if PARTS else {"forceinline": True})}
-SETTLED: dict[str, Any] = {**OPTIONS, **(PARTS.SETTLED if PARTS else {"forceinline": True})}
-ROUTINE: dict[str, Any] = {**OPTIONS, **(PARTS.ROUTINE if PARTS else {"forceinline": False})}
-ENTRY: dict[str, Any] = {**OPTIONS, **(PARTS.ENTRY if PARTS else {}), "nogil": True}
+INLINED: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.INLINED if OWN_COMPILER else {"forceinline": True})}
+SETTLED: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.SETTLED if OWN_COMPILER else {"forceinline": True})}
+ROUTINE: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.ROUTINE if OWN_COMPILER else {"forceinline": False})}
+ENTRY: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.ENTRY if OWN_COMPILER else {}), "nogil": True}
 
 
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     make: Any = njit  # whose stubs leave these options out
     compiled = make(**options)(function)
-    return PARTS.Inner.of(compiled) if PARTS and not INTERPRETED else compiled
+    return OWN_COMPILER.Inner.of(compiled) if OWN_COMPILER and not INTERPRETED else compiled
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -247,7 +247,7 @@ def entry(function: Callable[..., Any]) -> Any:
     make: Any = njit
     compiled = make(**ENTRY)(function)
     if not INTERPRETED:
-        compiled = PARTS.Entry.of(compiled) if PARTS else compiled
+        compiled = OWN_COMPILER.Entry.of(compiled) if OWN_COMPILER else compiled
         if (folder := cache_folder()) is not None:
             save_code(compiled, folder)
     return compiled

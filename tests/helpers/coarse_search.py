@@ -13,7 +13,7 @@ from doe.adaptive import acquisition, search
 FEWER: tuple[tuple[Any, dict[str, int]], ...] = (
     (acquisition, {"EVERYWHERE": 7, "CHILDREN": 32}),
     (acquisition, {"LEVELS": 10, "MOST_LEVELS": 200}),
-    (search, {"DRAWS": 8, "ROUNDS": 1, "SHOWN": 50, "FEW": 256}),
+    (search, {"FRONT_DRAWS": 8, "ROUNDS": 1, "SHOWN": 50, "FEW": 256}),
 )
 
 

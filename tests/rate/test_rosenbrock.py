@@ -14,7 +14,7 @@ from rbdyn.dynamics.figures import CAGE_SLIP, IMPACT_FORCE, POWER_LOSS, WHIRL_DE
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.forces.places import LOADS, POWERS, SHAFT
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.forces.state import PARTS, layout
+from rbdyn.dynamics.forces.state import ROLLER_STATES, layout
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import rosenbrock as ros
 from rbdyn.dynamics.integrators.advance import advance
@@ -34,10 +34,10 @@ STEEPER = ("traction.constants=[-0.05,20.0,400.0,0.05]",)
 def dense(matrix):
     """An arrow matrix as a plain one, in the order of the state vector."""
     z, m = matrix.own.shape[2], matrix.bodies.shape[0]
-    body = PARTS * z
+    body = ROLLER_STATES * z
     full = np.zeros((body + m, body + m))
     for j in range(z):
-        place = j + z * np.arange(PARTS)
+        place = j + z * np.arange(ROLLER_STATES)
         full[np.ix_(place, place)] = matrix.own[:, :, j]
         full[place, body:] = matrix.upper[:, j, :]
         full[np.ix_(body + matrix.pushed, place)] = matrix.lower[:, :, j]
@@ -300,7 +300,7 @@ def test_unit_workspace_fits_every_layout(everything):
     work = rodas(layout_of(everything), bearing, increments(everything, bearing))
     single = work.differences.one.bearing
     assert [type(part) for part in single] == [type(part) for part in bearing]
-    assert work.differences.one.y.size == layout_of(everything).size - PARTS * (bearing.rollers - 1)
+    assert work.differences.one.y.size == layout_of(everything).size - ROLLER_STATES * (bearing.rollers - 1)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from doe.pareto.front import DRAWS, pick_shares
+from doe.pareto.front import NOISE_DRAWS, pick_shares
 
 
 def lowest(costs: np.ndarray, shift: np.ndarray) -> int:
@@ -20,7 +20,7 @@ def test_two_points_are_picked_by_the_normal_law_of_their_difference(apart: floa
     shares = pick_shares(lowest, costs, errors, np.full((2, 2), 1e9))
     expected = 0.5 * (1.0 + math.erf(apart / (0.7 * math.sqrt(2.0)) / math.sqrt(2.0)))
     assert shares.sum() == pytest.approx(1.0)
-    assert abs(shares[0] - expected) < 4.0 * math.sqrt(max(expected * (1.0 - expected), 0.01) / DRAWS)
+    assert abs(shares[0] - expected) < 4.0 * math.sqrt(max(expected * (1.0 - expected), 0.01) / NOISE_DRAWS)
 
 
 def test_without_errors_the_pick_is_sure_and_the_same_seed_gives_the_same_bits() -> None:
@@ -34,4 +34,4 @@ def test_the_baseline_shifts_by_the_median_error() -> None:
     """A pick that depends on the shift alone changes as often as a normal number exceeds one of its standard deviations."""
     errors = np.array([[0.1], [0.2], [9.0]])
     shares = pick_shares(lambda _, shift: int(shift[0] > 0.2), np.zeros((3, 1)), errors, np.full((3, 1), 1e9))
-    assert abs(shares[1] - 0.1587) < 4.0 * math.sqrt(0.1587 * 0.8413 / DRAWS)
+    assert abs(shares[1] - 0.1587) < 4.0 * math.sqrt(0.1587 * 0.8413 / NOISE_DRAWS)

@@ -18,7 +18,7 @@ from doe.adaptive.acquisition import Region
 from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
 from doe.report.files import write
-from doe.report.sections.search import SURE, in_few_runs, limiting_sentence
+from doe.report.sections.search import SUFFICIENT_MISS, in_few_runs, limiting_sentence
 from doe.report.summary import restored
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
@@ -118,7 +118,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     fresh = outcome.adaptive.search
     claimed = np.hypot(fresh.bias, fresh.spread)
     assert all(f"{times:.1f}" in trust for times in claimed)
-    assert ("as their stated uncertainty allows" in trust) == bool((claimed <= SURE).all())
+    assert ("as their stated uncertainty allows" in trust) == bool((claimed <= SUFFICIENT_MISS).all())
     compared = record["adaptive"]["compared"]
     assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
     page = (folder / "report.html").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from doe.adaptive.emulators import Runs, fit_emulators
 from doe.pareto.tolerance import Neighbourhood
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import Confirmed
-from doe.workflow.front import DRAWS
+from doe.workflow.front import SURFACE_DRAWS
 from doe.workflow.pick import draws_about
 from doe.workflow.problem import Problem
 
@@ -33,7 +33,7 @@ def test_limit_case_draws_about_a_pick(tmp_path, error):
     values = bent(points * study.reach)
     runs = Runs(points, values, np.full((64, 3), 1e-4), np.full((64, 3), 7), np.full(64, 8))
     emulators = fit_emulators(study.goals, runs)
-    search = Adaptive(SimpleNamespace(emulators=emulators), None, study, None, np.zeros((3, 2)), (), 0.0)
+    search = Adaptive(SimpleNamespace(emulators=emulators), None, np.zeros((3, 2)), (), 0.0)
     coded = np.array([[0.3, -0.2, 0.5], [0.4, -0.2, 0.5], [0.3, 0.1, 0.6]])
     half = 2.0 * error * np.array([1.0, 0.01, 1.0])
     found = bent(coded[:1])[0]
@@ -48,11 +48,13 @@ def test_limit_case_draws_about_a_pick(tmp_path, error):
         base,
     )
     values = np.concatenate(list(drawn(np.vstack([coded, study.coded(study.baseline)]))))
-    assert values.shape == (DRAWS, 4, 3)
+    assert values.shape == (SURFACE_DRAWS, 4, 3)
     change = values[:, :3] - values[:, :1]
     truth = bent(coded) - found
     assert np.abs(change - truth).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=0.02)
     errors = pick.standard_error * np.sqrt(15.0 / 13.0)
     for place, level in ((0, found), (3, base.values)):
-        assert values[:, place].mean(axis=0) == pytest.approx(level, abs=4.0 * errors.max() / np.sqrt(DRAWS) + 1e-9)
+        assert values[:, place].mean(axis=0) == pytest.approx(
+            level, abs=4.0 * errors.max() / np.sqrt(SURFACE_DRAWS) + 1e-9
+        )
         assert values[:, place].std(axis=0) == pytest.approx(errors, rel=0.12, abs=1e-9)

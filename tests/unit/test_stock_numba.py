@@ -42,7 +42,7 @@ def anew(monkeypatch, tmp_path):
 
 def test_unit_this_numba_has_what_parts_need():
     """Unit: with the numba that is installed kernels are compiled from its parts, and nothing is noted."""
-    assert kernel.PARTS is parts and kernel.WHY_STOCK == "" and kernel.compiler_notes() == ()
+    assert kernel.OWN_COMPILER is parts and kernel.WHY_STOCK == "" and kernel.compiler_notes() == ()
 
 
 @pytest.mark.parametrize(

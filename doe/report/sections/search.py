@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from doe.adaptive.emulators import LEAST_DEVIATION
-from doe.pareto.front import DRAWS, noisy_hypervolume
+from doe.pareto.front import NOISE_DRAWS, noisy_hypervolume
 from doe.report.sections.answer import point_record
 from doe.report.sections.record import Record, factors, part
 from doe.report.still import COLOURS, SMALL, Still, name_marks
@@ -162,7 +162,7 @@ def _where(spent: Runs, pick: Record | None, one: str, two: str, axis: "Axes") -
     axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)
 
 
-SURE = 1.5  # RMS error in standard deviations up to which the stated uncertainty of emulators is sufficient
+SUFFICIENT_MISS = 1.5  # RMS error in standard deviations up to which the stated uncertainty of emulators is sufficient
 CAUSES = {
     "scene": "beyond it the bearing would lose its operating clearance",
     "moves": "where the region was extended as often as allowed",
@@ -252,7 +252,7 @@ def trust_sentence(study: Problem, adaptive: Adaptive) -> str:
     optimism = [f"{name} by {100.0 * x:.1f} %" for name, x in zip(objectives, front.optimism.tolist(), strict=True)]
     missed = np.hypot(search.bias, search.spread).tolist()
     errors = [f"{name} {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
-    overconfident = [name for name, times in zip(study.responses, missed, strict=True) if times > SURE]
+    overconfident = [name for name, times in zip(study.responses, missed, strict=True) if times > SUFFICIENT_MISS]
     if overconfident:
         claim = f"so their stated uncertainty of {_listed(overconfident)} is too small"
     else:
@@ -303,7 +303,7 @@ def adaptive_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     ]
     costs = front.goals.costs(search.predictions)
     scale = costs.min(axis=0), costs.max(axis=0)
-    fresh = noisy_hypervolume(front.costs, front.cost_errors, *scale, DRAWS, front.seed)
+    fresh = noisy_hypervolume(front.costs, front.cost_errors, *scale, NOISE_DRAWS, front.seed)
     return {
         "front": points,
         "pick": {**points[front.pick], "reason": front.pick_reason},

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doe.unknown.propagation import CONFIDENCE, Share
+from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Paragraph, Table, with_notes
 from rbdyn.base.table import Column, Sheet
@@ -128,7 +128,7 @@ def uncertainty_blocks(uncertainty: Uncertainty) -> list[Block]:
     rows = [(key, *(_share(output.shares.get(key)) for output in outputs)) for key in uncertainty.keys]
     floor = ("an input that does nothing", *(_share(output.floor) for output in outputs))
     header = ("input", *(quantity(output.name)[0] for output in outputs))
-    caption = f"{_what(outputs)} [%], {100.0 * CONFIDENCE:.0f} % intervals"
+    caption = f"{_what(outputs)} [%], {100.0 * SHARE_LEVEL:.0f} % intervals"
     screened = ""
     if uncertainty.screened:
         most = max(uncertainty.screened, key=lambda key: uncertainty.screened[key])

@@ -104,7 +104,7 @@ def inner_motion(y, body, acting):
 @kernel
 def motions(bearing, y):
     """``Action`` on the bearing in a state, and the motions of cage, inner and outer ring."""
-    body = state.PARTS * roller_count(bearing)
+    body = state.ROLLER_STATES * roller_count(bearing)
     acting = action(bearing.drive, y)
     outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
@@ -195,7 +195,7 @@ def accelerate_rollers(bearing, row, dy):
 @kernel
 def accelerate_cage(bearing, cage, pockets, land, row, dy):
     """Rates of the cage's coordinates into row ``row`` of ``dy``."""
-    body = state.PARTS * roller_count(bearing)
+    body = state.ROLLER_STATES * roller_count(bearing)
     fx, fy, moment = pockets.x + land.cage_x, pockets.y + land.cage_y, pockets.moment + land.cage_moment
     ax, ay, spin_up = cage_acceleration(bearing.cage, fx, fy, moment, cage.cos, cage.sin, cage.speed)
     dy[row, body + state.CAGE_X] = cage.vx
@@ -210,7 +210,7 @@ def accelerate_cage(bearing, cage, pockets, land, row, dy):
 @kernel
 def accelerate_inner_ring(bearing, inner, fx, fy, row, dy):
     """Rates of the inner ring's coordinates under a force [N] into row ``row`` of ``dy``."""
-    body = state.PARTS * roller_count(bearing)
+    body = state.ROLLER_STATES * roller_count(bearing)
     dy[row, body + state.RING_X] = inner.vx
     dy[row, body + state.RING_Y] = inner.vy
     dy[row, body + state.RING_VX] = fx / bearing.inner_ring_mass
@@ -267,7 +267,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
 @routine
 def pocket_loads(bearing, y, row, loads, scratch):
     """Fill row ``row`` of ``loads`` with those of the pocket walls [N] alone, for the state ``y``."""
-    cage = cage_motion(y, state.PARTS * roller_count(bearing))
+    cage = cage_motion(y, state.ROLLER_STATES * roller_count(bearing))
     load = contact_load = 0.0
     for i in range(touching_rollers(bearing, cage, y, scratch)):
         wall = roller_pocket(bearing, y, cage, scratch.touching[i])

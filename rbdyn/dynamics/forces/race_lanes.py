@@ -56,12 +56,12 @@ from rbdyn.dynamics.forces.races import (
     race_wrench,
     roller_radius,
 )
-from rbdyn.dynamics.forces.state import PARTS
+from rbdyn.dynamics.forces.state import ROLLER_STATES
 
 # Blocks hold LANES contacts, VECTOR of them at a time; each quantity is a row of a block. Packed rollers bring their
 # coordinates, their radii, the side of the race (+1 outer, -1 inner) and their traction coefficients.
 LANES, OUTPUTS = 16, 9
-RADII = PARTS * LANES
+RADII = ROLLER_STATES * LANES
 SIDES = RADII + LANES
 COEFFICIENTS = SIDES + LANES
 # Where the rows of the results of a contact begin: the fields of ``RaceWrench`` but for the slip.
@@ -92,7 +92,7 @@ class OnRing(NamedTuple):
 class Scratch(NamedTuple):
     """Work space of one thread."""
 
-    packed: NDArray[np.float64]  # ((PARTS + 3) * LANES,)
+    packed: NDArray[np.float64]  # ((ROLLER_STATES + 3) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     met: NDArray[np.float64]  # (INPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
@@ -103,7 +103,7 @@ class Scratch(NamedTuple):
 def scratch(rollers: int) -> Scratch:
     """Work space for the contacts of so many rollers."""
     return Scratch(
-        np.ones((PARTS + 3) * LANES),
+        np.ones((ROLLER_STATES + 3) * LANES),
         np.empty(OUTPUTS * LANES),
         np.ones(INPUTS * LANES),
         np.zeros(LANES, np.int64),
@@ -379,7 +379,7 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
 @kernel
 def pack(race, sizes, rollers, y, j, side, scratch, lane):
     """Copy the state of roller ``j`` at a race to a lane."""
-    for row in range(PARTS):
+    for row in range(ROLLER_STATES):
         scratch.packed[row * LANES + lane] = y[row * rollers + j]
     scratch.packed[RADII + lane] = roller_radius(sizes, j)
     scratch.packed[SIDES + lane] = side

@@ -41,7 +41,7 @@ SUPPORT = _body("outer ring", *PLACE, *VELOCITY)
 CLOCK = _body("clock", ("time", "s"), ("inner ring angle", "rad"), ("outer ring angle", "rad"))
 # Of every roller with tangential elasticity: first all at the outer, then all at the inner race.
 CONTACTS = _body("contact", ("outer traction coefficient", "1"), ("inner traction coefficient", "1"))
-PARTS = len(ROLLER)
+ROLLER_STATES = len(ROLLER)
 # Places within BODIES, SUPPORT and CLOCK.
 CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(len(BODIES))
 SUPPORT_X, SUPPORT_Y, SUPPORT_VX, SUPPORT_VY = range(len(SUPPORT))
@@ -60,7 +60,7 @@ class Layout(NamedTuple):
     @property
     def first_body(self) -> int:
         """Where the bodies begin, behind the rollers."""
-        return PARTS * self.rollers
+        return ROLLER_STATES * self.rollers
 
     @property
     def bodies(self) -> tuple[Component, ...]:
@@ -81,7 +81,7 @@ class Layout(NamedTuple):
 
 def layout(rollers: int, supported: bool, clocked: bool, elastic: bool = False) -> Layout:
     """Layout for a number of rollers, with an outer ring on a support, a clock, tangential elasticity or not."""
-    size = PARTS * rollers + len(BODIES)
+    size = ROLLER_STATES * rollers + len(BODIES)
     support = size if supported else None
     size += len(SUPPORT) * supported
     clock = size if clocked else None

@@ -25,7 +25,7 @@ from rbdyn.compiled.kernel import entry, kernel, law, routine
 from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
 from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
-from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
+from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, ROLLER_STATES
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
 # frame [rad/s].
@@ -273,7 +273,20 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 test_stiffness(method, k, stiffness, h, inverse_tolerance)
             end_step(method, bearing, stage, k, power, loads, scratch, counts)
             if keep(
-                method, PARTS * z, y, stage, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step
+                method,
+                ROLLER_STATES * z,
+                y,
+                stage,
+                k,
+                power,
+                loads,
+                clock,
+                work,
+                largest,
+                largest_time,
+                whirl,
+                h,
+                sample_step,
             ):
                 refine_peak(bearing, carry, h, tally)
             counts[ACCEPTED] += 1

@@ -35,7 +35,7 @@ from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivativ
 from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
-from rbdyn.dynamics.forces.state import PARTS, Layout
+from rbdyn.dynamics.forces.state import ROLLER_STATES, Layout
 from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import DERIVATIVES
 
@@ -56,9 +56,9 @@ def arrow_matrix(layout: Layout) -> ArrowMatrix:
     z, m = layout.rollers, len(layout.bodies)
     pushed = [place for place, part in enumerate(layout.bodies) if part.pushed]
     return ArrowMatrix(
-        own=np.zeros((PARTS, PARTS, z)),
-        upper=np.zeros((PARTS, z, m)),
-        lower=np.zeros((len(pushed), PARTS, z)),
+        own=np.zeros((ROLLER_STATES, ROLLER_STATES, z)),
+        upper=np.zeros((ROLLER_STATES, z, m)),
+        lower=np.zeros((len(pushed), ROLLER_STATES, z)),
         bodies=np.zeros((m, m)),
         pushed=np.array(pushed),
         pivots=np.zeros(m, dtype=np.int64),
@@ -69,8 +69,8 @@ def arrow_matrix(layout: Layout) -> ArrowMatrix:
 def shifted(matrix, shift, result):
     """``shift`` I - ``matrix`` into ``result``."""
     z, m = matrix.own.shape[2], matrix.bodies.shape[0]
-    for r in range(PARTS):
-        for c in range(PARTS):
+    for r in range(ROLLER_STATES):
+        for c in range(ROLLER_STATES):
             diagonal = shift if r == c else 0.0
             for j in range(z):
                 result.own[r, c, j] = diagonal - matrix.own[r, c, j]
@@ -78,7 +78,7 @@ def shifted(matrix, shift, result):
             for b in range(m):
                 result.upper[r, j, b] = -matrix.upper[r, j, b]
     for a in range(matrix.pushed.size):
-        for c in range(PARTS):
+        for c in range(ROLLER_STATES):
             for j in range(z):
                 result.lower[a, c, j] = -matrix.lower[a, c, j]
     for a in range(m):
@@ -95,22 +95,22 @@ def factor(matrix):
     """
     own, upper = matrix.own, matrix.upper
     z, m = own.shape[2], matrix.bodies.shape[0]
-    for p in range(PARTS):
+    for p in range(ROLLER_STATES):
         for j in range(z):
             own[p, p, j] = 1.0 / own[p, p, j]
-        for r in range(p + 1, PARTS):
+        for r in range(p + 1, ROLLER_STATES):
             for j in range(z):
                 own[r, p, j] *= own[p, p, j]
-            for c in range(p + 1, PARTS):
+            for c in range(p + 1, ROLLER_STATES):
                 for j in range(z):
                     own[r, c, j] -= own[r, p, j] * own[p, c, j]
             for j in range(z):
                 multiplier = own[r, p, j]
                 for b in range(m):
                     upper[r, j, b] -= multiplier * upper[p, j, b]
-    for r in range(PARTS - 1, -1, -1):
+    for r in range(ROLLER_STATES - 1, -1, -1):
         for j in range(z):
-            for c in range(r + 1, PARTS):
+            for c in range(r + 1, ROLLER_STATES):
                 multiplier = own[r, c, j]
                 for b in range(m):
                     upper[r, j, b] -= multiplier * upper[c, j, b]
@@ -118,7 +118,7 @@ def factor(matrix):
                 upper[r, j, b] *= own[r, r, j]
     for a in range(matrix.pushed.size):
         row = matrix.pushed[a]
-        for c in range(PARTS):
+        for c in range(ROLLER_STATES):
             for j in range(z):
                 multiplier = matrix.lower[a, c, j]
                 for b in range(m):
@@ -151,20 +151,20 @@ def solve(factors, x):
     """Replace the right side ``x``, in the order of the state vector, by the solution."""
     own, upper, pivots = factors.own, factors.upper, factors.pivots
     z, m = own.shape[2], factors.bodies.shape[0]
-    body = PARTS * z
-    for r in range(PARTS):
+    body = ROLLER_STATES * z
+    for r in range(ROLLER_STATES):
         for c in range(r):
             for j in range(z):
                 x[r * z + j] -= own[r, c, j] * x[c * z + j]
-    for r in range(PARTS - 1, -1, -1):
-        for c in range(r + 1, PARTS):
+    for r in range(ROLLER_STATES - 1, -1, -1):
+        for c in range(r + 1, ROLLER_STATES):
             for j in range(z):
                 x[r * z + j] -= own[r, c, j] * x[c * z + j]
         for j in range(z):
             x[r * z + j] *= own[r, r, j]
     for a in range(factors.pushed.size):
         total = 0.0
-        for c in range(PARTS):
+        for c in range(ROLLER_STATES):
             for j in range(z):
                 total += factors.lower[a, c, j] * x[c * z + j]
         x[body + factors.pushed[a]] -= total
@@ -179,7 +179,7 @@ def solve(factors, x):
         for c in range(r + 1, m):
             x[body + r] -= dense[r, c] * x[body + c]
         x[body + r] *= dense[r, r]
-    for r in range(PARTS):
+    for r in range(ROLLER_STATES):
         for j in range(z):
             total = 0.0
             for b in range(m):
@@ -226,7 +226,7 @@ def _(sizes, one, j):
 def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
     """Fill ``differences`` for the state ``y``, whose right-hand side is in row 0; row ``row`` is work space."""
     z, m = bearing.rollers, differences.matrix.bodies.shape[0]
-    body = PARTS * z
+    body = ROLLER_STATES * z
     for i in range(y.size):
         stage[i] = y[i]
     for b in range(m):
@@ -234,7 +234,7 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
         per = 1.0 / (stage[body + b] - y[body + b])
         derivative(bearing, stage, row, k, power, loads, scratch)
         stage[body + b] = y[body + b]
-        for r in range(PARTS):
+        for r in range(ROLLER_STATES):
             for j in range(z):
                 differences.matrix.upper[r, j, b] = (k[row, r * z + j] - k[0, r * z + j]) * per
         for a in range(m):
@@ -244,19 +244,19 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
     one = differences.one
     single = one.bearing
     for b in range(m):
-        one.y[PARTS + b] = y[body + b]
+        one.y[ROLLER_STATES + b] = y[body + b]
     for j in range(z):
         single.pocket_cos[0], single.pocket_sin[0] = bearing.pocket_cos[j], bearing.pocket_sin[j]
         take_size(bearing.sizes, single, j)
-        for c in range(PARTS):
+        for c in range(ROLLER_STATES):
             one.y[c] = y[c * z + j]
-        # Column PARTS stands for the roller unchanged, from which the others differ: one call, compiled once.
-        for c in range(PARTS, -1, -1):
+        # Column ROLLER_STATES stands for the roller unchanged, from which the others differ: one call, compiled once.
+        for c in range(ROLLER_STATES, -1, -1):
             place = c * z + j
-            if c < PARTS:
+            if c < ROLLER_STATES:
                 one.y[c] = y[place] + differences.increments[place]
-            derivative(single, one.y, c // PARTS, one.dy, one.power, one.loads, one.scratch)
-            if c < PARTS:
+            derivative(single, one.y, c // ROLLER_STATES, one.dy, one.power, one.loads, one.scratch)
+            if c < ROLLER_STATES:
                 per = 1.0 / (one.y[c] - y[place])
                 one.y[c] = y[place]
                 roller_column(differences, c, j, z, per)
@@ -266,10 +266,10 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
 def roller_column(differences, c, j, z, per):
     """Column ``c`` of roller ``j`` from the right-hand sides of its bearing: row 1 unchanged, row 0 changed."""
     matrix, dy, power = differences.matrix, differences.one.dy, differences.one.power
-    for r in range(PARTS):
+    for r in range(ROLLER_STATES):
         matrix.own[r, c, j] = (dy[0, r] - dy[1, r]) * per
     for a in range(matrix.pushed.size):
-        row = PARTS + matrix.pushed[a]
+        row = ROLLER_STATES + matrix.pushed[a]
         matrix.lower[a, c, j] = (dy[0, row] - dy[1, row]) * per
     for p in range(POWERS):
         differences.power[p, c * z + j] = (power[0, p] - power[1, p]) * per
@@ -332,7 +332,7 @@ def _(method, refused, bearing, y, k, stage, power, loads, scratch, clock, count
     if not refused:
         # Right-hand sides of one roller count as their share.
         jacobian(bearing, y, stage, k, NEXT_ROW, power, loads, scratch, method.differences)
-        counts[DERIVATIVES] += PARTS + 1 + method.factors.bodies.shape[0]
+        counts[DERIVATIVES] += ROLLER_STATES + 1 + method.factors.bodies.shape[0]
     n, u, per_step = y.size, method.u, 1.0 / h
     shifted(method.differences.matrix, per_step / GAMMA, method.factors)
     factor(method.factors)
@@ -446,7 +446,7 @@ def differences_of(layout: Layout, bearing: RollerBearing, increments: NDArray[n
 
 def one_roller(bearing: RollerBearing, size: int) -> OneRoller:
     """The same bearing, of the same types of laws, with room for one roller."""
-    moved = PARTS * (bearing.rollers - 1)
+    moved = ROLLER_STATES * (bearing.rollers - 1)
     single = bearing._replace(
         rollers=1,
         sizes=_room_for_one(bearing.sizes),
