@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
 from doe.dimension_chain.drawing import grade_words
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, stated_parts
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, size_text, stated_parts
 from doe.dimension_chain.reading import faults
 from doe.dimension_chain.refusal import (
     Judge,
@@ -37,22 +37,87 @@ from doe.dimension_chain.yields import (
     standard_error,
 )
 from rbdyn.base.faults import InputError, MethodError
-from rbdyn.base.records import Record, derived, keyed, outside_json
+from rbdyn.base.records import Record, derived, keyed, outside_json, shown, written
 
 # Probabilities of the quantiles, up to those of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
 MATCHED = "ok: matched in"
-# Figures of an allocated part.
-ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
-# What says where its sizes come from.
-SOURCES = ("fit", "origin", "iso_class", "estimated")
 
 
-def _size(part: Part) -> dict[str, Any]:
-    """JSON of a part: its figures, the code that states them, where they come from, a class of ISO 286 within a seat, whether it is an estimate, its
-    grade in words, and its drawing size."""
-    figures: dict[str, Any] = {key: getattr(part, key) for key in (*ALLOCATED, *SOURCES)}
-    return figures | {"grade_words": grade_words(part), "text": part.text}
+class AllocatedSize(Record):
+    """Nominal, deviations and grade of a part, and by how much its nominal moved, mm."""
+
+    nominal_mm: float = written("nominal, and the deviations from it")
+    upper_mm: float = written("")
+    lower_mm: float = written("")
+    grade: str | None = shown(
+        "grade", cell=lambda size: size.graded, text=True, meaning="grade of ISO 286-1, where one was chosen"
+    )
+    moved_mm: float = shown(
+        "nominal moved [mm]", cell=lambda size: size.shift, meaning="by how much the nominal moved from the scene's"
+    )
+
+    @property
+    def drawn(self) -> str:
+        """The size as a drawing states it, '9.290 0/-0.005'."""
+        return size_text(self.nominal_mm, self.upper_mm, self.lower_mm)
+
+    @property
+    def graded(self) -> str:
+        """The grade in words."""
+        return self.grade or ""
+
+    @property
+    def shift(self) -> str:
+        """'+0.020' of a nominal that moved, else nothing."""
+        return size_text(0.0, self.moved_mm, 0.0).split()[1].partition("/")[0] if self.moved_mm else ""
+
+    @property
+    def source(self) -> str:
+        """Where the deviations come from; empty where the record does not say."""
+        return ""
+
+
+class PartSize(AllocatedSize):
+    """A part to make: also the code that states its size, where that comes from, a class of ISO 286 within a seat, whether its
+    nominal is an estimate, its grade in words, and the size on the drawing."""
+
+    fit: str | None = written("code that states the deviations, such as H7")
+    origin: str = shown(
+        "deviations",
+        cell=lambda size: size.source,
+        text=True,
+        meaning="where the deviations come from: stated, allocated, or a growth by temperature",
+    )
+    iso_class: str | None = written("class of ISO 286-1 within the limits of a seat")
+    estimated: bool = written("whether the nominal is an estimate, which the drawing has to state")
+    grade_words: str | None = shown("", screen=False, files=False)
+    text: str = shown("", screen=False, files=False)
+
+    @property
+    def drawn(self) -> str:
+        """The size as its drawing states it."""
+        return self.text
+
+    @property
+    def graded(self) -> str:
+        """'IT7, m6 within' of a part: its grade, and of a seat the class of ISO 286 within its limits."""
+        within = f"{self.iso_class} within" if self.iso_class else ""
+        return ", ".join(word for word in (self.grade_words or self.grade, within) if word)
+
+    @property
+    def source(self) -> str:
+        """Where the deviations come from."""
+        return self.origin
+
+
+def _allocated(part: Part) -> AllocatedSize:
+    return AllocatedSize(part.nominal_mm, part.upper_mm, part.lower_mm, part.grade, part.moved_mm)
+
+
+def _size(part: Part) -> PartSize:
+    figures = part.nominal_mm, part.upper_mm, part.lower_mm, part.grade, part.moved_mm
+    return PartSize(*figures, part.fit, part.origin, part.iso_class, part.estimated, grade_words(part), part.text)
 
 
 class Linearisation(Record):
@@ -96,10 +161,7 @@ class ChainResult(Record):
     yields: dict[str, float] = keyed("yield")
     standard_error: float = derived(lambda self: max(self.standard_errors.values()), "yield", "standard_error")
     contributions: dict[str, dict[str, float]]
-    allocated: dict[str, Any] = derived(
-        lambda self: {part.name: {key: getattr(part, key) for key in ALLOCATED} for part in self.allocation},
-        "allocation",
-    )
+    allocated: dict[str, AllocatedSize] = keyed("allocation")
     status: str
     mean_mm: float = keyed("distribution", "mean_mm")
     standard_deviation_mm: float = keyed("distribution", "standard_deviation_mm")
@@ -117,17 +179,22 @@ class ChainResult(Record):
     seed: int
     limits_mm: Interval
     resolution_mm: float
-    sizes: dict[str, Any] = derived(lambda self: {part.name: _size(part) for part in self.parts}, "parts")
+    sizes: dict[str, PartSize] = keyed("parts")
     contributions_mm: dict[str, dict[str, float]]
     missed: Miss | None
     remedy: Remedy | None
-    allocation: tuple[Part, ...] = outside_json()
-    parts: tuple[Part, ...] = outside_json()
+    allocation: tuple[Part, ...] = outside_json(default=())
+    parts: tuple[Part, ...] = outside_json(default=())
 
     @property
     def refused(self) -> bool:
         """Whether the parts miss the limits."""
         return self.status.startswith("refused")
+
+    @property
+    def drawn_sizes(self) -> dict[str, PartSize]:
+        """The parts on a drawing, where growths by temperature do not stand."""
+        return {name: size for name, size in self.sizes.items() if size.origin != "temperature"}
 
 
 def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, source: str = "") -> ChainResult:
@@ -167,6 +234,8 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         yields=assemblies.yields,
         standard_errors={law: standard_error(share, samples) for law, share in assemblies.yields.items()},
         contributions=_contributions(function, parts),
+        allocated={part.name: _allocated(part) for part in verdict.nearest or parts},
+        sizes={part.name: _size(part) for part in parts},
         allocation=tuple(verdict.nearest or parts),
         status=verdict.status,
         mean_mm=mean,

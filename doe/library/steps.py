@@ -19,6 +19,7 @@ from rbdyn.base.records import plain
 from rbdyn.base.words import counted, quantity, with_error
 
 if TYPE_CHECKING:
+    from doe.dimension_chain import ChainResult
     from doe.response_surface import Surface
     from doe.response_surface.statistics import Fit
     from doe.workflow.asked import Asked
@@ -374,10 +375,10 @@ def _point(study: "Problem", text: str) -> list[float]:
 class ChainAnswer(Answer):
     """Solved dimension chains. Tables: "parts" (dimensions with tolerances [mm]), "contributions" [%], "closing" [mm].
 
-    ``chains``: JSON of each chain by its name; ``refused``: status of the chains that miss their limits, by name.
+    ``chains``: the solution of each chain by its name; ``refused``: status of the chains that miss their limits, by name.
     """
 
-    chains: Mapping[str, Any] = field(default_factory=dict)
+    chains: Mapping[str, "ChainResult"] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
 
     def blocks(self) -> list[Block]:
@@ -386,44 +387,16 @@ class ChainAnswer(Answer):
         return [block for name, chain in self.chains.items() for block in chain_blocks(name, chain)]
 
     def rows(self) -> Mapping[str, Rows]:
+        from doe.report.sections.chain import allocation_sheet, closing_sheet, share_sheet
+
         return {
-            "parts": part_rows(self.chains),
-            "contributions": [
-                {"chain": name, "part": part, **shares}
-                for name, chain in self.chains.items()
-                for part, shares in chain["contributions"].items()
-            ],
-            "closing": [{"chain": name, **_closing_row(chain)} for name, chain in self.chains.items()],
+            "parts": allocation_sheet(self.chains).records,
+            "contributions": share_sheet(self.chains).records,
+            "closing": closing_sheet(self.chains).records,
         }
 
     def brief(self) -> str:
-        return "; ".join(f"{name}: {chain['status']}" for name, chain in self.chains.items())
-
-
-def part_rows(chains: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Dimensions of the parts of chains, by their JSON records."""
-    return [
-        {"chain": name, "part": part, **sizes}
-        for name, chain in chains.items()
-        for part, sizes in chain["allocation"].items()
-        if isinstance(sizes, Mapping)
-    ]
-
-
-def _closing_row(chain: Mapping[str, Any]) -> dict[str, Any]:
-    """Nominal and ends of the closing link [mm], the yield of the parts as stated, and the status."""
-    link = chain["closing_link"]
-    ends = {
-        f"{kind}_{end}_mm": link[f"{kind}_mm"][place]
-        for kind in ("worst_case", "rss")
-        for place, end in enumerate(("low", "high"))
-    }
-    return {
-        "nominal_mm": link["nominal_mm"],
-        **ends,
-        "yield": chain["yield"].get("as_given"),
-        "status": chain["status"],
-    }
+        return "; ".join(f"{name}: {chain.status}" for name, chain in self.chains.items())
 
 
 def chain(path: Path | str, out: Path | str | None = None, force: bool = False) -> ChainAnswer:
@@ -436,7 +409,7 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
     A chain that misses its limits is listed in ``refused`` of the answer. Raises InputError with the faults of every chain.
     """
     from doe.dimension_chain import is_several, read_chains, solve
-    from doe.report.sections.chain import chain_tables, chains_record
+    from doe.report.sections.chain import chains_record, part_sheet, share_sheet
     from rbdyn.base.identity import identity_of
 
     path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
@@ -453,6 +426,9 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
         refuse(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         refused = {name: result.status for name, result in results.items() if result.refused}
-        solutions, identity = {name: r.as_dict() for name, r in results.items()}, identity_of("doe chain", {}, [path])
-        answer = ChainAnswer(record, folder, chains=solutions, refused=refused, identity=identity)
-        return replace(answer, files=saved(output, "chain.json", answer, partial(chain_tables, results)))
+        answer = ChainAnswer(
+            record, folder, chains=results, refused=refused, identity=identity_of("doe chain", {}, [path])
+        )
+        sheets = part_sheet(results), share_sheet(results)
+        tables = {sheet.file: sheet.records for sheet in sheets}
+        return replace(answer, files=saved(output, "chain.json", answer, lambda: tables))

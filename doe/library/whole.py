@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import path_given, registered
-from doe.library.steps import part_rows, point_row
+from doe.library.steps import point_row
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
@@ -60,10 +60,10 @@ class StudyAnswer(Answer):
         return sections(self.summary)
 
     def rows(self) -> Mapping[str, Rows]:
+        from doe.report.sections.chain import allocation_sheet
         from doe.report.sections.duty import duty_figures
         from doe.report.sections.fit import fit_rows
 
-        record = self.record
         fits = fit_rows([*self.summary.fit.responses.values()])
         return {
             "gains": self._gains(),
@@ -84,7 +84,7 @@ class StudyAnswer(Answer):
                 for name, point in self.summary.confirmation.items()
                 for response, value in point.responses.items()
             ],
-            "parts": part_rows(record["chains"]),
+            "parts": allocation_sheet(self.summary.chains).records,
             **{name: fits[name] for name in ("quality", "anova", "coefficients")},
             **({"duty": duty_figures(self.summary).records} if self.summary.duty else {}),
         }

@@ -13,7 +13,7 @@ from doe import clearance
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
 from doe.report.sections.answer import changes, first_screen
-from doe.report.sections.chain import chain_tables, chains
+from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
@@ -76,7 +76,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
         "confirmation.csv": confirmation_sheet(study.factors, result.confirmation).records,
-        "part_dimensions.csv": chain_tables(outcome.chains)["part_dimensions.csv"],
+        "part_dimensions.csv": part_sheet(outcome.chains).records,
     }
     if outcome.duty is not None:
         tables["duty_points.csv"] = duty_figures(result).records
@@ -172,7 +172,7 @@ def summary(outcome: StudyResult) -> Summary:
         statement=statement(gains),
         whirl_sentence=outcome.whirl_sentence,
         rivals_sentences=outcome.rivals_sentences,
-        chains={name: chain.as_dict() for name, chain in outcome.chains.items()},
+        chains=dict(outcome.chains),
         made=outcome.made,
         missed_chains=outcome.missed_chains,
         published_comparisons=outcome.published_comparisons,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from doe.dimension_chain import ChainResult
 from doe.report.sections.record import drop_undefined
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
@@ -49,7 +50,7 @@ class Summary(Record, kw_only=True):
     statement: str
     whirl_sentence: str
     rivals_sentences: list[str]
-    chains: Any
+    chains: dict[str, ChainResult]
     made: dict[str, Made]
     missed_chains: dict[str, str]
     published_comparisons: dict[str, PublishedComparison]

@@ -151,11 +151,6 @@ def frame_of(columns: Iterable[Column[R]], series: R) -> "pd.DataFrame":
     return pd.DataFrame({column.key: column.value(series) for column in columns})
 
 
-def each(names: Iterable[str], *columns: Column[R]) -> tuple[Column[R], ...]:
-    """The columns of every name in its turn, see ``Column.of``."""
-    return tuple(column for name in names for template in columns for column in template.of((name,)))
-
-
 @dataclass(frozen=True)
 class Sheet(Generic[R]):
     """A table of rows by its columns.

@@ -93,7 +93,7 @@ def test_several_chains_print_one_json_object():
 
 
 def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved):
-    text = "".join(terminal.text(chain_blocks(name, result.as_dict()), Detail.ALL) for name, result in solved.items())
+    text = "".join(terminal.text(chain_blocks(name, result), Detail.ALL) for name, result in solved.items())
     for words in (
         "48.130 +0.025/0", "in worst case", "by root sum square", "ppm below", "Contributions",
         "Matched in 4 classes", "A linear chain would be off", "Quantiles of the closing link",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from typing import Any
 
 import numpy as np
+
+from doe.dimension_chain import Chain, ChainResult, solve
 
 FACTORS = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
 RESPONSES = ["impact_force_N", "whirl_deviation_ratio", "power_loss_W"]
@@ -194,21 +197,7 @@ def summary() -> dict[str, Any]:
         },
         "gains": dict.fromkeys(RESPONSES, VERDICT),
         "statement": "The gain is real in all three responses.",
-        "chains": {
-            "pocket": {
-                "closing_link": {"nominal_mm": 0.24, "worst_case_mm": [0.23, 0.24], "rss_mm": [0.231, 0.239]},
-                "yield": {"as_given": 0.999976, "standard_error": 5e-6},
-                "contributions": {
-                    "pocket_width": {"variance_percent": 60.0, "worst_case_percent": 55.0},
-                    "roller_diameter": {"variance_percent": 40.0, "worst_case_percent": 45.0},
-                },
-                "allocation": {
-                    "pocket_width": {"nominal_mm": 9.24, "upper_mm": 0.0, "lower_mm": -0.005, "grade": "IT5"},
-                    "roller_diameter": {"nominal_mm": 9.0, "upper_mm": 0.005, "lower_mm": 0.0, "grade": None},
-                },
-                "status": "ok: deviations allocated",
-            }
-        },
+        "chains": {"pocket": pocket_chain().as_dict()},
         "published_comparisons": {
             RESPONSES[0]: {
                 "ours_min_mean_max": [77.0, 92.0, 114.0], "theirs_min_mean_max": [145.0, 203.0, 278.0],
@@ -222,6 +211,17 @@ def summary() -> dict[str, Any]:
         "versions": {"rbdyn": "0.1.0"},
         "seeds": {"design": 1},
     }  # fmt: skip
+
+
+@functools.cache
+def pocket_chain() -> ChainResult:
+    """A chain of two parts with allocated deviations."""
+    links = [
+        {"name": "pocket_width", "coefficient": 1.0, "nominal_mm": 9.24},
+        {"name": "roller_diameter", "coefficient": -1.0, "nominal_mm": 9.0},
+    ]
+    limits = {"lower_mm": 0.23, "upper_mm": 0.24}
+    return solve(Chain.model_validate({"closing_link": limits, "link": links}), samples=1000)
 
 
 def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:

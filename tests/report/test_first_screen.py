@@ -138,9 +138,10 @@ def test_a_loss_or_no_gain_is_no_good_news(verdicts, words, role):
 
 def test_a_chain_that_misses_warns():
     record = summary()
-    record["chains"]["pocket"]["status"] = "refused: misses the upper limit by 0.01 mm"
+    missed = {"mode": "worst_case", "below_mm": 0.0, "above_mm": 0.01, "width_mm": 0.0, "yield_short": None}
+    record["chains"]["pocket"] |= {"status": "refused: the sizes are too large", "missed": missed}
     warnings = [text for text, role in roles(record).items() if role == "warning"]
-    assert any("pocket misses its limits" in text and "0.01 mm" in text for text in warnings)
+    assert any("pocket misses its limits" in text and "0.0100 mm" in text for text in warnings)
     assert not any("misses" in text for text in roles(summary()))
 
 

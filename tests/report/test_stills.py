@@ -118,7 +118,8 @@ def test_bars_are_as_long_as_their_numbers_and_bear_them():
 
 
 def test_shares_of_a_chain_fill_their_bar():
-    shares = {"bore": {"variance_percent": 75.0}, "land": {"variance_percent": 23.0}, "rim": {"variance_percent": 2.0}}
+    percents = {"bore": 75.0, "land": 23.0, "rim": 2.0}
+    shares = {name: {"variance_percent": value, "worst_case_percent": 0.0} for name, value in percents.items()}
     words = [
         each.text for each in ElementTree.fromstring(f"<p>{contributions('guide', shares).svg()}</p>").iter("text")
     ]

@@ -222,7 +222,7 @@ def test_given_deviations_stay_where_others_are_allocated():
 
 def printed(name, result):
     """What the terminal shows of a chain."""
-    return text(chain_blocks(name, result.as_dict()))
+    return text(chain_blocks(name, result))
 
 
 def test_a_moved_nominal_is_marked():

@@ -103,7 +103,7 @@ def test_unit_stated_sizes_that_meet_the_limits_stay_on_the_drawing():
     """Unit: wider sizes that would do too are no part of the answer."""
     result = solve(chain([(1, 9.29, 0.0, -0.0047), (-1, 9.0, 0.002, 0.0)], (0.28, 0.29)), samples=10)
     assert result.status == "ok" and [part.lower_mm for part in result.allocation] == [-0.0047, 0.0]
-    assert "9.2900 0/-0.0047" in text(chain_blocks("pocket", result.as_dict()))
+    assert "9.2900 0/-0.0047" in text(chain_blocks("pocket", result))
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_unit_a_refused_chain_shows_who_takes_what_and_that_a_yield_meets_it():
     assert result.contributions["b"]["worst_case_percent"] == pytest.approx(100 * 10 / 31)
     assert result.missed.width_mm == pytest.approx(0.011)  # with a step for the free part
     assert result.remedy.mode_yield_meets and 0.9973 <= result.remedy.mode_yield < 1.0
-    shown = text(chain_blocks("length", result.as_dict()))
+    shown = text(chain_blocks("length", result))
     for words in (
         'Write mode = "yield" under allocate',
         "Contributions",

@@ -13,7 +13,7 @@ from synthetic_study import summary
 
 from doe.dimension_chain import solve
 from doe.report.sections.answer import first_screen
-from doe.report.sections.chain import chain_tables
+from doe.report.sections.chain import part_sheet
 from doe.report.summary import restored
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed
@@ -274,7 +274,7 @@ def test_unit_an_estimate_is_marked_on_drawing_table_and_report():
     solved = solve(chain([(1.0, 61.333, sides | {"estimated": True}), (-1.0, 61.0, sides)], (0.303, 0.363)))
     first, second = solved.parts
     assert first.text.startswith("≈ 61.333 ") and not second.text.startswith("≈")
-    rows = chain_tables({"guide": solved})["part_dimensions.csv"]
+    rows = part_sheet({"guide": solved}).records
     assert [row["estimated"] for row in rows] == [True, False]
     shown = text(first_screen(restored(summary() | {"chains": {"guide": solved.as_dict()}})))
     assert f"≈ estimated: {first.name} 61.333 mm; state it before the part is drawn." in shown

@@ -5,24 +5,22 @@ The sections are blocks of the record of a study; the ``..._record`` functions w
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from doe.report.sections.chain import estimates_note, grade_cell, refusal_blocks, yield_words
+from doe.report.sections.chain import DRAWN, NAMES, estimates_note, part_sheet, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points, in_operation, least_words
 from doe.report.sections.record import (
     LIMITS,
     SENSES,
     SIGNS_NOTE,
     change,
-    dimension,
-    moved,
     nearest,
     of_hundred,
     part,
     share_with_interval,
     sign_of,
     signed,
-    sizes,
 )
 from doe.report.summary import Summary
 from doe.workflow.asked import Factor, Response
@@ -36,6 +34,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import identity_line
 from rbdyn.base.records import finite
+from rbdyn.base.table import Column
 from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
 from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
@@ -139,17 +138,19 @@ def _edge(edge: Edge) -> str:
 
 def _parts_to_make(summary: Summary) -> list[Block]:
     """Parts of every dimension chain, and what a refused one takes and needs; all else is in a section of its own."""
-    chains = part(summary, "chains") or {}
-    parts = {name: sizes(chain, "parts") or sizes(chain) for name, chain in chains.items()}
-    rows = [
-        (label(name), label(chain_name), dimension(size), grade_cell(size), moved(size))
-        for chain_name, of_chain in parts.items()
-        for name, size in of_chain.items()
-    ]
-    header = ("part", "chain", "dimension [mm]", "grade", "moved [mm]")
-    shares = (f"{label(name)}: {words}" for name, chain in chains.items() if (words := yield_words(chain)))
-    table = Table("Parts to make", header, rows, "; ".join(shares), text_columns=(1, 3))
-    estimates = estimates_note({name: size for of_chain in parts.values() for name, size in of_chain.items()})
+    chains = summary.chains
+    sheet = part_sheet(chains)
+    chain_name, part_name = NAMES
+    columns = (
+        part_name,
+        replace(chain_name, text=True),
+        replace(DRAWN, words="dimension [mm]"),
+        Column[Any]("grade", at=(2, "graded"), text=True),
+        Column[Any]("moved", words="moved [mm]", at=(2, "shift")),
+    )
+    note = "; ".join(f"{label(name)}: {yield_words(chain)}" for name, chain in chains.items())
+    table = replace(sheet, caption="Parts to make", columns=columns, note=note).block
+    estimates = estimates_note({name: size for chain in chains.values() for name, size in chain.drawn_sizes.items()})
     return [
         table,
         Paragraph(estimates, "warning"),

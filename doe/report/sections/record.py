@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from doe.dimension_chain.links import size_text
 from doe.pareto.manufacture import Interval, percent
 from doe.workflow.asked import Asked, Factor
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, says
@@ -64,13 +63,6 @@ def record_table(caption: str, record: Record | None, folded: bool = False) -> T
     rows = list(scalars(record or {}))
     prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
     return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
-
-
-def sizes(chain: Record, key: str = "allocation") -> dict[str, Any]:
-    """Parts of a dimension chain whose record holds their sizes; growths by temperature stand on no drawing."""
-    figures = {"nominal_mm", "upper_mm", "lower_mm"}
-    rows = (chain.get(key) or {}).items()
-    return {name: row for name, row in rows if figures <= set(row) and row.get("origin") != "temperature"}
 
 
 def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:
@@ -191,13 +183,3 @@ def signed(gain: Record) -> str:
 def change(gain: Record) -> str:
     """'11.16 ± 0.65 % less' of a gain."""
     return improvement(part(gain, "percent"), part(gain, "error_percent"), part(gain, "goal") or "min")
-
-
-def moved(part: Mapping[str, Any]) -> str:
-    """'+0.020' of a part whose nominal was moved, else nothing."""
-    return size_text(0.0, part["moved_mm"], 0.0).split()[1].partition("/")[0] if part.get("moved_mm") else ""
-
-
-def dimension(part: Mapping[str, Any]) -> str:
-    """'9.290 0/-0.005' of a part's nominal and deviations, as its drawing states them."""
-    return str(part.get("text") or size_text(part["nominal_mm"], part["upper_mm"], part["lower_mm"]))
