@@ -103,7 +103,7 @@ def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
     from doe.report.files import summary
 
     def write(outcome, folder: Path) -> dict:
-        record = summary(outcome) | {"files": []}
+        record = summary(outcome).as_dict() | {"files": []}
         (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
         return record
 
