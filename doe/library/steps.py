@@ -5,7 +5,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from doe.workflow.asked import Asked
     from doe.workflow.design import DesignResult
     from doe.workflow.problem import Problem
+    from doe.workflow.surface_front import SurfaceFront
 
 
 def notes_record(notes: Notes) -> dict[str, Any]:
@@ -52,12 +52,6 @@ class DesignAnswer(Answer):
             "coded": coded_sheet(self.result.factors, runs).records,
             "terms": power_sheet(self.result.evaluation).records,
         }
-
-    def print_csv(self) -> None:
-        """Print the runs as CSV."""
-        from doe.report.sections.design import print_csv
-
-        print_csv(self.result)
 
     def brief(self) -> str:
         runs, factors = counted(len(self.result.runs), "run"), ", ".join(self.result.factors)
@@ -247,35 +241,28 @@ class FrontAnswer(Answer):
     ``asked``: factors and responses of the study.
     """
 
-    asked: "Asked | None" = None
+    result: "SurfaceFront" = field(kw_only=True)
+    asked: "Asked" = field(kw_only=True)
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.front import front_blocks
-        from doe.report.sections.record import drop_undefined, readable
+        from doe.report.sections.record import readable
 
-        assert self.asked is not None
-        summary = SimpleNamespace(asked=self.asked, front=drop_undefined(self.as_dict()))
-        return with_notes(self.record.get("notes", ()), readable(front_blocks(summary), self.asked))
+        return with_notes(self.result.notes or (), readable(front_blocks(self.asked, self.result), self.asked))
 
     def rows(self) -> Mapping[str, Rows]:
-        picks = {"baseline": self.record["baseline"], **self.record["picks"]}
-        gains = self.record["predicted_gains"]
+        picks = {"baseline": self.result.baseline, **self.result.picks}
+        gains = self.result.predicted_gains
         return {
-            "front": [point_row(point) for point in self.record["front"]],
-            "picks": [{"point": name, **point_row(point)} for name, point in picks.items()],
-            "gains": [{"response": name, **gain} for name, gain in gains.items()],
+            "front": [point.row for point in self.result.front],
+            "picks": [{"point": name, **point.row} for name, point in picks.items()],
+            "gains": [{"response": name, **gain.as_dict()} for name, gain in gains.items()],
         }
 
     def brief(self) -> str:
-        gains = self.record["predicted_gains"].items()
-        texts = [f"{quantity(name)[0]} {with_error(gain['percent'], gain['error_percent'])} %" for name, gain in gains]
-        return f"{counted(len(self.record['front']), 'point')}; predicted gains of the pick {', '.join(texts)}"
-
-
-def point_row(point: Mapping[str, Any]) -> dict[str, Any]:
-    """A point of a front as a row: factors, responses, and their 95 % half-widths."""
-    errors = {f"{name}_error": error for name, error in (point.get("errors") or {}).items()}
-    return {**point["factors"], **point["responses"], **errors}
+        gains = self.result.predicted_gains.items()
+        texts = [f"{quantity(name)[0]} {with_error(gain.percent, gain.error_percent)} %" for name, gain in gains]
+        return f"{counted(len(self.result.front), 'point')}; predicted gains of the pick {', '.join(texts)}"
 
 
 def front(
@@ -305,11 +292,12 @@ def front(
     import numpy as np
 
     from doe.report.identity import study_identity
-    from doe.report.sections.front import front_record, front_tables, given_point_record
+    from doe.report.sections.front import front_sheet
     from doe.workflow.asked import Asked
     from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
     from doe.workflow.problem import Problem
+    from doe.workflow.surface_front import StatedPoint, SurfaceFront
 
     path = path_given(path, "path")
     table, folder = (
@@ -327,12 +315,13 @@ def front(
         if pareto.tolerance_violations is not None:
             reading = (*reading, Note("tolerances", tolerances_out_of_reach(study, pareto.tolerance_violations)))
         extrapolated = extrapolation_notes(surfaces, study.coded(pareto.points[pareto.pick]))
-        record = front_record(study, surfaces, pareto) | notes_record((*extrapolated, *reading))
-        if values is not None:
-            record["point"] = given_point_record(study, surfaces, pareto, np.array(values))
-        identity = study_identity("doe front", study, table)
-        answer = FrontAnswer(record, folder, asked=Asked.of(study), identity=identity)
-        return replace(answer, files=saved(output, "front.json", answer, partial(front_tables, record)))
+        notes = [*extrapolated, *reading]
+        stated = None if values is None else StatedPoint.at(study, surfaces, pareto, np.array(values))
+        result = replace(SurfaceFront.of(study, surfaces, pareto), notes=notes or None, point=stated)
+        identity, asked = study_identity("doe front", study, table), Asked.of(study)
+        answer = FrontAnswer(result.as_dict(), folder, result=result, asked=asked, identity=identity)
+        sheet = front_sheet(study.factors, study.responses, result.front)
+        return replace(answer, files=saved(output, "front.json", answer, lambda: {sheet.file: sheet.records}))
 
 
 def _point_text(point: Any) -> str:
@@ -386,13 +375,6 @@ class ChainAnswer(Answer):
 
     chains: Mapping[str, "ChainResult"] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
-    path: Path | None = None
-
-    @property
-    def unmet(self) -> list[str]:
-        """Why chains miss their limits."""
-        several = "chains" in self.record
-        return [f"{self.path}: {f'chain {name}: ' if several else ''}{why}" for name, why in self.refused.items()]
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.chain import chain_blocks
@@ -439,8 +421,9 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
         refuse(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         refused = {name: result.status for name, result in results.items() if result.refused}
-        identity = identity_of("doe chain", {}, [path])
-        answer = ChainAnswer(record, folder, chains=results, refused=refused, path=path, identity=identity)
+        answer = ChainAnswer(
+            record, folder, chains=results, refused=refused, identity=identity_of("doe chain", {}, [path])
+        )
         sheets = part_sheet(results), share_sheet(results)
         tables = {sheet.file: sheet.records for sheet in sheets}
         return replace(answer, files=saved(output, "chain.json", answer, lambda: tables))

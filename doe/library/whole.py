@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import path_given, registered
-from doe.library.steps import point_row
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
@@ -41,22 +40,6 @@ class StudyAnswer(Answer):
     """
 
     finished_before: bool = False
-    shows_unmet: ClassVar[bool] = True
-
-    @property
-    def closing(self) -> list[str]:
-        """The time that it took unless it was finished before, and its files."""
-        files = ", ".join(self.files)
-        if self.finished_before:
-            return [f"Finished before, nothing has changed since: {self.folder} holds {files}"]
-        cost = self.record["cost"]
-        spent = f"{cost['total_s']:.1f} s, of which design runs {cost['design_s']:.1f} s"
-        return [spent, f"written to {self.folder}: {files}"]
-
-    @property
-    def unmet(self) -> list[str]:
-        """What keeps the study from its demands, such as a missed limit or chain."""
-        return [*self.record["obstacles"]["sentences"]]
 
     @cached_property
     def summary(self) -> "Summary":
@@ -94,7 +77,7 @@ class StudyAnswer(Answer):
                 }
                 for run in self.summary.design.points
             ],
-            "front": [point_row(point) for point in self._front()],
+            "front": self._front(),
             "confirmation": [
                 {"point": name, **point.factors, "response": response, **value.as_dict()}
                 for name, point in self.summary.confirmation.items()
@@ -105,10 +88,14 @@ class StudyAnswer(Answer):
             **({"duty": duty_figures(self.summary).records} if self.summary.duty else {}),
         }
 
-    def _front(self) -> list[dict[str, Any]]:
+    def _front(self) -> Rows:
         """Points of the front: those of the adaptive search where there was one."""
+        from doe.workflow.surface_front import EstimatedPoint
+
         searched = self.record.get("adaptive")
-        return self.record["front"]["front"] if searched is None else searched["front"]
+        if searched is None:
+            return [point.row for point in self.summary.front.front]
+        return [EstimatedPoint.from_dict(point).row for point in searched["front"]]
 
     def _gains(self) -> Rows:
         gains, points, rows = self.summary.gains, self.summary.confirmation, []

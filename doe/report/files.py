@@ -17,7 +17,7 @@ from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
-from doe.report.sections.front import front_record, front_tables, predicted_record
+from doe.report.sections.front import front_sheet
 from doe.report.sections.record import notes_of, readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
 from doe.report.sections.search import (
@@ -38,6 +38,7 @@ from doe.workflow.duty import DutyAnswer
 from doe.workflow.pick import SearchedPick
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, StudyDesign
+from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.arrays import Array
@@ -72,7 +73,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     tables = {
         runs.file: runs.records,
         **fit_files(outcome.surfaces),
-        "front.csv": front_tables(record["front"])["front.csv"]
+        "front.csv": front_sheet(study.factors, study.responses, result.front.front).records
         if outcome.adaptive is None
         else archive_table(study, outcome.adaptive),
         "confirmation.csv": confirmation_sheet(study.factors, result.confirmation).records,
@@ -160,8 +161,8 @@ def summary(outcome: StudyResult) -> Summary:
         asked=Settings.of_runs(study),
         design=StudyDesign.of(study, outcome.design, outcome.runs),
         fit=fits_of(outcome.surfaces),
-        front=front_record(study, outcome.surfaces, outcome.front),
-        pick_on_surfaces=predicted_record(study, outcome.surfaces, outcome.pick.point),
+        front=SurfaceFront.of(study, outcome.surfaces, outcome.front),
+        pick_on_surfaces=EstimatedPoint.predicted(study, outcome.surfaces, outcome.pick.point),
         pick=study.by_factor(outcome.pick.point),
         operating_clearances_mm=outcome.clearances.operating,
         clearance_class=outcome.clearances.class_sentence,

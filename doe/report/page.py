@@ -17,10 +17,11 @@ from typing import Any
 from doe.report.sections import answer, bearing, chain, design, duty, fit, front, robust
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
-from doe.report.sections.front import complete, fronts, picks
+from doe.report.sections.front import fronts, picks
 from doe.report.sections.record import Record, drop_undefined, factors, notes_of, part, readable, record_table
 from doe.report.summary import Summary, restored
-from doe.workflow.asked import Factor, Response
+from doe.workflow.asked import Asked, Factor, Response
+from doe.workflow.surface_front import EstimatedPoint, Point, RobustPoint
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
 from rbdyn.base.page import identity_section, page
@@ -121,16 +122,12 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
             }
             for run in summary.design.points
         ],
-        "marks": {
-            name: [part(point, "factors", factor.name) for factor in inputs]
-            for name, point in marks.items()
-            if name in ("baseline", "pick") and complete(point, summary)
-        },
+        "marks": {name: [marks[name].factors[factor.name] for factor in inputs] for name in ("baseline", "pick")},
         "fronts": [
-            {"words": points.words, "points": [_point(point, inputs, names) for point in points.points]}
+            {"words": points.words, "points": [_point(point, summary.asked) for point in points.points]}
             for points in fronts(summary)
         ],
-        "compared": {name: _point(point, inputs, names) for name, point in marks.items()},
+        "compared": {name: _point(point, summary.asked) for name, point in marks.items()},
         "motion": {name: _moving(run["moving"]) for name, run in motion.items() if part(run, "moving")},
     }
     if emulators := part(summary, "adaptive", "emulators"):
@@ -150,15 +147,17 @@ def _named(response: Response) -> dict[str, str]:
     return {"words": response.label, "unit": ""} if response.is_ratio else {"words": words, "unit": unit}
 
 
-def _point(point: Record, inputs: Sequence[Factor], names: Sequence[str]) -> dict[str, Any]:
+def _point(point: Point, asked: Asked) -> dict[str, Any]:
     """Short keys, for there are many: x factors, y responses, e half-widths, r values with tolerances."""
     values = {
-        "x": [_rounded(part(point, "factors", factor.name)) for factor in inputs],
-        "y": [_rounded(part(point, "responses", name)) for name in names],
-        "e": [_rounded(part(point, "errors", name), 2) for name in names] if point.get("errors") else None,
-        "r": [_rounded(part(point, "robust", name)) for name in names] if point.get("robust") else None,
+        "x": [_rounded(point.factors[name]) for name in asked.columns],
+        "y": [_rounded(point.responses[name]) for name in asked.names],
     }
-    return {key: row for key, row in values.items() if row is not None}
+    if isinstance(point, EstimatedPoint):
+        values["e"] = [_rounded(point.errors[name], 2) for name in asked.names]
+    if isinstance(point, RobustPoint):
+        values["r"] = [_rounded(point.robust.get(name)) for name in asked.names]
+    return values
 
 
 def _rounded(value: float | None, digits: int = 6) -> float | None:

@@ -16,6 +16,7 @@ from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
 from doe.workflow.runs import StudyDesign
+from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
 from rbdyn.base.identity import Identity
@@ -40,8 +41,8 @@ class Summary(Record, kw_only=True):
     asked: Settings
     design: StudyDesign
     fit: Fits
-    front: Any
-    pick_on_surfaces: Any
+    front: SurfaceFront
+    pick_on_surfaces: EstimatedPoint
     pick: dict[str, Any]
     operating_clearances_mm: dict[str, dict[str, float]]
     clearance_class: str

@@ -447,7 +447,8 @@ class PredictedGain(Record):
     model error at both points, with the degrees of freedom of `Surface.interval_dof`.
 
     ``scatter``: by how much two single runs at one point differ, by the pure error of replicates. ``within_scatter``:
-    whether the gain is no larger. Both are None if no run is repeated.
+    whether the gain is no larger. Both are None if no run is repeated. ``selection_optimism_percent``: by how much the choice of
+    the pick exaggerates the gain.
     """
 
     percent: float
@@ -458,6 +459,7 @@ class PredictedGain(Record):
     within_scatter: bool | None = derived(
         lambda self: None if self.scatter is None else abs(self.percent) <= self.scatter, "within_single_run_scatter"
     )
+    selection_optimism_percent: float | None = None
     response: str = outside_json(default="")
     baseline: float = outside_json(default=math.nan)
     value: float = outside_json(default=math.nan)

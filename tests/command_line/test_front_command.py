@@ -8,9 +8,9 @@ from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.sections.front import front_record
 from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front
+from doe.workflow.surface_front import SurfaceFront
 from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
@@ -23,7 +23,7 @@ def front_of(folder, *replacements):
     """The record of the edited example on the published table."""
     study = edited_study(folder, *replacements)
     surfaces = table_surfaces(study)
-    return study, surfaces, front_record(study, surfaces, find_front(study, surfaces))
+    return study, surfaces, SurfaceFront.of(study, surfaces, find_front(study, surfaces)).as_dict()
 
 
 def command(study, *arguments):

@@ -101,7 +101,10 @@ def summary() -> dict[str, Any]:
     """Every part of the record."""
     cube: list[list[float]] = [list(corner) for corner in itertools.product((-1.0, 1.0), repeat=3)]
     runs = [*cube, *([0.0] * 3 for _ in range(4))]
-    front = [point([0.5, 1.0 - 0.1 * k, -1.6 + 0.1 * k]) for k in range(12)]
+    front = [point([0.5, 1.0 - 0.1 * k, -1.6 + 0.1 * k]) | {"non_dominated_probability": 0.9} for k in range(12)]
+    robust = [
+        {key: each[key] for key in ("factors", "responses")} | {"robust": each["responses"]} for each in front[:6]
+    ]
     pick, baseline = front[3], point([0.0, 0.0, 0.0])
     limits = [(c - REACH * s, c + REACH * s) for c, s in zip(CENTRE, STEP, strict=True)]
     simulated = {
@@ -170,14 +173,26 @@ def summary() -> dict[str, Any]:
         },
         "fit": {"responses": {name: fitted(name, runs) for name in RESPONSES}},
         "front": {
-            "front": front, "knee": front[5], "pick": {**pick, "reason": "the knee of the front"},
-            "picks": {"desirability": front[8]}, "baseline": baseline, "hypervolume": 0.9, "generations": 3, "seed": 1,
-            "hypervolume_history": [0.7, 0.85, 0.9], "predicted_gains": dict.fromkeys(RESPONSES, VERDICT),
-            "constraints": [{"response": "power_loss_W", "sense": "<=", "limit": 260.0, "value": 230.0, "kept": True}],
-            "tolerance_aware": {"kind": "worst_case", "quantile": None,
-                                "front": [{**each, "robust": each["responses"]} for each in front[:6]]},
+            "front": front, "knee": front[5], "picks": {"desirability": front[8]}, "baseline": baseline,
+            "pick": {**pick, "reason": "the knee of the front", "beyond_runs": False, "at_bounds": {}},
+            "hypervolume": 0.9, "largest_hypervolume": 1.331, "hypervolume_history": [0.7, 0.85, 0.9], "ideal": {}, "nadir": {},
+            "pick_dominates_baseline": {"probability": 0.9, "standard_error": 0.01, "draws": 1000},
+            "predicted_gains": {
+                name: {**VERDICT, "single_run_scatter_percent": None, "goal": "min"} for name in RESPONSES
+            },
+            "statement": "", "archive": 12, "feasible_share": 1.0, "evaluations": 300, "generations": 3, "seed": 1,
+            "constraints": [{"response": "power_loss_W", "sense": "<=", "limit": 260.0, "value": 230.0, "error": None, "kept": True,
+                             "probability": 0.99, "demanded_probability": 0.95}],
+            "tolerance_aware": {
+                "kind": "worst_case", "quantile": None, "distribution": "uniform", "half_widths": {},
+                "front": robust, "hypervolume": 0.8, "pick": {**robust[3], "reason": "the knee"}, "picks": {},
+                "baseline_robust": {}, "plain_pick_robust": {}, "plain_pick_inside": True, "nominal_loss_percent": 1.0,
+                "robust_gain_percent": None, "pick_gains_percent": {},
+                "survival": {**dict.fromkeys(("plain_pick", "pick", "standard_error", "plain_pick_interval", "pick_interval")),
+                             "open_errors": ""},
+            },
         },
-        "pick_on_surfaces": None,
+        "pick_on_surfaces": {key: pick[key] for key in ("factors", "responses", "errors")},
         "pick": chosen,
         "operating_clearances_mm": {},
         "clearance_class": "",

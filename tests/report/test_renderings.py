@@ -42,8 +42,11 @@ def record() -> dict:
     whole = summary()
     limit = {"sense": "<=", "bound": 260.0, "value": 231.472, "error": 0.0057, "verdict": "kept", "probability": 0.99}
     for name in ("baseline", "pick"):
-        whole["confirmation"][name]["limits"] = {RESPONSES[2]: limit}
-    whole["edge"] = {"sentence": "The pick lies 0.05 mm inside of the region."}
+        whole["confirmation"][name] |= {
+            "limits": {RESPONSES[2]: limit},
+            "every_limit": [{"response": RESPONSES[2], **limit}],
+        }
+    whole["edge"]["sentence"] = "The pick lies 0.05 mm inside of the region."
     whole["adaptive"] = {"sentences": ["The pick has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."]}
     whole["tolerances_sentence"] = "95 % of the parts keep the gain of 3.25 ± 0.41 %."
     return whole

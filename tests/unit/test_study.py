@@ -18,13 +18,13 @@ from matplotlib.image import imread
 from short_studies import SHORT, rows, run_design, run_study, short_study, silent, stored
 
 from doe.report.files import write
-from doe.report.sections.front import front_record
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.status import finished_record as is_finished
 from doe.workflow.status import inputs_digest
+from doe.workflow.surface_front import SurfaceFront
 from doe.workflow.surfaces import fit_surfaces, reference_runs
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.storage import run_key
@@ -228,7 +228,7 @@ def test_reference_of_another_design_is_refused(tmp_path):
 def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
     study = Problem.load(short_study(tmp_path))
     surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
-    record = front_record(study, surfaces, find_front(study, surfaces))
+    record = SurfaceFront.of(study, surfaces, find_front(study, surfaces)).as_dict()
     pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
     assert all(pick[name] <= baseline[name] for name in study.responses)
     assert all(

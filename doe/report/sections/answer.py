@@ -27,13 +27,9 @@ from doe.workflow.asked import Factor, Response
 from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
-from doe.workflow.problem import Problem
-from doe.workflow.surfaces import PredictedGain
 from doe.workflow.tolerances import FactorTolerance
-from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
 from rbdyn.base.identity import identity_line
-from rbdyn.base.records import finite
 from rbdyn.base.table import Column
 from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
 from rbdyn.clearances import CLEARANCES, other_ranges
@@ -350,22 +346,20 @@ def confirmation(summary: Summary, motion: Mapping[str, Any]) -> Section:
         for name, point in points.items()
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
-    if predictions := part(summary, "front", "predicted_gains"):
-        # The surfaces predict the gains of their own pick, which another may have overtaken.
-        places = {name: {"factors": point.factors} for name, point in points.items()}
-        name = nearest(summary, part(summary, "front", "pick", "factors"), places) or "pick"
-        simulated = points[name].gains or {}
-        rows = [
-            [
-                label(response),
-                change(gain),
-                *((change(simulated[response]), sign_of(simulated[response])) if response in simulated else ("", "")),
-            ]
-            for response, gain in predictions.items()
+    # The surfaces predict the gains of their own pick, which another may have overtaken.
+    name = nearest(asked, summary.front.pick.factors, {name: point.factors for name, point in points.items()})
+    simulated = points[name].gains or {}
+    rows = [
+        [
+            label(response),
+            change(gain),
+            *((change(simulated[response]), sign_of(simulated[response])) if response in simulated else ("", "")),
         ]
-        columns = ("response", "on the surfaces", "simulated", "verdict")
-        caption = f"Gains predicted by the surfaces and simulated, {point_words(name)}"
-        blocks.append(Table(caption, columns, rows, text_columns=(3,)))
+        for response, gain in summary.front.predicted_gains.items()
+    ]
+    columns = ("response", "on the surfaces", "simulated", "verdict")
+    caption = f"Gains predicted by the surfaces and simulated, {point_words(name)}"
+    blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     blocks += [changes(summary), limits(summary), Paragraph(summary.edge.sentence)]
     reasons = [(point_words(name), point.reason) for name, point in points.items() if point.reason]
     blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
@@ -403,17 +397,3 @@ def tolerances(widths: Mapping[str, FactorTolerance]) -> Table:
     ]
     header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
     return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))
-
-
-def gains_record(gains: Sequence[PredictedGain]) -> dict[str, Any]:
-    """JSON of predicted gains by response."""
-    return {gain.response: gain.as_dict() for gain in gains}
-
-
-def point_record(study: Problem, point: Array, values: Array, errors: Array) -> dict[str, Any]:
-    """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
-    return {
-        "factors": study.by_factor(point),
-        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
-        "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
-    }

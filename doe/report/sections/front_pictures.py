@@ -11,10 +11,10 @@ from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.record import Record
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
 from doe.workflow.asked import Factor
 from doe.workflow.confirmation import ConfirmedPoint
+from doe.workflow.surface_front import Point as FrontPoint
 from rbdyn.base.words import label, quantity, shown
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Front:
 
     role: str
     words: str
-    points: list[Record]
+    points: Sequence[FrontPoint]
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,14 @@ class Coordinate:
     place: int
     ends: Range
 
-    def values(self, points: Iterable[Record]) -> list[float]:
+    def values(self, points: Iterable[FrontPoint]) -> list[float]:
         """Its value at each point."""
-        return [point[self.kind][self.name] for point in points]
+        return [getattr(point, self.kind)[self.name] for point in points]
 
-    def share(self, point: Record) -> float:
+    def share(self, point: FrontPoint) -> float:
         """Where the value of a point is between the ends, 0 to 1."""
         low, high = self.ends
-        return float((point[self.kind][self.name] - low) / (high - low))
+        return float((getattr(point, self.kind)[self.name] - low) / (high - low))
 
 
 def drawn_pairs(goals: Sequence[str]) -> list[tuple[int, int]]:
@@ -114,7 +114,7 @@ def pair_still(
     one: tuple[int, str],
     two: tuple[int, str],
     sets: Sequence[Front],
-    marks: Mapping[str, Record],
+    marks: Mapping[str, FrontPoint],
     confirmed: Mapping[str, ConfirmedPoint],
     limits: Mapping[str, Sequence[float]],
 ) -> Still:
@@ -123,7 +123,7 @@ def pair_still(
     points = [*marks.values(), *(point for front in sets for point in front.points)]
     axes, drawn = [], dict[str, list[float]]()
     for along, (place, name) in enumerate((one, two)):
-        values = [point["responses"][name] for point in points] + [pair[0][along] for pair in simulated.values()]
+        values = [point.responses[name] for point in points] + [pair[0][along] for pair in simulated.values()]
         drawn[name] = near(limits.get(name, ()), values)
         axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
     words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
@@ -146,7 +146,7 @@ def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:
 def _pair(
     axes: Sequence[Coordinate],
     sets: Sequence[Front],
-    marks: Mapping[str, Record],
+    marks: Mapping[str, FrontPoint],
     simulated: Mapping[str, tuple[Point, tuple[float | None, float | None]]],
     limits: Mapping[str, Sequence[float]],
     axis: "Axes",
@@ -159,7 +159,7 @@ def _pair(
     for front in sets:
         _dots(axis, front.role, across.values(front.points), up.values(front.points))
     for name, point in marks.items():
-        _mark(axis, name, (point["responses"][across.name], point["responses"][up.name]))
+        _mark(axis, name, (point.responses[across.name], point.responses[up.name]))
     for name, (place, half_widths) in simulated.items():
         for line in error_bars(place, half_widths, (across.ends, up.ends)):
             axis.plot(*zip(*line, strict=True), color=COLOURS["ink"], linewidth=1.4)
@@ -207,7 +207,7 @@ def _mark(axis: "Axes", name: str, place: Point, simulated: bool = False) -> Non
     name_marks(line, "mark", [f"{words}, simulated" if simulated else words])
 
 
-def legend_still(sets: Sequence[Front], marks: Mapping[str, Record], confirmed: bool, limited: bool) -> Still:
+def legend_still(sets: Sequence[Front], marks: Mapping[str, FrontPoint], confirmed: bool, limited: bool) -> Still:
     """What the marks of the pictures mean; a hollow mark is the same point, simulated."""
     count = len(sets) + len(marks) + confirmed + limited
     draw = partial(_legend, sets, list(marks), confirmed, limited)
@@ -239,13 +239,16 @@ def _legend(sets: Sequence[Front], names: Sequence[str], confirmed: bool, limite
 
 
 def parallel_still(
-    inputs: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, Record]
+    inputs: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, FrontPoint]
 ) -> Still:
     """Parallel coordinates: an axis for each factor and response, a line for each point."""
     keys = [("factors", place, factor.name) for place, factor in enumerate(inputs)]
     keys += [("responses", place, name) for place, name in enumerate(names)]
     points = [*(point for front in sets for point in front.points), *marks.values()]
-    axes = [Coordinate(kind, name, place, span((p[kind][name] for p in points), 0.02)) for kind, place, name in keys]
+    axes = [
+        Coordinate(kind, name, place, span((getattr(p, kind)[name] for p in points), 0.02))
+        for kind, place, name in keys
+    ]
     words = f"Parallel coordinates of {len(points) - len(marks)} points of the front"
     both = {name: marks[name] for name in ("baseline", "pick") if name in marks}
     look = PARALLEL | {"width": max(PARALLEL["width"], AXIS_WIDTH * len(axes))}
@@ -253,7 +256,7 @@ def parallel_still(
     return replace(still, data={"front": _data("parallel", axes, still)})
 
 
-def _parallel(axes: Sequence[Coordinate], sets: Sequence[Front], marks: Mapping[str, Record], axis: "Axes") -> None:
+def _parallel(axes: Sequence[Coordinate], sets: Sequence[Front], marks: Mapping[str, FrontPoint], axis: "Axes") -> None:
     from matplotlib.collections import LineCollection
 
     middles = [number + 0.5 for number in range(len(axes))]

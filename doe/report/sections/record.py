@@ -65,22 +65,17 @@ def record_table(caption: str, record: Record | None, folded: bool = False) -> T
     return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
 
 
-def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:
-    """Name of the candidate whose factors are nearest to a place in coded units; None without any.
+def nearest(asked: Asked, place: Mapping[str, float], candidates: Mapping[str, Mapping[str, float]]) -> str:
+    """Name of the candidate whose factors are nearest to those of a place in coded units.
 
     A pick is simulated at the resolution of the drawing, so its factors are not those of the front to the digit.
     """
 
     def distance(name: str) -> float:
-        steps = [
-            abs(candidates[name]["factors"][factor.name] - (place or {})[factor.name]) / (factor.step or 1.0)
-            for factor in factors(summary)
-        ]
+        steps = [abs(candidates[name][each.name] - place[each.name]) / each.step for each in asked.factors]
         return math.hypot(*steps)
 
-    names = {factor.name for factor in factors(summary)}
-    whole = [name for name, point in candidates.items() if names <= set(point.get("factors") or {})]
-    return min(whole, key=distance) if place and names <= set(place) and whole else None
+    return min(candidates, key=distance)
 
 
 def drop_undefined(value: Any) -> Any:

@@ -13,11 +13,11 @@ import numpy as np
 
 from doe.adaptive.emulators import LEAST_DEVIATION
 from doe.pareto.front import NOISE_DRAWS, noisy_hypervolume
-from doe.report.sections.answer import point_record
 from doe.report.sections.record import Record, factors, part
 from doe.report.still import COLOURS, SMALL, Still, name_marks
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
 from doe.workflow.problem import Problem
+from doe.workflow.surface_front import EstimatedPoint
 from doe.workflow.whole import StudyResult
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Table
@@ -298,8 +298,7 @@ def adaptive_record(study: Problem, adaptive: Adaptive) -> dict[str, Any]:
     search, front = adaptive.search, adaptive.search.front
     rows = zip(front.points, front.values, front.half_widths, strict=True)
     points = [
-        point_record(study, point[: len(study.factors)], *rest) | {"factors": _factors(study, point)}
-        for point, *rest in rows
+        EstimatedPoint.of(study, point, *rest).as_dict() | {"factors": _factors(study, point)} for point, *rest in rows
     ]
     costs = front.goals.costs(search.predictions)
     scale = costs.min(axis=0), costs.max(axis=0)
