@@ -54,7 +54,6 @@ class Loss(NamedTuple):
     film: Node | Literal["guide"] | None = None
 
 
-# In the order of the power vector of ``rbdyn.dynamics.forces.equations``.
 LOSSES = (
     Loss("outer_race_traction", lambda shares: shares.sliding("outer")),
     Loss("inner_race_traction", lambda shares: shares.sliding("inner")),
@@ -73,3 +72,9 @@ LOSSES = (
 )
 # Powers lost of a simulation; its rolling resistance is that of both races.
 POWER_TERMS = tuple(dict.fromkeys(loss.power or loss.name for loss in LOSSES if loss.power is not None))
+# Their places in the power vector of a simulation. The input by the shafts and by loads without a potential follow, and last the
+# inner race's part of the rolling resistance.
+(
+    OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
+    LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POWERS,
+) = range(len(POWER_TERMS) + 4)  # fmt: skip

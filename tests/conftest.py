@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from rbdyn.base.faults import read_toml
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.forces.equations import derivative
-from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.state import LOADS
 from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.losses import POWERS
 from rbdyn.scene import Scene
 
 ROOT = Path(__file__).parent.parent

@@ -21,10 +21,10 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivative_once
-from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.forces.state import Layout
+from rbdyn.dynamics.forces.state import LOADS, Layout
 from rbdyn.dynamics.integrators.advance import book_whirl
+from rbdyn.losses import POWERS
 
 
 class BudgetSpent(Exception):  # noqa: N818

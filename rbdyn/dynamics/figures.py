@@ -13,9 +13,9 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.clearances import REPORTED
-from rbdyn.dynamics.forces.places import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
-from rbdyn.losses import POWER_TERMS
+from rbdyn.losses import POWER_TERMS, SHAFT
 from rbdyn.result import TEMPERATURES
 
 if TYPE_CHECKING:

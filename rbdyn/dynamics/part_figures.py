@@ -12,7 +12,7 @@ import numpy as np
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.figures import PARTS, of_kind
-from rbdyn.dynamics.forces.places import INNER_LOAD, OUTER_LOAD
+from rbdyn.dynamics.forces.state import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import Runs

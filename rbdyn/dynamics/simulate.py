@@ -14,7 +14,7 @@ from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
 from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.places import INNER_LOAD, LAND_LOAD, OUTER_LOAD
+from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import (
     friction_check,

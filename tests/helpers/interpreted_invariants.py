@@ -30,12 +30,12 @@ from rbdyn.dynamics.forces.bodies import (
 )
 from rbdyn.dynamics.forces.cage import guide_forces
 from rbdyn.dynamics.forces.equations import cage_motion, inner_motion, mechanical_energy
-from rbdyn.dynamics.forces.places import LOAD, SHAFT
 from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, RoundRace, WavyRace, unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.losses import LOAD, SHAFT
 
 # Of all scenes that are tried where time allows.
 SHARE = float(os.environ.get("SHARE_OF_SCENES", "1.0"))

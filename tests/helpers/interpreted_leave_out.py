@@ -45,9 +45,9 @@ from rbdyn.dynamics.forces.cage import (
     NoPocket,
     OuterGuide,
 )
-from rbdyn.dynamics.forces.places import LOAD
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.losses import LOAD
 
 # Round-off of the sums, relative to the largest of each kind of derivative, power or load. Both paths compute the
 # overlaps, which are differences of positions, from the same numbers in the same order.

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import sys
 import types
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +26,18 @@ CLEARANCE = (
 )
 
 
-def add(module: str, place: str, entry: str, more: str = "") -> None:
-    """Read a module whose text has an ``entry`` before the first ``place``."""
+def add(module: str, entries: Mapping[str, str], more: str = "") -> None:
+    """Read a module whose text begins with ``more`` and has ``entries``, each before the first of its place."""
     path = ROOT.joinpath(*module.split(".")).with_suffix(".py")
-    before, mark, after = path.read_text(encoding="utf-8").partition(place)
-    assert mark, module
+    text = path.read_text(encoding="utf-8")
+    for place, entry in entries.items():
+        before, mark, after = text.partition(place)
+        assert mark, module
+        text = before + entry + mark + after
     found = types.ModuleType(module)
     found.__file__ = str(path)
     sys.modules[module] = found
-    exec(compile(more + before + entry + mark + after, str(path), "exec"), found.__dict__)
+    exec(compile(more + text, str(path), "exec"), found.__dict__)
 
 
 def run(*words: Any) -> str:
@@ -124,15 +128,14 @@ def clearance() -> dict[str, bool]:
 def main(kind: str, folder: Path) -> None:
     """The program."""
     if kind == "figure":
-        imported = "from rbdyn.dynamics.forces.places import OUTER_LOAD\n"
-        add("rbdyn.dynamics.figures", "_PLACES = ", FIGURE, imported)
+        imported = "from rbdyn.dynamics.forces.state import OUTER_LOAD\n"
+        add("rbdyn.dynamics.figures", {"_PLACES = ": FIGURE}, imported)
         found = figure(folder)
     elif kind == "loss":
-        add("rbdyn.losses", '    Loss("spin_windage"', LOSS)
-        add("rbdyn.dynamics.forces.places", "SHAFT, LOAD", "CHURNING, ")
+        add("rbdyn.losses", {'    Loss("spin_windage"': LOSS, "SHAFT, LOAD": "CHURNING, "})
         found = loss()
     else:
-        add("rbdyn.clearances", '    Clearance("lip"', CLEARANCE)
+        add("rbdyn.clearances", {'    Clearance("lip"': CLEARANCE})
         found = clearance()
     print(json.dumps(found))
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import mechanical_energy
-from rbdyn.dynamics.forces.places import LOAD, SHAFT
 from rbdyn.dynamics.forces.races import unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, SmoothRamps
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.run import Run
+from rbdyn.losses import LOAD, SHAFT
 
 HELPERS = Path(__file__).parents[1] / "helpers"
 INTERPRETED = (HELPERS / "interpreted_invariants.py", HELPERS / "interpreted_leave_out.py")

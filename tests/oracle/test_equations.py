@@ -14,11 +14,11 @@ from conftest import EVERYTHING, ROOT
 from numpy_twin import POWERS, twin
 
 from rbdyn.dynamics.forces.equations import pocket_loads
-from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.state import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import needs_clock
-from rbdyn.losses import POWER_TERMS
+from rbdyn.losses import POWER_TERMS, SHAFT
 
 # Position round-off of 3e-18 m over the smallest approaches of the random states (some 1e-8 m) is 3e-10 of that
 # contact's load, and 1e-10 of the largest force on a body.

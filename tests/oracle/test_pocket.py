@@ -17,7 +17,7 @@ from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping
 from rbdyn.contact.hertz_line import LineContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.forces.cage import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy
-from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.forces.state import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.integrators.advance import book_peaks, book_point, empty_tally
 
 VISCOSITY, RADIUS, LENGTH, FLOOR = 2.87e-3, 4.5e-3, 5e-3, 0.8e-6

@@ -11,10 +11,10 @@ from test_runge_kutta import one_step, orders_of, slope_of
 
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.forces.equations import mechanical_energy
-from rbdyn.dynamics.forces.places import SHAFT
 from rbdyn.dynamics.integrators import runge_kutta
 from rbdyn.dynamics.integrators.advance import DERIVATIVES, interpolate
 from rbdyn.dynamics.simulate import simulate
+from rbdyn.losses import SHAFT
 
 KUTTA = runge_kutta.Kutta()
 RK43 = "numerics.method=rk43"

@@ -12,9 +12,8 @@ from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import CAGE_SLIP, IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.forces.equations import mechanical_energy
-from rbdyn.dynamics.forces.places import LOADS, POWERS, SHAFT
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.forces.state import ROLLER_STATES, layout
+from rbdyn.dynamics.forces.state import LOADS, ROLLER_STATES, layout
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import rosenbrock as ros
 from rbdyn.dynamics.integrators.advance import advance
@@ -25,6 +24,7 @@ from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.losses import POWERS, SHAFT
 
 STEEP = ("traction.constants=[-0.05,5.0,100.0,0.05]",)
 # A slope of 40 s/m, where the implicit method is the cheaper one.

@@ -12,13 +12,14 @@ from short_studies import short_study
 from doe.workflow.confirmation import Choice, confirmed_from, whirl_sentence
 from doe.workflow.problem import Problem
 from rbdyn.dynamics.figures import BEARING
-from rbdyn.dynamics.forces.places import LOADS, POWERS
+from rbdyn.dynamics.forces.state import LOADS
 from rbdyn.dynamics.integrators.advance import WHIRL, book_whirl
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.recording import PLACE_SUMS, SPEED_SUMS
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import quantity, whirl_notes
 from rbdyn.dynamics.statistics.replicate import Replicate
+from rbdyn.losses import POWERS
 from rbdyn.result import JITTER, Quantity
 
 # Radial guide clearance 150 um.

@@ -15,8 +15,17 @@ from rbdyn.base.faults import RunError
 from rbdyn.dynamics import figures
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import POWER_LOSS
-from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
-from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y
+from rbdyn.dynamics.forces.state import (
+    CAGE_ANGLE,
+    CAGE_SPEED,
+    CAGE_VX,
+    CAGE_VY,
+    CAGE_X,
+    CAGE_Y,
+    LOADS,
+    POCKET_CONTACT_LOAD,
+    POCKET_LOAD,
+)
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import (
     CAGE_SHARES,
@@ -43,6 +52,7 @@ from rbdyn.dynamics.statistics.error_bars import (
     unseen_regime,
 )
 from rbdyn.dynamics.statistics.replicate import Replicate
+from rbdyn.losses import POWERS
 from rbdyn.result import Quantity
 
 

@@ -257,7 +257,7 @@ def test_invariant_spin_up_from_rest(make_scene):
     from conftest import EVERYTHING
 
     from rbdyn.dynamics.forces.equations import mechanical_energy
-    from rbdyn.dynamics.forces.places import LOAD, SHAFT
+    from rbdyn.losses import LOAD, SHAFT
 
     scene = make_scene(
         *EVERYTHING,

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn import losses
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
-from rbdyn.dynamics.forces import places, state
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import (
     RingMotion,
     action,
@@ -241,27 +242,27 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
     support_fx, support_fy = on_outer.x + land.outer_x, on_outer.y + land.outer_y
     support_loss = support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
-    power[row, places.OUTER_TRACTION] = on_outer.traction
-    power[row, places.INNER_TRACTION] = on_inner.traction
-    power[row, places.ROLLING] = on_outer.rolling + on_inner.rolling
-    power[row, places.RACE_DAMPING] = on_outer.damping + on_inner.damping
-    power[row, places.POCKET_FRICTION] = pockets.friction
-    power[row, places.POCKET_DAMPING] = pockets.damping
-    power[row, places.POCKET_FILM] = pockets.film
-    power[row, places.LAND_FILM] = land.film
-    power[row, places.LAND_FRICTION] = land.friction
-    power[row, places.LAND_DAMPING] = land.damping
-    power[row, places.DRAG] = drag_loss
-    power[row, places.SUPPORT_DAMPING] = support_loss
+    power[row, losses.OUTER_TRACTION] = on_outer.traction
+    power[row, losses.INNER_TRACTION] = on_inner.traction
+    power[row, losses.ROLLING] = on_outer.rolling + on_inner.rolling
+    power[row, losses.RACE_DAMPING] = on_outer.damping + on_inner.damping
+    power[row, losses.POCKET_FRICTION] = pockets.friction
+    power[row, losses.POCKET_DAMPING] = pockets.damping
+    power[row, losses.POCKET_FILM] = pockets.film
+    power[row, losses.LAND_FILM] = land.film
+    power[row, losses.LAND_FRICTION] = land.friction
+    power[row, losses.LAND_DAMPING] = land.damping
+    power[row, losses.DRAG] = drag_loss
+    power[row, losses.SUPPORT_DAMPING] = support_loss
     inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
-    power[row, places.SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
-    power[row, places.LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
-    power[row, places.INNER_ROLLING] = on_inner.rolling
-    loads[row, places.POCKET_LOAD] = pockets.load
-    loads[row, places.OUTER_LOAD] = on_outer.load
-    loads[row, places.INNER_LOAD] = on_inner.load
-    loads[row, places.LAND_LOAD] = land.load
-    loads[row, places.POCKET_CONTACT_LOAD] = pockets.contact_load
+    power[row, losses.SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, losses.LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
+    power[row, losses.INNER_ROLLING] = on_inner.rolling
+    loads[row, state.POCKET_LOAD] = pockets.load
+    loads[row, state.OUTER_LOAD] = on_outer.load
+    loads[row, state.INNER_LOAD] = on_inner.load
+    loads[row, state.LAND_LOAD] = land.load
+    loads[row, state.POCKET_CONTACT_LOAD] = pockets.contact_load
 
 
 @routine
@@ -273,8 +274,8 @@ def pocket_loads(bearing, y, row, loads, scratch):
         wall = roller_pocket(bearing, y, cage, scratch.touching[i])
         load = max(load, abs(wall.on_wall))
         contact_load = max(contact_load, wall.load)
-    loads[row, places.POCKET_LOAD] = load
-    loads[row, places.POCKET_CONTACT_LOAD] = contact_load
+    loads[row, state.POCKET_LOAD] = load
+    loads[row, state.POCKET_CONTACT_LOAD] = contact_load
 
 
 @routine

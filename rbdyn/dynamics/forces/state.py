@@ -46,6 +46,8 @@ ROLLER_STATES = len(ROLLER)
 CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(len(BODIES))
 SUPPORT_X, SUPPORT_Y, SUPPORT_VX, SUPPORT_VY = range(len(SUPPORT))
 TIME, INNER_ANGLE, OUTER_ANGLE = range(len(CLOCK))
+# Places of the largest loads in their vector. On a pocket wall: contact and film together, and contact alone.
+POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 
 
 class Layout(NamedTuple):

@@ -23,9 +23,18 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, law, routine
 from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
-from rbdyn.dynamics.forces.places import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
-from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, ROLLER_STATES
+from rbdyn.dynamics.forces.state import (
+    CAGE_VX,
+    CAGE_VY,
+    CAGE_X,
+    CAGE_Y,
+    LOADS,
+    POCKET_CONTACT_LOAD,
+    POCKET_LOAD,
+    ROLLER_STATES,
+)
+from rbdyn.losses import POWERS
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
 # frame [rad/s].

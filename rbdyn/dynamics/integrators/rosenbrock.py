@@ -32,12 +32,12 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import VECTOR, kernel, law, routine
 from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivative_once
-from rbdyn.dynamics.forces.places import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
-from rbdyn.dynamics.forces.state import ROLLER_STATES, Layout
+from rbdyn.dynamics.forces.state import LOADS, ROLLER_STATES, Layout
 from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import DERIVATIVES
+from rbdyn.losses import POWERS
 
 
 class ArrowMatrix(NamedTuple):

@@ -11,11 +11,10 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Notes
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.places import INNER_ROLLING, POWERS, ROLLING
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
 from rbdyn.dynamics.parameters.state import LoadDistribution, load_distribution
 from rbdyn.dynamics.parameters.validity import spin_windage
-from rbdyn.losses import LOSSES, POWER_TERMS
+from rbdyn.losses import INNER_ROLLING, LOSSES, POWER_TERMS, POWERS, ROLLING
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 from rbdyn.scene.thermal import Thermal, inlet_temperature

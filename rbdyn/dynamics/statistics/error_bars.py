@@ -39,11 +39,12 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import quantity as words_of
 from rbdyn.dynamics.figures import FIGURES, WHIRL_SPEED
-from rbdyn.dynamics.forces.places import POCKET_LOAD, SHAFT
+from rbdyn.dynamics.forces.state import POCKET_LOAD
 from rbdyn.dynamics.parameters.state import GROUPS
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_chance, student_factor
 from rbdyn.dynamics.statistics.metrics import Runs, quantity
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic
+from rbdyn.losses import SHAFT
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 

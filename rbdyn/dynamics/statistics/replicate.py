@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.dynamics.forces.places import INNER_ROLLING, LOAD, SHAFT
-from rbdyn.losses import POWER_TERMS
+from rbdyn.losses import INNER_ROLLING, LOAD, POWER_TERMS, SHAFT
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Replicate:
     - ``whirl``: samples, sum and sum of squares of the speed of the cage's centre
     - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
     - ``work``: integrals of the powers in the order of ``POWER_TERMS`` and what follows there
-    - ``largest``: loads in the order of ``forces.places``
+    - ``largest``: loads in the order of ``forces.state``
     - ``energy``: kinetic, elastic and potential energy together, at the ends of batches
     - ``energy_scale``: load of a contact times its approach
     - ``stiffness``: as in ``advance.Carry``
