@@ -32,7 +32,7 @@ LIKELY = 0.5  # chance of keeping all limits at which a point counts as feasible
 LEVELS = 13  # 2^13 levels, of which only those count that something may still gain
 MOST_LEVELS = 1500  # of those
 FRONT_DRAWS = 32  # fronts drawn
-WORTH = 0.25  # of an emulator's variance: as small the scatter of a run is to be
+SCATTER_SHARE = 0.25  # of an emulator's variance: as small the scatter of a run is to be
 NOTICEABLE, LEAST_SHARE = 0.97, 1e-3  # changes of a deviation that are followed, and its least share
 BEYOND = 1.0  # of the range of a cost: as far below the best predicted a level may lie
 
@@ -243,7 +243,7 @@ def batch(
         # The run will also show its neighbours: they are not other chances of the same luck.
         shared = emulators.covariance(candidates, candidates[row])
         shared = shared - np.einsum("rnm,rm->nm", reductions, reductions[:, row])
-        reduction = shared / np.sqrt((1.0 + WORTH) * deviations[row] ** 2)
+        reduction = shared / np.sqrt((1.0 + SCATTER_SHARE) * deviations[row] ** 2)
         reductions = np.concatenate([reductions, reduction[None]])
         deviations = np.maximum(np.sqrt((deviations**2 - reduction**2).clip(0.0)), LEAST_SHARE * used)
         changed = np.flatnonzero((deviations < NOTICEABLE * used).any(axis=1))

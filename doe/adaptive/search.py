@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from doe.adaptive.acquisition import (
     FRONT_DRAWS,
-    WORTH,
+    SCATTER_SHARE,
     Levels,
     Region,
     batch,
@@ -306,7 +306,7 @@ class _Search:
         """As many (n,) as make the scatter of a run small compared with the uncertainty of it."""
         columns = self.goals.objectives
         single, deviations = emulators.scatter(points)[:, columns], emulators.predict(points)[1][:, columns]
-        enough = np.ceil((single / (WORTH * deviations**2)).max(axis=1))
+        enough = np.ceil((single / (SCATTER_SHARE * deviations**2)).max(axis=1))
         return enough.clip(self.plan.least, self.plan.most).astype(np.int64)
 
     def _run(self, points: Array, replicates: Whole) -> Runs:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base import html, terminal
-from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, says
+from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, has_content
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.result import write_json
@@ -115,7 +115,7 @@ class Answer(Mapping[str, Any]):
 
 def _still(section: Section) -> Section:
     """The section without empty blocks and interactive pictures, and with tables for tiles: a cell has no scripts or styles."""
-    blocks = [block for block in section.blocks if says(block) and not isinstance(block, Widget)]
+    blocks = [block for block in section.blocks if has_content(block) and not isinstance(block, Widget)]
     return replace(section, blocks=[block.table if isinstance(block, Tiles) else block for block in blocks])
 
 

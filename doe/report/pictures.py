@@ -120,7 +120,7 @@ def robust_front(front: RobustFront, path: Path) -> None:
         axis.plot(across, up, ".", color="tab:blue", markersize=4, label="predicted by emulators")
         for point, marker in zip(front.confirmed, "*o^v", strict=False):
             x, y = (100.0 * point.gains[responses[place]] for place in (i, j))
-            words = f"{point.name}, simulated: better in all in {100.0 * point.better.all.value:.0f} %"
+            words = f"{point.name}, simulated: better in all in {100.0 * point.chances.all.value:.0f} %"
             color = "tab:red" if marker == "*" else "black"
             axis.plot(x, y, marker, mfc="none", color=color, markersize=9, label=words)
         axis.axhline(0.0, color="tab:gray", linewidth=1.0)

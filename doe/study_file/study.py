@@ -200,7 +200,7 @@ class StudyFile(Consistent):
         tables = {tuple(path[:end]) for path in (key.split(".") for key in keys) for end in range(1, len(path))}
         for key in keys:
             path = tuple(key.split("."))
-            if reason := RUN_KEYS.on(path):
+            if reason := RUN_KEYS.reason_for(path):
                 yield f"factor.key = {key!r}: {reason}"
             elif path in tables:
                 yield f"factor.key = {key!r}: replaces the table of another factor's key; take one of them out"

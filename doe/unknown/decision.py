@@ -55,7 +55,7 @@ LEAST_NOISE = 1e-9  # standard deviation over the size of the values; smaller no
 Hits = Callable[[Array], NDArray[np.bool_]]  # from points (k, m) to whether each hits (k, q)
 
 
-class Better(Record):
+class GainChances(Record):
     """Probability that each gain is positive, by its name, and that all are, with 95 % intervals."""
 
     gains: dict[str, Share] = keyed("better")
@@ -63,14 +63,14 @@ class Better(Record):
 
 
 @one_thread
-def better(names: Sequence[str], gains: Array, variances: Array, seed: int) -> Better:
+def gain_chances(names: Sequence[str], gains: Array, variances: Array, seed: int) -> GainChances:
     """Probabilities that the true gains (n, m) are positive, from simulated gains and their smoothed variances (n, m).
 
     Raw variances of few replicates scatter, and the distribution would follow the noise of a row that seems sure by chance."""
     *alone, every = _likely_shares(
         gains, variances, lambda points: np.column_stack([points > 0.0, (points > 0.0).all(axis=1)]), seed
     )
-    return Better(dict(zip(names, alone, strict=True)), every)
+    return GainChances(dict(zip(names, alone, strict=True)), every)
 
 
 def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> list[Share]:
@@ -152,7 +152,7 @@ def _root(matrix: Array) -> Array:
 def odds(values: Array, variances: Array, lower: float, upper: float, seed: int) -> Share:
     """Probability that the true value of an input set is from ``lower`` to ``upper``; either may be infinite.
 
-    ``values`` (n,) are simulated, with ``variances`` (n,) smoothed over the inputs as in ``better``.
+    ``values`` (n,) are simulated, with ``variances`` (n,) smoothed over the inputs as in ``gain_chances``.
     """
     (share,) = _likely_shares(
         values[:, None], variances[:, None], lambda points: (lower <= points) & (points <= upper), seed
@@ -167,7 +167,7 @@ HALVES, POINTS, FEWER_BINS, AVERAGE_PARTS = 200, 2048, 32, 8
 # Share of resamplings in which an input must be worth most to be decisive, and its normal quantile.
 DECISIVE, DECISIVE_Z = 0.95, 1.645
 # Worth below which no measurement is proposed, and probability of the better choice from which none can be worth much.
-WORTH, NEARLY_ALL = 0.02, 0.9
+LEAST_WORTH, NEARLY_ALL = 0.02, 0.9
 # Share of the worth of the best pair below which an input alone is not decisive.
 ALONE = 0.5
 
@@ -202,7 +202,7 @@ class PairWorth(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Decides:
+class DecisiveInputs:
     """Unknown inputs by their worth.
 
     inputs : the best first
@@ -344,7 +344,7 @@ def _averaging(members: sparse.csr_array) -> sparse.csr_array:
 
 
 @one_thread
-def decides(
+def decisive_inputs(
     quantiles: Array,
     gains: Array,
     variances: Array,
@@ -352,7 +352,7 @@ def decides(
     seed: int,
     read: Array | None = None,
     knowable: Sequence[int] | None = None,
-) -> Decides:
+) -> DecisiveInputs:
     """Which inputs are decisive, from rows at quantiles (n, d) of the inputs, the last of which does nothing.
 
     gains, variances : (n, m); variances are smooth over the inputs
@@ -389,7 +389,7 @@ def decides(
     )
     measured = _measured(places, by)
     p = float(better.mean())
-    return Decides(
+    return DecisiveInputs(
         measured.inputs,
         measured.pair,
         [gain.explained for gain in gains_at],
@@ -471,7 +471,7 @@ class _Measured:
         if not self.pairs.values.size:
             return None
         best, again = int(self.pairs.values.argmax()), self.pairs.again
-        more = again[:, best] > self.worths.again.max(axis=1) + WORTH
+        more = again[:, best] > self.worths.again.max(axis=1) + LEAST_WORTH
         if ((again.argmax(axis=1) == best) & more).mean() < DECISIVE:
             return None
         low, high = self.pairs.ends[:, best].clip(0.0).tolist()
@@ -482,7 +482,7 @@ class _Measured:
 
         ``p``: probability that all gains are positive; ``count``: number of rows.
         """
-        if not self.places or self.worths.ends[1].max() < WORTH:
+        if not self.places or self.worths.ends[1].max() < LEAST_WORTH:
             return "nothing", [], float(count)
         # The last is the input that does nothing.
         again = np.column_stack([self.worths.again, np.zeros(len(self.worths.again))])

@@ -86,7 +86,11 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     documented_keys, law_keys = {entry.key for entry in documented()}, set(uncertain.laws)
     override_claims = Claims({key_path(override): override for override in uncertain.assignments})
     refuse(
-        [f"{data}: column {key}: {reason}" for key in rig.keys if (reason := RUN_KEYS.on(tuple(key.split("."))))]
+        [
+            f"{data}: column {key}: {reason}"
+            for key in rig.keys
+            if (reason := RUN_KEYS.reason_for(tuple(key.split("."))))
+        ]
         + [f"{data}: column {fault}" for fault in first_guess_faults(base.thermal, base.lubricant, rig.keys)]
         + [
             f"{data}: column {key} is a target too ({path}: uncertain or --free); take it out of one of them"
@@ -101,7 +105,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         + [
             f"--free {key}: uncertain.set gives its value; take it out there"
             for key in free
-            if override_claims.on(tuple(key.split(".")))
+            if override_claims.reason_for(tuple(key.split(".")))
         ]
     )
     estimated = [*uncertain.estimated, *(key for key in free if key not in law_keys)]

@@ -124,9 +124,9 @@ class Case:
         keys = {unknown_input.key for unknown_input in inputs}
         # A fixed input that multiplies a varying one keeps its ratio to that.
         tied_values = {
-            key: own_value / value_of(self.ran, law.times)
+            key: own_value / value_of(self.scene_of_sets, law.times)
             for key, law in by_key.items()
-            if key not in keys and law.times in keys and is_number(own_value := value_of(self.ran, key))
+            if key not in keys and law.times in keys and is_number(own_value := value_of(self.scene_of_sets, key))
         }
         shared = self.tables(overrides)
         scenes: list[Scene | str] = []
@@ -150,7 +150,7 @@ class Case:
         return tables
 
     @cached_property
-    def ran(self) -> Scene:
+    def scene_of_sets(self) -> Scene:
         """The scene of input sets with all inputs at the scene's values. Raises InputError."""
         return rollers_only(Scene.from_dict(self.tables(), f"{self.home}: uncertain.set"))
 
@@ -162,11 +162,11 @@ class Case:
     @property
     def replicates(self) -> int:
         """Replicates of a run."""
-        return self.ran.numerics.replicates
+        return self.scene_of_sets.numerics.replicates
 
     def unit(self, unknown_input: Input) -> float:
         """Factor on the numbers of an input's law: the value of the key that it multiplies, or 1."""
-        return 1.0 if unknown_input.law.times is None else float(value_of(self.ran, unknown_input.law.times))
+        return 1.0 if unknown_input.law.times is None else float(value_of(self.scene_of_sets, unknown_input.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
         """The joint distribution of the inputs. Raises InputError if correlations contradict each other."""
@@ -212,7 +212,9 @@ def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Ma
     }
     claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})
-    refuse(f"--set {override}: {reason}" for override in overrides if (reason := claimed.on(key_path(override))))
+    refuse(
+        f"--set {override}: {reason}" for override in overrides if (reason := claimed.reason_for(key_path(override)))
+    )
 
 
 def override_notes(case: Case, overrides: Sequence[str], runs: str = "") -> list[Note]:
@@ -272,18 +274,20 @@ def case_of(
     plain = clearance.undeclared(data, scene)
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
-    inputs = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
+    inputs = inputs_of(case.scene_of_sets, case.tables(), uncertain, fixed, columns, str(home))
     if not inputs:
         fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
         raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
     keys = {unknown_input.key for unknown_input in inputs}
-    inputs_without_set = inputs_of(case.ran, plain, uncertain, fixed, columns)
+    inputs_without_set = inputs_of(case.scene_of_sets, plain, uncertain, fixed, columns)
     by_set = [unknown_input.key for unknown_input in inputs_without_set if unknown_input.key not in keys]
     active = keys | fixed.keys() | {*by_set, *MARKING}
     idle_keys = [key for key in uncertain.estimated if key not in active]
     doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
     constant = {*by_set, *fixed, *keys}
-    exact = [entry.key for entry in documented_of(case.ran) if not entry.on_request and entry.key not in constant]
+    exact = [
+        entry.key for entry in documented_of(case.scene_of_sets) if not entry.on_request and entry.key not in constant
+    ]
     case = replace(
         case,
         every=inputs,

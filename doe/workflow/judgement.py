@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from doe.running.store import Failure
-from doe.unknown.decision import Better, Interval, Verdict
+from doe.unknown.decision import GainChances, Interval, Verdict
 from doe.unknown.propagation import Share
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, outside_json, spread
@@ -34,7 +34,7 @@ class RobustPoint(Record):
     reason: str
     factors: dict[str, float]
     gains: dict[str, float]
-    better: Better = spread()
+    chances: GainChances = spread()
 
 
 class RobustFront(Record):
@@ -88,7 +88,7 @@ class Decision:
 class Robust(Record, kw_only=True):
     """The robust judgement of the pick over all unknown ``inputs``.
 
-    ``better``: how likely each gain and all gains are. ``decides``: deciding inputs by worth, where one of them is surely the
+    ``chances``: how likely each gain and all gains are. ``decides``: deciding inputs by worth, where one of them is surely the
     first; ``undecided``: the sentence where none is; ``pair``: the two that are worth most together. ``explained``: share of each gain's
     variance that the inputs predict. ``halved``: the probability of all gains if the ranges of the inputs were half as wide.
     ``front``: the robust front, None if the study asks for none.
@@ -99,7 +99,7 @@ class Robust(Record, kw_only=True):
     keeps its limits.
     """
 
-    better: Better = spread()
+    chances: GainChances = spread()
     decides: list[Decider] = field(default_factory=list)
     undecided: str | None
     pair: Pair | None
@@ -119,8 +119,8 @@ class Robust(Record, kw_only=True):
 
 def worded(robust: Robust, decision: Decision, notes: Notes = ()) -> Robust:
     """The judgement with its sentences: the odds of the pick, the decisive input, the effect of the ranges, a safer point."""
-    chances = ", ".join(f"{quantity(name)[0]} {share.of_hundred} %" for name, share in robust.better.gains.items())
-    every = robust.better.all
+    chances = ", ".join(f"{quantity(name)[0]} {share.of_hundred} %" for name, share in robust.chances.gains.items())
+    every = robust.chances.all
     statement = "hold over" if every.value >= NEARLY_ALL else "depend on"
     undecided = _undecided(robust, decision) if decision.verdict == "undecided" else None
     sure = [decider for decider in decision.inputs if decider.worth > LEAST and decision.verdict == "decided"]
@@ -140,10 +140,10 @@ def _of_front(robust: Robust) -> list[str]:
     if front is None or not front.confirmed:
         return [] if front is None else [f"Robust front: {front.note}."]
     pick, *others = front.confirmed
-    best = max(others, key=lambda point: point.better.all.value)
+    best = max(others, key=lambda point: point.chances.all.value)
     lost = [quantity(name)[0] for name, q2 in front.q2.items() if q2 < EXPLAINED]
     doubt = f"; the emulators predict little of {' and '.join(lost)}, so a better one may exist" if lost else ""
-    if best.better.all.value <= pick.better.all.value:
+    if best.chances.all.value <= pick.chances.all.value:
         return [
             f"No simulated point of the robust front is better in all responses in more cases than the pick{doubt}."
         ]
@@ -151,8 +151,8 @@ def _of_front(robust: Robust) -> list[str]:
         f"{quantity(name)[0]} {shown(x)} {quantity(name)[1]}".rstrip() for name, x in best.factors.items()
     )
     return [
-        f"Safer alternative: {place} (better in all responses in {best.better.all.of_hundred} of 100 cases; the pick at the "
-        f"same input sets in {pick.better.all.of_hundred}){doubt}."
+        f"Safer alternative: {place} (better in all responses in {best.chances.all.of_hundred} of 100 cases; the pick at the "
+        f"same input sets in {pick.chances.all.of_hundred}){doubt}."
     ]
 
 
@@ -195,7 +195,7 @@ def _undecided(robust: Robust, decision: Decision) -> str:
 
 def _nothing(robust: Robust, decision: Decision) -> str:
     """The sentence that no input is worth measuring, with the most that any could be worth."""
-    p = robust.better.all.value
+    p = robust.chances.all.value
     most = min(max((decider.worth_interval[1] for decider in decision.inputs), default=0.0), 1.0 - max(p, 1.0 - p))
     return (
         "No measurement of one unknown is worth making: it would raise the chance of the right choice by at most "

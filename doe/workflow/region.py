@@ -45,7 +45,7 @@ WIDER_K = (0.0, 60.0, 120.0)
 # Difference of temperatures [K] by which a moved region stays above the floors: those at another centre differ a little.
 SPARE_K = 2.5
 # Share of all that is taken from which a cause is named.
-NAMED = 0.2
+LEAST_CHANGE = 0.2
 # Difference of temperatures [K] between two parts that is left at a point of the duty, below which its least corner is balanced.
 FEW_K = 30.0
 # By how much more a region moves [K] where that corner seizes by its own heat.
@@ -99,7 +99,7 @@ class Taken(NamedTuple):
         play = self.running.play
         changes = {"fits": play.fit, "heat": play.temperature, "rotation": play.rotation}
         taken = play.drawn - play.operating
-        names = [name for name, change in changes.items() if -change > NAMED * abs(taken)]
+        names = [name for name, change in changes.items() if -change > LEAST_CHANGE * abs(taken)]
         takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
         rest = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
         rest += " and heat itself until it closes" if self.hotter else ""

@@ -20,7 +20,7 @@ from doe.running.runner import Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown import inputs as unknown
-from doe.unknown.decision import Decides, InputWorth, better, decides, in_doubt, odds, shrunk
+from doe.unknown.decision import DecisiveInputs, InputWorth, decisive_inputs, gain_chances, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
 from doe.unknown.propagation import Emulated, Runs, Share, emulated
 from doe.workflow.input_sets import (
@@ -188,7 +188,7 @@ def find_robust_front(
     for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
         gains, variances = fresh_pairs.gains(goals, number)
         gained = dict(zip(names, _over_inputs(shrunk(gains, variances), share).tolist(), strict=True))
-        odds_of_gains = better(names, gains, variances, case.uncertain.seed)
+        odds_of_gains = gain_chances(names, gains, variances, case.uncertain.seed)
         confirmed.append(RobustPoint(name, reason, study.by_factor(point), gained, odds_of_gains))
     # The baseline and the pick ran before at the sets that are the study's own.
     spent += CONFIRMED * (len(candidates) - 1) + 2 * int((rows >= settings.points).sum())
@@ -343,7 +343,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     inputs, columns = [case.every[place] for place in places], [*places, -1]
     fresh_sets = joint.sets(FRESH, seed + 1)[:, columns]
     knowable = [place for place, unknown_input in enumerate(inputs) if unknown_input.law.kind == "unknown"]
-    analysis = decides(
+    analysis = decisive_inputs(
         pairs.quantiles[:, columns],
         gains,
         variances,
@@ -356,10 +356,10 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, new_failures = find_robust_front(study, case, pairs, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *new_failures)
-    odds_of_gains = better(names, gains, variances, seed)
+    odds_of_gains = gain_chances(names, gains, variances, seed)
     pair, decision = _decision_by_keys(case, inputs, analysis)
     robust = Robust(
-        better=odds_of_gains,
+        chances=odds_of_gains,
         undecided=None,
         pair=pair,
         halved=min(max(odds_of_gains.all.value + analysis.halved, 0.0), 1.0),
@@ -443,7 +443,7 @@ def _input_readings(case: Case, inputs: Sequence[Input], fresh: Array, seed: int
     return readings
 
 
-def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: Decides) -> tuple[Pair | None, Decision]:
+def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: DecisiveInputs) -> tuple[Pair | None, Decision]:
     """The best pair and the decision, by keys and values of the inputs."""
 
     def decider(deciding: InputWorth) -> Decider:

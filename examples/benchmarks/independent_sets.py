@@ -131,7 +131,7 @@ def chances(study: Problem, base: np.ndarray, pick: np.ndarray, tool: Mapping[in
     side = [1.0 if goals[name] == "max" else -1.0 for name in names]
     columns = [OUTPUTS.index(name) for name in names]
     wins = (pick - base)[:, columns] * side > 0.0
-    stated = {seed: [*each.better.gains, each.better.all] for seed, each in tool.items()}
+    stated = {seed: [*each.chances.gains, each.chances.all] for seed, each in tool.items()}
     for place, name in enumerate([*names, "all"]):
         won = wins.all(axis=1) if place == len(names) else wins[:, place]
         parts = [f"{name:24}", _chance(float(won.mean()), *wilson(float(won.mean()), len(won)))]

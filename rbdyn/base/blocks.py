@@ -182,7 +182,7 @@ def with_notes(notes: Iterable[Note | Mapping[str, Any]], blocks: Iterable[Block
     return [Verdict(every, judged), *blocks, Remarks(every)]
 
 
-def says(block: Block) -> bool:
+def has_content(block: Block) -> bool:
     """Whether a block has content: a table rows, a list items, a paragraph words."""
     match block:
         case Table(rows=content) | Bullets(items=content) | Tiles(tiles=content) | Figures(pictures=content):

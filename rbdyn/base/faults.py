@@ -411,7 +411,7 @@ class Claims:
         self._reasons = reasons
         self._within = {path[:end]: reason for path, reason in reasons.items() for end in range(1, len(path))}
 
-    def on(self, path: tuple[str, ...]) -> str | None:
+    def reason_for(self, path: tuple[str, ...]) -> str | None:
         """Reason of the claim on a key, a table around it or a key within it; None without a claim."""
         whole = (self._reasons[path[:end]] for end in range(1, len(path) + 1) if path[:end] in self._reasons)
         return next(whole, self._within.get(path))
@@ -425,7 +425,7 @@ def assignment_faults(name: str, assignments: Sequence[str], claims: Mapping[tup
     faults, claimed, before = list[str](), Claims(claims), set[tuple[str, ...]]()
     for assignment in assignments:
         path = key_path(assignment)
-        reason = claimed.on(path) if path else "write it as key.path=value"
+        reason = claimed.reason_for(path) if path else "write it as key.path=value"
         if path in before:
             reason = "replaces an earlier assignment of this list; keep one of them"
         if reason:

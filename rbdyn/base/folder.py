@@ -31,7 +31,7 @@ T = TypeVar("T")
 MARK, PARTIAL = "made_by.json", ".made_by.partial"
 OWN = {MARK, PARTIAL, lock.NAME, f"{lock.NAME}-journal"}
 # Most names in a sentence.
-NAMED = 3
+FILES_NAMED = 3
 
 
 class OutputFolder:
@@ -280,5 +280,5 @@ def _newest(stage: Path) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{', '.join(names[:NAMED])}{more}"
+    more = f" and {len(names) - FILES_NAMED} more" if len(names) > FILES_NAMED else ""
+    return f"{', '.join(names[:FILES_NAMED])}{more}"

@@ -18,7 +18,7 @@ from rbdyn.base.blocks import (
     Tiles,
     Verdict,
     Widget,
-    says,
+    has_content,
 )
 
 # Classes of the style sheet by the role of a paragraph.
@@ -28,7 +28,7 @@ CLASSES = {"": "", "small": ' class="note"'} | {role: f' class="{role}"' for rol
 def section(part: Section, widget: Callable[[str], str] = lambda name: "") -> str:
     """A section with its heading; ``widget`` writes the place of a named interactive picture."""
     body = []
-    blocks = [block for block in part.blocks if says(block)]
+    blocks = [block for block in part.blocks if has_content(block)]
     # Small tables that follow each other are set next to each other where there is room.
     for together, group in groupby(blocks, lambda block: isinstance(block, Table) and not block.folded):
         pieces = [widget(block.name) if isinstance(block, Widget) else render(block) for block in group]

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rbdyn.base import html
-from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict, says
+from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict, has_content
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import Identity, identity_line, identity_table
 from rbdyn.base.vector import vector_copies
@@ -87,7 +87,7 @@ def page(
 
 def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
     """Page of a result: its verdict, its blocks at every detail with long tables folded, its pictures (SVG by name), its identity."""
-    opening = "".join(html.render(block) for block in blocks if isinstance(block, Verdict) and says(block))
+    opening = "".join(html.render(block) for block in blocks if isinstance(block, Verdict) and has_content(block))
     blocks = [_folded(block) for block in blocks if not isinstance(block, Verdict)]
     drawn = [Figures([picture], name) for name, picture in pictures.items()]
     parts = [

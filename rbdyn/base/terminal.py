@@ -8,7 +8,19 @@ from collections.abc import Iterable, Sequence
 from textwrap import shorten, wrap
 from typing import NamedTuple
 
-from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Tiles, Verdict, says
+from rbdyn.base.blocks import (
+    ALARMS,
+    Block,
+    Bullets,
+    Detail,
+    Heading,
+    Paragraph,
+    Remarks,
+    Table,
+    Tiles,
+    Verdict,
+    has_content,
+)
 from rbdyn.base.notes import CODES, DANGER, NOTE, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
@@ -41,7 +53,7 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
     bold : whether headings, captions and warnings are in bold type.
     """
     page = Page(width, bold)
-    shown = [block for block in blocks if block.detail <= detail and says(block)]
+    shown = [block for block in blocks if block.detail <= detail and has_content(block)]
     written = ""
     for block in sorted(shown, key=lambda block: not isinstance(block, Verdict)):
         titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)

@@ -155,14 +155,14 @@ class NamedOil(NamedTuple):
     grease: bool = False
 
 
-NAMED = re.compile(r"(grease\s+)?(?:iso\s*)?vg\s*-?(\d{1,4})\s*([a-z]*)", re.IGNORECASE | re.ASCII)
+VISCOSITY_GRADE = re.compile(r"(grease\s+)?(?:iso\s*)?vg\s*-?(\d{1,4})\s*([a-z]*)", re.IGNORECASE | re.ASCII)
 NUMBERS = {"7808": "MIL-L-7808", "23699": "MIL-L-23699", "85734": "MIL-L-85734"}
 
 
 def oil_named(text: str) -> NamedOil:
     """The oil of a text such as "ISO VG 32", "VG 15 PAO", "grease VG 100 mineral", "23699" or "Jet Oil II". Raises MethodError."""
     plain = " ".join(text.split())
-    if graded := NAMED.fullmatch(plain):
+    if graded := VISCOSITY_GRADE.fullmatch(plain):
         grease, grade, base = graded.groups()
         bases = {name.lower(): name for name in BASE_OILS}
         if int(grade) in GRADES and (not base or base.lower() in bases):

@@ -111,7 +111,7 @@ def inputs_of(
     faults += [
         f'uncertain."{key}": is {role} too; remove it from one of them'
         for key in keys
-        if (role := others.on(tuple(key.split("."))))
+        if (role := others.reason_for(tuple(key.split("."))))
     ]
     faults += [
         f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; remove it'
@@ -132,7 +132,7 @@ def inputs_of(
         Input(entry.key, entry.as_law, entry.reason)
         for entry in documented_of(scene)
         if entry.key not in keys
-        and others.on(tuple(entry.key.split("."))) is None
+        and others.reason_for(tuple(entry.key.split("."))) is None
         and (
             entry.key in uncertain.estimated
             or (uncertain.defaults == "documented" and not entry.on_request and not _has_entry(data, entry.key))

@@ -314,8 +314,8 @@ def judgement(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Any]:
 def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Problem, Any]) -> None:
     _, found = judgement
     imbalance, mass = found.decision.inputs
-    assert all(found.better.gains[name].value > 0.98 for name in ("impact_force_N", "power_loss_W"))
-    assert found.better.all.value == pytest.approx(0.4, abs=0.05)
+    assert all(found.chances.gains[name].value > 0.98 for name in ("impact_force_N", "power_loss_W"))
+    assert found.chances.all.value == pytest.approx(0.4, abs=0.05)
     assert imbalance.key == "cage.imbalance_um" and imbalance.flip == pytest.approx(20.0, abs=1.5)
     assert imbalance.worth == pytest.approx(0.4, abs=0.05) and not imbalance.pick_above
     assert mass.worth < 0.02 and mass.flip is None
@@ -376,7 +376,7 @@ def test_doubtful_rows_get_more_replicates_within_the_share_allowed(tmp_path: Pa
     assert set(simulations.replicates) == {2, 4, 8}
     assert 768 < found.runs <= 1280
     assert sum(simulations.replicates) / 2 == found.runs
-    assert found.better.all.value == pytest.approx(0.4, abs=0.12)
+    assert found.chances.all.value == pytest.approx(0.4, abs=0.12)
 
 
 ALL_VARY = """
@@ -405,8 +405,8 @@ def test_inputs_without_an_effect_on_levels_still_count(tmp_path: Path) -> None:
     study = _study(tmp_path, ALL_VARY)
     found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Rest(0.001))  # type: ignore[arg-type]
     assert len(found.inputs) == 23 and len(found.screened) == 21 and "cage.imbalance_um" not in found.screened
-    assert found.better.all.value == pytest.approx(0.25, abs=0.04)
-    assert found.better.all.low < 0.25 < found.better.all.high
+    assert found.chances.all.value == pytest.approx(0.25, abs=0.04)
+    assert found.chances.all.low < 0.25 < found.chances.all.high
     named = {each.key for each in found.inputs} - set(found.screened) - {"cage.imbalance_um"}
     assert named <= {"cage.pocket_contact_length_mm", "lubricant.oil_fraction"}
     (other,) = {"cage.pocket_contact_length_mm", "lubricant.oil_fraction"} - named
@@ -557,7 +557,7 @@ def test_robust_front_keeps_what_it_promises(tmp_path: Path, kind: str) -> None:
     pick, surest, *_ = found.confirmed
     assert (pick.name, surest.name) == ("pick", "robust surest")
     # The pick's guide costs more whirl than its pocket gains where the imbalance is above 12.5 um.
-    assert pick.better.all.value == pytest.approx(0.25, abs=0.05) and surest.better.all.value > 0.98
+    assert pick.chances.all.value == pytest.approx(0.25, abs=0.05) and surest.chances.all.value > 0.98
     for each in found.confirmed:
         _, guide_mm, pocket_mm = each.factors.values()
         x, y = 0.3 - pocket_mm, guide_mm - 0.15

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from doe.emulator import pooled_variances
-from doe.unknown.decision import Decides, decides
+from doe.unknown.decision import DecisiveInputs, decisive_inputs
 from doe.unknown.inputs import nested
 from rbdyn.base.arrays import Array
 
@@ -80,12 +80,12 @@ class Known:
     inputs: int
     noise: float
 
-    def decide(self, pairs: int, seed: int) -> Decides:
+    def decide(self, pairs: int, seed: int) -> DecisiveInputs:
         """What so many pairs make of it."""
         quantiles = nested(self.inputs + 1, pairs, 1000 + seed)
         gains, variances, freedom = noisy(self.gains(quantiles[:, :-1]), self.noise, seed)
         fresh = nested(self.inputs + 1, FRESH, 5000 + seed)
-        return decides(quantiles, gains, smooth(quantiles, variances, freedom), fresh, seed)
+        return decisive_inputs(quantiles, gains, smooth(quantiles, variances, freedom), fresh, seed)
 
     def truth(self, slices: int = 128) -> tuple[Array, Array]:
         """Worths (d,) and flips (d,) of all inputs by half a million sets, without noise or emulator; not a number where the

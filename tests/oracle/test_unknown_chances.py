@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.unknown.decision import _shares, better, odds
+from doe.unknown.decision import _shares, gain_chances, odds
 
 ROWS = 128
 
@@ -45,7 +45,10 @@ def test_chance_of_gains_of_any_form(kind: str) -> None:
 
 def test_odds_of_a_limit_are_of_any_form_too() -> None:
     gains, variances = gains_with_noise("skewed", 0.6, 1)
-    chance, limit = better("a", gains, variances, 1).gains["a"], odds(gains[:, 0], variances[:, 0], 0.0, np.inf, 1)
+    chance, limit = (
+        gain_chances("a", gains, variances, 1).gains["a"],
+        odds(gains[:, 0], variances[:, 0], 0.0, np.inf, 1),
+    )
     assert limit.value == pytest.approx(chance.value, abs=0.04)
     nothing = odds(np.full(20, 3.0), np.zeros(20), 0.0, 2.0, 1)
     assert nothing.value == 0.0 and nothing.high < 0.2
@@ -56,7 +59,7 @@ def test_odds_of_a_limit_are_of_any_form_too() -> None:
 @pytest.mark.parametrize("kind", CHANCE)
 def test_intervals_of_chances_cover_gains_of_any_form(kind: str, noise: float) -> None:
     """In 60 samples each; noise as large as the scatter of the gains, for rare bad cases over three times that."""
-    found = [better("a", *gains_with_noise(kind, noise, seed), seed).gains["a"] for seed in range(60)]
+    found = [gain_chances("a", *gains_with_noise(kind, noise, seed), seed).gains["a"] for seed in range(60)]
     held = np.mean([share.low <= CHANCE[kind] <= share.high for share in found])
     bias = np.mean([share.value for share in found]) - CHANCE[kind]
     print(f"{kind}, noise {noise:g}: coverage {held:.3f}, bias {bias:+.3f}")

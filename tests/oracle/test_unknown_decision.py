@@ -5,7 +5,7 @@ import pytest
 from decisions import noisy, smooth
 from scipy import stats
 
-from doe.unknown.decision import _shares, better, decides, in_doubt
+from doe.unknown.decision import _shares, decisive_inputs, gain_chances, in_doubt
 from doe.unknown.inputs import nested
 from rbdyn.base.estimate import wilson
 
@@ -16,7 +16,7 @@ def test_noise_is_taken_off_the_share_of_cases() -> None:
     truth = 1.0 + stats.norm.ppf(quantiles)
     gains, *rest = noisy(truth, 2.0, 1)
     assert float((gains > 0.0).mean()) == pytest.approx(0.67, abs=0.03)
-    found = better("ab"[: gains.shape[1]], gains, smooth(quantiles, *rest), 1)
+    found = gain_chances("ab"[: gains.shape[1]], gains, smooth(quantiles, *rest), 1)
     assert found.gains["a"].value == pytest.approx(chance, abs=0.04)
     assert found.gains["a"].low < chance < found.gains["a"].high
 
@@ -37,7 +37,7 @@ def test_gains_that_go_together_are_not_multiplied() -> None:
     quantiles = nested(1, 256, 2)
     one = stats.norm.ppf(quantiles)
     gains, *rest = noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
-    found = better("ab"[: gains.shape[1]], gains, smooth(quantiles, *rest), 1)
+    found = gain_chances("ab"[: gains.shape[1]], gains, smooth(quantiles, *rest), 1)
     assert found.all.value == pytest.approx(0.5, abs=0.03)
     assert [each.value for each in found.gains.values()] == pytest.approx([0.5, 0.5], abs=0.03)
 
@@ -49,7 +49,7 @@ def test_intervals_of_shares_cover() -> None:
         random = np.random.default_rng(seed)
         quantiles = random.random((128, 1))
         gains, *rest = noisy(0.5 + stats.norm.ppf(quantiles), 0.5, seed)
-        share = better("a", gains, smooth(quantiles, *rest), seed).gains["a"]
+        share = gain_chances("a", gains, smooth(quantiles, *rest), seed).gains["a"]
         held.append(share.low <= stats.norm.cdf(0.5) <= share.high)
     assert np.mean(held) >= 0.9
 
@@ -58,9 +58,9 @@ def test_a_design_that_always_wins_is_sure_within_its_rows() -> None:
     quantiles = nested(3, 256, 3)
     gains, *rest = noisy(np.full((256, 2), 0.2), 0.02, 3)
     variances = smooth(quantiles, *rest)
-    found = better("ab"[: gains.shape[1]], gains, variances, 1)
+    found = gain_chances("ab"[: gains.shape[1]], gains, variances, 1)
     assert found.all.value > 0.98 and found.all.low > 0.97
-    sure = decides(quantiles, gains, variances, nested(3, 4096, 4), 1)
+    sure = decisive_inputs(quantiles, gains, variances, nested(3, 4096, 4), 1)
     assert all(each.worth < 0.01 for each in sure.inputs)
     assert in_doubt(gains, variances).size == 0
 

@@ -24,7 +24,7 @@ from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.sections.record import change, scalars
 from doe.report.still import Still
-from doe.unknown.decision import Better
+from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
 from doe.workflow.judgement import Robust, RobustFront, RobustPoint
 from doe.workflow.pick import BeyondBound, Outward
@@ -356,10 +356,10 @@ def test_the_odds_of_the_gains_follow_these():
         "Of 100 cases the pick is better in all of these in 57 (51 to 63): the gains depend on what is not known."
     )
     better = dict.fromkeys(names, Share(0.8, 0.7, 0.9))
-    odds, factors = Better(better, Share(0.57, 0.51, 0.63)), dict.fromkeys(FACTORS, 0.1)
+    odds, factors = GainChances(better, Share(0.57, 0.51, 0.63)), dict.fromkeys(FACTORS, 0.1)
     front = RobustFront([], [RobustPoint("robust knee", "", factors, dict.fromkeys(names, 0.031), odds)], {})
     robust = Robust(
-        better=odds, undecided=None, pair=None, halved=0.6, front=front, explained=dict.fromkeys(names, 0.9), inputs=[],
+        chances=odds, undecided=None, pair=None, halved=0.6, front=front, explained=dict.fromkeys(names, 0.9), inputs=[],
         screened={}, pairs=128, runs=256, doubtful=0, sentences=[sentence],
     )  # fmt: skip
     record = summary() | {"robust": robust.as_dict()}

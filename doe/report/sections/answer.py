@@ -88,7 +88,7 @@ def _gained(summary: Summary) -> list[Block]:
     text, robust = summary.statement, summary.robust
     sentences = robust.sentences if robust else []
     # Only the first two sentences are verdicts: the odds of the gains, and what decides.
-    first: Role = "statement" if robust and robust.better.all.value >= NEARLY_ALL else "warning"
+    first: Role = "statement" if robust and robust.chances.all.value >= NEARLY_ALL else "warning"
     second: Role = "warning" if robust and robust.undecided else ""
     further: list[Role] = [""] * len(sentences)
     return [
@@ -198,8 +198,8 @@ def _robust_points(summary: Summary) -> Table:
         [
             point.name.removeprefix("robust "),
             *(factor.text(point.factors[factor.name], 1) for factor in inputs),
-            *(_gain_and_share(point.gains.get(name), point.better.gains.get(name)) for name in names),
-            _gain_and_share(None, point.better.all),
+            *(_gain_and_share(point.gains.get(name), point.chances.gains.get(name)) for name in names),
+            _gain_and_share(None, point.chances.all),
         ]
         for point in (front.confirmed if front else ())
     ]

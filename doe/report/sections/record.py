@@ -11,7 +11,7 @@ from typing import Any
 
 from doe.pareto.manufacture import Interval, percent
 from doe.workflow.asked import Asked, Factor
-from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, says
+from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import improvement, label, quantity, shown
 
@@ -96,7 +96,7 @@ def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]
     # The longest first, for a name may begin with another.
     words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
     ratios = {label(each.name): each.label for each in (asked.responses if asked else ()) if each.is_ratio}
-    return [_without_unit(_spelt(block, words), ratios) for block in blocks if says(block)]
+    return [_without_unit(_spelt(block, words), ratios) for block in blocks if has_content(block)]
 
 
 def notes_of(summary: Record) -> Notes:

@@ -64,10 +64,10 @@ def _odds(robust: Robust) -> Table:
     """Probability of each gain, and the share of its variance over the inputs that the emulators explain."""
     rows = [
         (quantity(name)[0], share.of_hundred, _percent(robust.explained[name]))
-        for name, share in robust.better.gains.items()
+        for name, share in robust.chances.gains.items()
     ]
     header = ("response", "pick better in 100 cases", "explained by the inputs")
-    every = ("all of these", robust.better.all.of_hundred, "")
+    every = ("all of these", robust.chances.all.of_hundred, "")
     return Table("Odds that the pick is better than the original", header, [*rows, every])
 
 

@@ -15,7 +15,7 @@ from rbdyn.result import write_json
 from rbdyn.scene.unknown import UnknownInput
 
 # Most inputs that a sentence names, and the least share of one.
-NAMED, WORTH = 2, 0.1
+CAUSES_NAMED, LEAST_SHARE_NAMED = 2, 0.1
 RANGES: tuple[Column[OutputRange], ...] = (
     Column("output", at="name", cell=lambda output: quantity(output.name)[0], meaning="figure"),
     Column("value", at=("nominal", "value"), screen=False, meaning="value as the scene says, with its 95 % error"),
@@ -114,10 +114,10 @@ def range_sentence(output: OutputRange) -> str:
 def _causes(output: OutputRange) -> str:
     if output.floor is None:
         return "the decisive input is unknown"
-    least = max(output.floor.high, WORTH)
+    least = max(output.floor.high, LEAST_SHARE_NAMED)
     ranked = sorted(((share, key) for key, share in output.shares.items() if share.value > least), reverse=True)
     return (
-        " and ".join(f"{key} causes {100.0 * share.value:.0f} %" for share, key in ranked[:NAMED])
+        " and ".join(f"{key} causes {100.0 * share.value:.0f} %" for share, key in ranked[:CAUSES_NAMED])
         or "no input dominates"
     )
 

@@ -17,7 +17,7 @@ from rbdyn.base.tables.decimal_marks import Exact
 from rbdyn.base.tables.workbook_parts import DamageError, Parts
 from rbdyn.base.words import counted
 
-NAMED = re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)
+SHEET_PATH = re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)
 SUFFIXES = (".xlsx", ".xlsm")
 # First bytes of a zip archive, which an .xlsx is, and of an old or encrypted workbook.
 ARCHIVE, OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
@@ -61,7 +61,7 @@ class _Book(NamedTuple):
 
 def split_path(path: Path) -> tuple[Path, str | None]:
     """The file of a path, and the sheet that ``file.xlsx:Sheet`` names, if any."""
-    named = None if path.exists() else NAMED.fullmatch(str(path))
+    named = None if path.exists() else SHEET_PATH.fullmatch(str(path))
     return (Path(named[1]), named[2]) if named else (path, None)
 
 
