@@ -3,11 +3,10 @@
 from rbdyn.base.loading import Loading
 
 with Loading():
+    from doe.commands.functions import calibrate, chain, design, fit, front, study, uncertainty
     from doe.commands.keys import keys
     from doe.commands.new import new
-    from doe.commands.steps import chain, design, fit, front
-    from doe.commands.study import status, study
-    from doe.commands.unknown import calibrate, uncertainty
+    from doe.commands.status import status
     from rbdyn.base import streams
     from rbdyn.base.command import Program, Version
 

@@ -1,15 +1,32 @@
-"""Options of several commands, and what they print while runs go on and after these."""
+"""Commands made of the functions of the library, options of several of them, and what they print while runs go on."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rbdyn.base.command import checkpoint_message, flag, folder_option, progress_bar, valued
+from rbdyn.base.blocks import Detail
+from rbdyn.base.command import (
+    FAILED,
+    alarm,
+    checkpoint_message,
+    flag,
+    folder_option,
+    guarded,
+    notice,
+    print_json,
+    progress_bar,
+    valued,
+)
+from rbdyn.base.records import plain
+from rbdyn.base.terminal import show
 
 if TYPE_CHECKING:
+    from doe.library.answer import Answer
     from doe.running.runner import Progress
 
 
@@ -70,3 +87,65 @@ def bars(quiet: bool) -> "Iterator[Callable[[str, int, int], None]]":
             bar(done, total)
 
         yield progress
+
+
+def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callable[..., None]:
+    """The command of the function ``name`` of ``doe``; ``about`` is its help.
+
+    ``options``: annotation of each parameter that is an option, in their order; ``quiet``, ``verbose`` and ``as_csv`` say what is
+    printed. ``kept``: results are always in a folder, by default of the file's name and this. The function's own defaults hold for
+    what is not stated.
+    """
+
+    def run(*stated: Any, **named: Any) -> None:
+        given = run.__signature__.bind(*stated, **named)  # type: ignore[attr-defined]
+        given.apply_defaults()
+        values = given.arguments
+        as_json, as_csv, *levels = (values.pop(key, False) for key in ("as_json", "as_csv", "quiet", "verbose"))
+        if kept and values["out"] is None:
+            values["out"] = Path(f"{values['path'].stem}_{kept}")
+        with guarded(as_json), keeping_runs(values["out"]):
+            import doe
+
+            with bars(levels[0] or as_json) as progress:
+                follow = {"progress": progress, "notice": notice(levels[0])} if "workers" in values else {}
+                stated_values = {key: value for key, value in values.items() if value is not None}
+                answer = getattr(doe, name)(**stated_values, **follow)
+            if as_csv and not as_json:
+                answer.print_csv()
+            else:
+                _hand_over(answer, as_json, Detail.of(*levels))
+
+    parameters = [
+        Parameter(key, Parameter.POSITIONAL_OR_KEYWORD, default=_default(kind), annotation=kind)
+        for key, kind in options.items()
+    ]
+    first = [parameter for parameter in parameters if parameter.default is Parameter.empty]
+    rest = [parameter for parameter in parameters if parameter.default is not Parameter.empty]
+    run.__signature__ = Signature([*first, *rest])  # type: ignore[attr-defined]
+    run.__name__, run.__doc__ = name, about
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
+
+
+def _default(annotation: Any) -> Any:
+    """False of a flag, None of what may be left out, none of what must be stated."""
+    kind = get_args(annotation)[0]
+    return False if kind is bool else None if type(None) in get_args(kind) else Parameter.empty
+
+
+def _hand_over(answer: "Answer", as_json: bool, detail: Detail) -> None:
+    """Print the answer with its files; what it fails for ends with exit code 1, on standard error unless the screen has it."""
+    if as_json:
+        record = plain(answer.as_dict())
+        print_json(record)
+        alarm(note for note in record.get("notes", ()) if note["text"] not in answer.unmet)
+    else:
+        show(answer.screen(), detail)
+        for line in answer.closing:
+            print(line)
+    if as_json or not (answer.shows_unmet and sys.stdout.isatty()):
+        for sentence in answer.unmet:
+            print(sentence, file=sys.stderr)
+    if answer.unmet:
+        raise typer.Exit(FAILED)

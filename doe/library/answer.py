@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rbdyn.base import html, terminal
 from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, has_content
@@ -44,6 +44,18 @@ class Answer(Mapping[str, Any]):
     def screen(self) -> list[Block]:
         """The answer on a terminal, which begins with bearing, point and date, or else the input files."""
         return [*([] if self.identity is None else [identity_line(self.identity, Detail.USUAL)]), *self.blocks()]
+
+    @property
+    def closing(self) -> list[str]:
+        """Lines below the answer on a terminal: where its files are."""
+        return [f"written to {self.folder}: {', '.join(self.files)}"] if self.folder else []
+
+    @property
+    def unmet(self) -> list[str]:
+        """Sentences on demands that are not met, for which the command fails; ``shows_unmet``: whether the answer has them."""
+        return []
+
+    shows_unmet: ClassVar[bool] = False
 
     def sections(self) -> list[Section]:
         """Chapters of a notebook's page, the first of which is open."""

@@ -53,6 +53,12 @@ class DesignAnswer(Answer):
             "terms": power_sheet(self.result.evaluation).records,
         }
 
+    def print_csv(self) -> None:
+        """Print the runs as CSV."""
+        from doe.report.sections.design import print_csv
+
+        print_csv(self.result)
+
     def brief(self) -> str:
         runs, factors = counted(len(self.result.runs), "run"), ", ".join(self.result.factors)
         return f"{self.result.kind.replace('_', ' ')}, {runs} of {factors}"
@@ -375,6 +381,13 @@ class ChainAnswer(Answer):
 
     chains: Mapping[str, "ChainResult"] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
+    path: Path | None = None
+
+    @property
+    def unmet(self) -> list[str]:
+        """Why chains miss their limits."""
+        several = "chains" in self.record
+        return [f"{self.path}: {f'chain {name}: ' if several else ''}{why}" for name, why in self.refused.items()]
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.chain import chain_blocks
@@ -421,9 +434,8 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
         refuse(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         refused = {name: result.status for name, result in results.items() if result.refused}
-        answer = ChainAnswer(
-            record, folder, chains=results, refused=refused, identity=identity_of("doe chain", {}, [path])
-        )
+        identity = identity_of("doe chain", {}, [path])
+        answer = ChainAnswer(record, folder, chains=results, refused=refused, path=path, identity=identity)
         sheets = part_sheet(results), share_sheet(results)
         tables = {sheet.file: sheet.records for sheet in sheets}
         return replace(answer, files=saved(output, "chain.json", answer, lambda: tables))

@@ -58,7 +58,7 @@ class UncertaintyAnswer(Answer):
 def uncertainty(
     path: Path | str,
     points: int | None = None,
-    target: float = 0.1,
+    target: float | str = 0.1,
     overrides: Sequence[str] = (),
     out: Path | str | None = None,
     workers: int | None = None,
@@ -73,7 +73,7 @@ def uncertainty(
 
     - ``path``: SCENE.toml of a roller bearing; ``overrides`` of its keys, such as ``["cage.mass_g=50"]``
     - ``points``: input sets to begin with, a power of two from 16 to 512; by default those of the scene
-    - ``target``: standard error of the ends of a range, as a fraction of its width
+    - ``target``: standard error of the ends of a range, as a fraction of its width, such as 0.1 or "10%"
     - ``out``: folder of the files and the store of runs, by default SCENE_uncertainty; finished runs are found there
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
     - ``progress(stage, done, total)``: called as runs end; ``notice(sentence)``: called with the number of runs, then with their time
@@ -88,7 +88,7 @@ def uncertainty(
     from doe.workflow.status import content_digest, runs_digest
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
     from rbdyn.base.page import REPORT_FILES, write_with_report
-    from rbdyn.dynamics.target import valid_target
+    from rbdyn.dynamics.target import target_of, valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
     folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
@@ -96,7 +96,7 @@ def uncertainty(
     outputs = texts_given(figures, "figures", '["outer_max_pressure_MPa"]')
     refuse(_points_faults(points))
     points = None if points is None else int(points)
-    accuracy = valid_target(target)
+    accuracy = target_of(target) if isinstance(target, str) else valid_target(target)
     names = (*UNCERTAINTY_FILES, *REPORT_FILES)
     with output_folder(folder, "doe", names, force=force) as output, registered(path, folder):
         inputs, runs = content_digest(path), runs_digest(path, assignments)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from doe.library.answer import Answer, Rows
 from doe.library.effort import path_given, registered
@@ -40,6 +40,22 @@ class StudyAnswer(Answer):
     """
 
     finished_before: bool = False
+    shows_unmet: ClassVar[bool] = True
+
+    @property
+    def closing(self) -> list[str]:
+        """The time that it took unless it was finished before, and its files."""
+        files = ", ".join(self.files)
+        if self.finished_before:
+            return [f"Finished before, nothing has changed since: {self.folder} holds {files}"]
+        cost = self.record["cost"]
+        spent = f"{cost['total_s']:.1f} s, of which design runs {cost['design_s']:.1f} s"
+        return [spent, f"written to {self.folder}: {files}"]
+
+    @property
+    def unmet(self) -> list[str]:
+        """What keeps the study from its demands, such as a missed limit or chain."""
+        return [*self.record["obstacles"]["sentences"]]
 
     @cached_property
     def summary(self) -> "Summary":

@@ -5,13 +5,13 @@ Intervals are Student's at the degrees of freedom of the errors. A limit is kept
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from doe.clearance import Simulations
-from doe.duty import DutyResult
+from doe.duty import DutyResult, Simulated
 from doe.running.store import Failure
 from doe.threads import one_thread
 from doe.unknown.propagation import Share
@@ -62,35 +62,35 @@ class Confirmed:
     Intervals use `error`: the root sum square of both half-widths, as of independent errors. ``freedom`` (m,): degrees
     of freedom of the statistical half-widths, infinite unless stated, as those of the numerical ones are.
 
-    ``power_terms``: power losses [W] by contact. ``reason``: why the point was chosen. ``orbit_share``: radius of the
-    cage's orbit over its play if the cage trembles, else None. ``friction_check``: friction by the maker's model, None
-    without a designation.
-
-    ``at_points``: figures of the simulation by point of the duty; ``worst``: by response that is the worst of them, the
-    likeliest point and its probability; ``jitter_points``: those at which alone the cage trembles. They are empty
-    without a duty.
-
-    ``temperatures``: steady temperatures [C] by node, ``temperature_ranges``: 5, 50 and 95 % of them, of the inner ring over the
-    outer one and of the clearances, over the inputs of the heat balance; both None without a balance, and over a duty. ``hot``: scenes at the temperatures of their runs by point of
-    the duty, or under EVERYWHERE without a duty; empty without a balance.
+    ``reason``: why the point was chosen. ``result``: that of its simulation, None for figures at a point of a duty alone.
     """
 
     point: Array
     values: Array
     statistical: Array
     numerical: Array
-    power_terms: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     freedom: Array | None = None
-    orbit_share: float | None = None
-    friction_check: Mapping[str, float | None] | None = None
-    at_points: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
-    worst: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-    temperatures: Mapping[str, Quantity] | None = None
-    temperature_ranges: dict[str, list[float]] | None = None
-    hot: Mapping[str, Scene] = field(default_factory=dict)
-    jitter_points: tuple[str, ...] = ()
-    dangers: Notes = ()
+    result: Simulated | None = None
+
+    @property
+    def at_points(self) -> Mapping[str, Mapping[str, Quantity]]:
+        """Figures of the simulation by point of the duty; empty without a duty."""
+        return self.result.at_points if isinstance(self.result, DutyResult) else {}
+
+    @property
+    def hot(self) -> dict[str, Scene]:
+        """Scenes at the temperatures of their runs by point of the duty, or under EVERYWHERE; empty without a heat balance."""
+        result = self.result
+        results = result.points if isinstance(result, DutyResult) else {EVERYWHERE: result}
+        return {
+            name: simulated_scene(one) for name, one in results.items() if one is not None and one.thermal is not None
+        }
+
+    @property
+    def dangers(self) -> Notes:
+        """Dangers of its runs."""
+        return () if self.result is None else tuple(of_level(condensed(self.result.notes), DANGER))
 
     @property
     def error(self) -> Array:
@@ -173,21 +173,7 @@ def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | Du
     """The study's responses of a simulation at a chosen point."""
     responses = result.responses
     values, statistical, numerical, freedom = arrays_of([responses.get(name) for name in study.responses])
-    terms, check, orbit = result.power_terms_W, result.friction_check, result.cage_orbit_radius_share
-    jitter = orbit.value if orbit is not None and result.jitters else None
-    confirmed = Confirmed(choice.point, values, statistical, numerical, terms, choice.reason, freedom, jitter, check)
-    confirmed = replace(confirmed, dangers=tuple(of_level(condensed(result.notes), DANGER)))
-    if isinstance(result, DutyResult):
-        hot = {name: simulated_scene(one) for name, one in result.points.items() if one.thermal is not None}
-        return replace(
-            confirmed, at_points=result.at_points, worst=result.worst, jitter_points=result.jitter_points, hot=hot
-        )
-    if result.thermal is None:
-        return confirmed
-    hot = {EVERYWHERE: simulated_scene(result)}
-    return replace(
-        confirmed, temperatures=result.temperatures_C, temperature_ranges=result.thermal.get("ranges"), hot=hot
-    )
+    return Confirmed(choice.point, values, statistical, numerical, choice.reason, freedom, result)
 
 
 def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> dict[str, Gain]:
@@ -208,16 +194,16 @@ def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> dict[str, Gai
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
     """A warning that the whirl deviation ratio, which has a goal, is that of a trembling cage; else empty."""
     objectives = [study.responses[index] for index in study.goals.objectives]
-    shares = {name: confirmed[name].orbit_share for name in ("baseline", "pick")}
-    jitter_shares = {name: share for name, share in shares.items() if share is not None}
-    if WHIRL not in objectives or not jitter_shares:
+    radii = []
+    for name in ("baseline", "pick"):
+        result = confirmed[name].result
+        if result is not None and result.jitters and result.cage_orbit_radius_share is not None:
+            points = ", ".join(result.jitter_points) if isinstance(result, DutyResult) else ""
+            where = f"at the {name}{f' ({points})' if points else ''}"
+            radii.append(f"{result.cage_orbit_radius_share.value:.2g} of its play {where}")
+    if WHIRL not in objectives or not radii:
         return ""
-    points = {name: ", ".join(confirmed[name].jitter_points) for name in jitter_shares}
-    radii = " and ".join(
-        f"{share:.2g} of its play at the {name}{f' ({points[name]})' if points[name] else ''}"
-        for name, share in jitter_shares.items()
-    )
-    return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
+    return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {' and '.join(radii)}."
 
 
 def statement(gains: Mapping[str, Gain]) -> str:
@@ -473,24 +459,30 @@ class ConfirmedPoint(Record, kw_only=True):
     def of(cls, study: Problem, point: Confirmed, gains: dict[str, Gain] | None) -> "ConfirmedPoint":
         """A simulated point of a study; ``gains`` over the baseline, None for that itself."""
         columns = (point.values.tolist(), map(finite, point.statistical), map(finite, point.numerical))
-        nodes = point.temperatures
+        result = point.result
+        assert result is not None
+        balance = None if isinstance(result, DutyResult) else result.thermal
         return cls(
             factors=study.by_factor(point.point),
             reason=point.reason,
             responses=dict(zip(study.responses, map(SimulatedValue, *columns), strict=True)),
-            power_terms_W=dict(point.power_terms),
+            power_terms_W=dict(result.power_terms_W),
             limits={limit.response: limit.nameless for limit in limits_of(study, point)},
             every_limit=every_limit(study, point),
-            friction_check=None if point.friction_check is None else dict(point.friction_check),
-            temperatures_C=None
-            if nodes is None
-            else {
-                name: Temperature(nodes[node].value, nodes[node].stated_error) for name, node in TEMPERATURES.items()
-            },
-            thermal=None if nodes is None else Balance(point.temperature_ranges),
+            friction_check=result.friction_check,
+            temperatures_C=_temperatures(result),
+            thermal=None if balance is None else Balance(balance.get("ranges")),
             gains=gains,
             statement=None if gains is None else statement(gains),
         )
+
+
+def _temperatures(result: Simulated) -> dict[str, Temperature] | None:
+    """Steady temperatures by response; None without a heat balance, and over a duty."""
+    if isinstance(result, DutyResult) or result.temperatures_C is None:
+        return None
+    nodes = {name: result.temperatures_C[node] for name, node in TEMPERATURES.items()}
+    return {name: Temperature(figure.value, figure.stated_error) for name, figure in nodes.items()}
 
 
 class PickLimit(Record):

@@ -9,7 +9,7 @@ from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any
 
-from doe.duty import scenes_of
+from doe.duty import DutyResult, scenes_of
 from doe.study_file.study import PointResponse, Response
 from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed, Gain, SimulatedValue, gains
@@ -126,8 +126,9 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
     }
     both, names = {"baseline": baseline, "pick": pick}, [point.name for point in points]
     worst = {
-        end: {response: WorstPoint(*worst) for response, worst in confirmed.worst.items()}
+        end: {response: WorstPoint(*worst) for response, worst in confirmed.result.worst.items()}
         for end, confirmed in both.items()
+        if isinstance(confirmed.result, DutyResult)
     }
     life = lives(
         study, {end: point.point for end, point in both.items()}, {end: point.hot for end, point in both.items()}

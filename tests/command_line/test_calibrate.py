@@ -20,6 +20,7 @@ from doe.workflow.calibration import calibration_stages, design_of, find_calibra
 from doe.workflow.identification import Calibration
 from doe.workflow.rig import read_rig
 from rbdyn.base.terminal import text
+from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -227,19 +228,10 @@ class _Result:
     counted_turns, replicates = 40.0, 2
 
     def __init__(self, values: dict[str, float], errors: dict[str, float]) -> None:
-        self.figures = {
-            name: {
-                "value": value * (1.0 + errors[name] * noise),
-                "statistical_error": 2.4 * errors[name] * value,
-                "numerical_error": 0.0,
-                "effective_samples": 8.0,
-                "degrees_of_freedom": 7,
-            }
+        self.responses = {
+            name: Quantity(value * (1.0 + errors[name] * noise), 2.4 * errors[name] * value, 0.0, 8.0, 7)
             for (name, value), noise in zip(values.items(), errors["noise"], strict=True)  # type: ignore[call-overload]
         }
-
-    def as_dict(self) -> dict[str, Any]:
-        return self.figures
 
 
 def _responses(scene: Scene) -> dict[str, float]:

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from doe import clearance
 from doe.cli import app
-from doe.commands.study import status_blocks
+from doe.commands.status import status_blocks
 from doe.running.runner import Stage, agenda_in
 from doe.running.store import STALE_S, STORE, Point, Store, at_work
 from doe.workflow.problem import Problem
@@ -178,9 +178,9 @@ def killed_in(monkeypatch, seeds_from: int, after: int = 0) -> None:
 
 def study_command(path: Path, out: Path, **options) -> None:
     """``doe study`` in this process."""
-    from doe.commands.study import study
+    from doe.commands.functions import study
 
-    study(path, out, 1, quiet=True, **options)
+    study(path, out, workers=1, quiet=True, **options)
 
 
 @pytest.mark.parametrize(
@@ -281,7 +281,7 @@ def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
 
 
 def test_uncertainty_of_a_scene_has_a_status_too(tmp_path, monkeypatch, capsys):
-    from doe.commands.unknown import uncertainty
+    from doe.commands.functions import uncertainty
 
     path, out = short_study(tmp_path).with_name("cylindrical_roller.toml"), tmp_path / "scene"
     assert "bearing" in read_toml(path)

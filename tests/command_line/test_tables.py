@@ -99,20 +99,18 @@ def test_no_word_of_a_heading_is_broken(monkeypatch, tmp_path, name):
 
 
 def test_no_word_of_a_heading_of_a_study_is_broken(monkeypatch, tmp_path):
-    from doe.commands.study import study
+    from doe.commands.functions import study
     from doe.report.files import summary
 
     def write(outcome, folder: Path) -> dict:
-        record = summary(outcome) | {"files": []}
+        record = summary(outcome).as_dict() | {"files": []}
         (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
         return record
 
     path = short_study(tmp_path)
     instantly(monkeypatch.setattr)
     monkeypatch.setattr("doe.report.files.write", write)
-    assert_unbroken(
-        monkeypatch, tables_of(monkeypatch, lambda: study(path, tmp_path / "out", 2, quiet=False, verbose=True))
-    )
+    assert_unbroken(monkeypatch, tables_of(monkeypatch, lambda: study(path, tmp_path / "out", workers=2, verbose=True)))
 
 
 @pytest.mark.parametrize("room", [80, 100, 120, 160])

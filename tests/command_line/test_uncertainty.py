@@ -238,18 +238,9 @@ class _Result:
 
     def __init__(self, values: Sequence[float], error: float) -> None:
         names = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
-        self.figures = {
-            name: {
-                "value": value,
-                "statistical_error": 2.4 * error * value,
-                "effective_samples": 8.0,
-                "degrees_of_freedom": 7,
-            }
-            for name, value in zip(names, values, strict=True)
+        self.responses = {
+            name: Quantity(value, 2.4 * error * value, None, 8.0, 7) for name, value in zip(names, values, strict=True)
         }
-
-    def as_dict(self) -> dict[str, Any]:
-        return self.figures
 
 
 class _Simulations:
@@ -439,18 +430,11 @@ class _Outputs(_Simulations):
         error = self.error / np.sqrt(scene.numerics.replicates)
         values = (10.0 + 0.1 * scene.cage.imbalance_um) * np.ones(4) + error * random.standard_normal(4)
         half = 2.2 * error * np.sqrt(random.chisquare(8, 4) / 8.0)
-        figures = {
-            name: {
-                "value": value,
-                "statistical_error": wide,
-                "numerical_error": 0.0,
-                "effective_samples": 9.0,
-                "degrees_of_freedom": 8,
-            }
+        result = _Result((1.0, 1.0, 1.0), 0.0)
+        result.responses = {
+            name: Quantity(value, wide, 0.0, 9.0, 8)
             for name, value, wide in zip(OUTPUTS, values.tolist(), half.tolist(), strict=True)
         }
-        result = _Result((1.0, 1.0, 1.0), 0.0)
-        result.figures = figures
         return result
 
 

@@ -101,8 +101,8 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     """The program."""
     from short_studies import run_design
 
+    from doe.commands.functions import study as doe_study
     from doe.commands.options import keeping_runs
-    from doe.commands.study import study as doe_study
     from doe.library.effort import registered
     from doe.workflow.problem import Problem
     from rbdyn.base.command import guarded, print_json

@@ -13,7 +13,7 @@ from instant_runs import instant_result
 from short_studies import short_study
 
 from doe.clearance import points_of
-from doe.commands.study import status_blocks
+from doe.commands.status import status_blocks
 from doe.running.runner import NOTE, agenda_in
 from doe.running.store import STORE, Store
 from doe.workflow.problem import Problem

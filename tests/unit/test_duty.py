@@ -104,7 +104,7 @@ def test_two_equal_points_with_half_of_the_time_give_the_record_of_the_plain_stu
     over = duty_study(tmp_path / "over", TWICE, limit, (IMPACT, f'{IMPACT}aggregate = "worst"\n'))
     records, counts = [], []
     for study in (plain, over):
-        records.append(summary(run_study(study, study.path.parent, 1, lambda title: silent)))
+        records.append(summary(run_study(study, study.path.parent, 1, lambda title: silent)).as_dict())
         counts.append(len(ran))
         ran.clear()
     assert counts[0] == counts[1]
@@ -490,7 +490,7 @@ def test_a_search_and_a_robust_judgement_over_a_duty_are_the_same_with_any_worke
         study = duty_study(tmp_path / str(workers), IDLE_AND_CRUISE, *keys)
         options = {"adaptive": True, "robust": True}
         outcome = run_study(study, study.path.parent, workers, lambda title: silent, **options)
-        record = summary(outcome)
+        record = summary(outcome).as_dict()
         stored_keys = set(rows(study.path.parent / "study.sqlite"))
         found.append((stored_keys, *(json.dumps(record[key]) for key in ("gains", "limits", "duty", "robust"))))
         assert record["robust"]["runs"] % 2 == 0

@@ -57,12 +57,12 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
     instantly(monkeypatch.setattr)
     outcome = run_study(mounted_study(tmp_path), tmp_path, 1, lambda title: silent)
     text = answer_text(record := summary(outcome))
-    plays = record["operating_clearances_mm"]
+    plays = record.operating_clearances_mm
     scene = outcome.study.confirmation_scene(outcome.pick.point)
     assert plays["guide_clearance_mm"]["pick"] == pytest.approx(1e3 * scene.clearances["guide"].operating)
     assert "baseline in operation" in text and f"{plays['pocket_clearance_mm']['pick']:.3f}" in text
-    assert record["clearance_class"].startswith("ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of ")
-    assert record["clearance_class"] in text
+    assert record.clearance_class.startswith("ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of ")
+    assert record.clearance_class in text
 
 
 def test_unit_without_a_mounting_there_is_nothing_to_show(tmp_path):

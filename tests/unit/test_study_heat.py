@@ -124,7 +124,7 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     study = Problem.load(hot_study(tmp_path))
     scene = study.confirmation_scene(study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
-    assert confirmed.values[-1] == 93.0 and confirmed.temperature_ranges["inner"] == [88.0, 93.0, 108.0]
+    assert confirmed.values[-1] == 93.0 and confirmed.result.thermal["ranges"]["inner"] == [88.0, 93.0, 108.0]
     hot = confirmed.hot[EVERYWHERE]
     assert hot.thermal is None and hot.mounting.inner_ring_temperature_C == 93.0 and hot.lubricant.temperature_C == 92.7
     found = operating_clearances(study, {"baseline": hot, "pick": hot}).operating
@@ -221,7 +221,7 @@ def test_a_study_of_hot_clearances(tmp_path):
     """Each design at its own temperatures: the limit of the inner ring is kept, heat takes 30 um of the guide, and the oil
     carries the loss off with a rise of 13 K."""
     outcome = run_study(Problem.load(hot_study(tmp_path)), tmp_path, 1, lambda title: silent)
-    record = summary(outcome)
+    record = summary(outcome).as_dict()
     baseline = record["confirmation"]["baseline"]["temperatures_C"]
     assert baseline["oil_temperature_C"]["value"] == pytest.approx(92.7, abs=0.5)
     assert record["limits"]["inner_temperature_C"]["verdict"] == "kept"

@@ -123,22 +123,19 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        warning, gains = map(
-            shown.stdout.index, ("Warning: LIMIT BROKEN at the pick: impact force <= 35", "Changes confirmed")
-        )
-        assert shown.stdout.index("Chosen clearances") < warning < gains
-        assert "2 points simulated" in shown.stdout
+        words = ("Danger: Limit impact force <= 35", "Chosen clearances", "✗ broken", "Changes confirmed")
+        places = [*map(shown.stdout.index, words)]
+        assert places == sorted(places) and "LIMIT BROKEN" not in shown.stdout
     assert "Finished before" in again.stdout
     record = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert record["status"] == "broken"
     assert record["confirmation"]["baseline"]["limits"]["impact_force_N"]["verdict"] == "broken"
     answer = (tmp_path / "out" / "answer.txt").read_text(encoding="utf-8")
-    assert "Warning: LIMIT BROKEN" in answer and "doe study study.toml --robust" in answer
+    assert "Danger: Limit impact force" in answer and "doe study study.toml --robust" in answer
+    assert record["limits_sentence"].startswith("LIMIT BROKEN") and "2 points simulated" in record["limits_sentence"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "✗ broken" in page and ">limit<" in page
-    assert re.search(r'class="warning"><strong>Warning:</strong> LIMIT BROKEN', page)
     assert not re.search(r'class="statement">[^<]*(LIMIT|a real loss|no gain)', page)
-    assert "LIMIT BROKEN" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "broken" in (tmp_path / "out" / "confirmation.csv").read_text(encoding="utf-8")
 
 

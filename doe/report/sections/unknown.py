@@ -87,6 +87,16 @@ def input_sheet(inputs: Iterable[UnknownInput], *columns: Column[UnknownInput]) 
     )
 
 
+def set_sheet(keys: Iterable[str], outputs: Iterable[str]) -> Sheet[Any]:
+    """The columns of input sets."""
+    columns = (
+        *Column[Any]("{}", unit="of the key", meaning="value of each unknown input").of(keys),
+        *Column[Any]("{}", unit="of the name", meaning="outputs of that set; not in `posterior.csv`").of(outputs),
+    )
+    content = "A row an input set: of `doe uncertainty` with its outputs, of `doe calibrate` drawn from the posterior."
+    return Sheet("", columns, file="input_sets.csv, posterior.csv", content=content)
+
+
 def set_rows(uncertainty: Uncertainty) -> list[dict[str, Any]]:
     """Inputs and outputs of each input set."""
     sets = uncertainty.sets

@@ -1,97 +1,19 @@
-"""``doe study``, which runs a whole study or goes on with it, and ``doe status``, which shows where a command stands."""
+"""``doe status``, which shows where a command stands."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from doe.commands.options import (
-    Adaptive,
-    Quiet,
-    Retry,
-    Robust,
-    Scheduler,
-    StudyOut,
-    StudyPath,
-    Verbose,
-    bars,
-    keeping_runs,
-)
+from doe.commands.options import Quiet
 from doe.running.runner import count_of
 from rbdyn.base.blocks import Block, Bullets, Detail, Paragraph, Table
-from rbdyn.base.command import (
-    FAILED,
-    Force,
-    Json,
-    Workers,
-    alarm,
-    folder_option,
-    guarded,
-    hand_over,
-    notice,
-    print_json,
-)
+from rbdyn.base.command import Json, folder_option, guarded, hand_over
 from rbdyn.base.faults import InputError
 from rbdyn.base.pace import duration
 from rbdyn.base.terminal import show
 from rbdyn.base.words import counted
-
-if TYPE_CHECKING:
-    from doe.library.whole import StudyAnswer
-
-
-def study(
-    path: StudyPath,
-    out: StudyOut = None,
-    force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    retry: Retry = False,
-    adaptive: Adaptive = False,
-    robust: Robust = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
-    """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
-    folder = out or Path(f"{path.stem}_results")
-    with guarded(as_json), keeping_runs(folder):
-        from doe.library.whole import study
-
-        with bars(quiet or as_json) as progress:
-            answer = study(path, folder, adaptive, robust, workers, scheduler, retry, progress, notice(quiet), force)
-        record = answer.as_dict()
-        if not as_json:
-            _print(answer, Detail.of(quiet, verbose))
-        _leave_by(record, as_json)
-
-
-def _print(answer: "StudyAnswer", detail: Detail) -> None:
-    """The answer of a study with its files, and the time that it took unless it was finished before."""
-    files = ", ".join(answer.files)
-    show(answer.blocks(), detail)
-    if answer.finished_before:
-        print(f"Finished before, nothing has changed since: {answer.folder} holds {files}")
-        return
-    cost = answer["cost"]
-    print(f"{cost['total_s']:.1f} s, of which design runs {cost['design_s']:.1f} s")
-    print(f"written to {answer.folder}: {files}")
-
-
-def _leave_by(record: dict[str, Any], as_json: bool) -> None:
-    """Print the record if asked for, and fail if anything keeps the study from its demands, such as a missed limit or chain."""
-    if as_json:
-        print_json(record)
-    sentences = record["obstacles"]["sentences"]
-    if as_json:
-        alarm(note for note in record["notes"] if note["text"] not in sentences)
-    if as_json or not sys.stdout.isatty():
-        for sentence in sentences:
-            print(sentence, file=sys.stderr)
-    if sentences:
-        raise typer.Exit(FAILED)
 
 
 def status(
