@@ -147,8 +147,9 @@ class StudyAnswer(Answer):
             f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"
             for name, gain in self.summary.gains.items()
         ]
-        sentence = self.summary.limits_sentence
-        return ", ".join([*changes, *([sentence] if sentence else [])])
+        judged = self.summary.confirmation["pick"].every_limit
+        limits = [f"{limit.bound_words} {limit.verdict}" for limit in judged]
+        return ", ".join([*changes, *limits])
 
 
 def study(
@@ -174,7 +175,7 @@ def study(
       and with what no run can change
     - ``force``: also write over files in ``out`` that no command of ``doe`` made
 
-    A broken limit is in ``answer["status"]`` and ``answer["limits_sentence"]``. Raises InputError with all faults of the
+    A broken limit is in ``answer["status"]`` and ``answer["limits"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
     """
     from doe.workflow.problem import Problem

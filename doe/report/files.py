@@ -154,7 +154,6 @@ def summary(outcome: StudyResult) -> Summary:
         identity=study_identity("doe study", study),
         status=outcome.status,
         limits={limit.response: PickLimit(limit.nameless, odds.get(limit.response)) for limit in outcome.limits},
-        limits_sentence=outcome.limits_sentence,
         obstacles=outcome.obstacles,
         tried=outcome.tries,
         edge=outcome.edge,

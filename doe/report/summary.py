@@ -34,7 +34,6 @@ class Summary(Record, kw_only=True):
     identity: Identity
     status: str
     limits: dict[str, PickLimit]
-    limits_sentence: str
     obstacles: Obstacles
     tried: int
     edge: Edge

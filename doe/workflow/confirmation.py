@@ -22,7 +22,7 @@ from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_erro
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
-from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
+from rbdyn.base.words import chance, decimals, quantity, with_error
 from rbdyn.result import TEMPERATURES, Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
@@ -217,18 +217,9 @@ def statement(gains: Mapping[str, Gain]) -> str:
         LOSS: [name for name, gain in gains.items() if -gain.percent > gain.error_among(count)],
         NOISE: [name for name, gain in gains.items() if abs(gain.percent) <= gain.error_among(count)],
     }
-    parts = [
-        f"{', '.join(f'{name} {_improved(gains[name], count)}' for name in names)}: {words}"
-        for words, names in by_words.items()
-        if names
-    ]
-    intervals = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
+    parts = [f"{', '.join(names)}: {words}" for words, names in by_words.items() if names]
+    intervals = f" (verdicts that hold for all {count} together)" if count > 1 else ""
     return f"Simulated changes from the baseline{intervals}: {'; '.join(parts)}."
-
-
-def _improved(gain: Gain, count: int) -> str:
-    """A gain in words, with the error that holds together with those of ``count`` gains."""
-    return improvement(gain.percent, gain.error_among(count), gain.goal)
 
 
 class Limit(Record, kw_only=True):
@@ -353,38 +344,6 @@ def worst_limits(limits: Sequence[Limit]) -> dict[str, Limit]:
 def verdict_of(limits: Sequence[Limit]) -> Verdict:
     """The worst verdict; kept without limits."""
     return max((limit.verdict for limit in limits), key=ORDER.index, default="kept")
-
-
-def sentence(limits: Sequence[Limit], probability: float, tries: int) -> str:
-    """The verdicts on the limits at the pick, the worst first; empty without limits. ``tries``: simulated points."""
-    if not limits:
-        return ""
-    words = {
-        "broken": "LIMIT BROKEN at the pick: {}, beyond by more than its error",
-        "undecided": "LIMIT UNDECIDED at the pick: {}, too near the bound for its error",
-        "kept": f"Limit kept at the pick, probability {probability:g} demanded: {{}}",
-    }
-    parts = []
-    for verdict in reversed(ORDER):
-        group = [limit.text for limit in limits if limit.verdict == verdict]
-        parts += [words[verdict].format(", ".join(group))] if group else []
-    points = "first point simulated" if tries == 1 else f"{tries} points simulated"
-    return f"{'. '.join(parts)} ({points})."
-
-
-def odds_sentence(study: Problem, odds: Mapping[str, Share] | None) -> str:
-    """Probability that the pick keeps its limits over the unknown inputs, or the command for it; empty without limits."""
-    if not study.goals.limited:
-        return ""
-    if odds is None:
-        return (
-            "The probability of keeping the limits over the unknown inputs is computed by: "
-            f"doe study {study.path.name} --robust."
-        )
-    shares = ", ".join(
-        f"{name} {100.0 * p:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %)" for name, (p, low, high) in odds.items()
-    )
-    return f"Probability that the pick keeps its limits over the unknown inputs: {shares}."
 
 
 class SimulatedValue(Record):

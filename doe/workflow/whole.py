@@ -33,8 +33,6 @@ from doe.workflow.confirmation import (
     Verdict,
     gains,
     limits_of,
-    odds_sentence,
-    sentence,
     simulate_original,
     verdict_of,
     whirl_sentence,
@@ -358,13 +356,6 @@ class StudyResult:
         """Why no point that is better in every response as simulated is the pick; none where there is no such point."""
         forecast = Forecast(self.study, self.surfaces, self.front, self.adaptive, self.searched_pick)
         return rivals_sentences(forecast, self.confirmed)
-
-    @property
-    def limits_sentence(self) -> str:
-        """The verdicts in words, with the probability of keeping the limits over the unknown inputs; empty without limits."""
-        verdict_words = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tries)
-        odds = None if self.robust is None else self.robust.odds
-        return f"{verdict_words} {odds_sentence(self.study, odds)}".strip()
 
 
 @one_thread

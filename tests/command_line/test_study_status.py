@@ -16,6 +16,7 @@ import typer
 from doe_command import doe, doe_process, invoke, loaded_by
 from instant_runs import instantly
 from short_studies import run_design, short_study, silent
+from synthetic_study import summary as made_up
 from typer.testing import CliRunner
 
 from doe import clearance
@@ -219,13 +220,9 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
     def looked(outcome, folder):
         seen.append(study_status(outcome.study, out))
         (folder / "answer.txt").write_text("none", encoding="utf-8")
-        record = {
+        record = made_up() | {
             "inputs": outcome.inputs,
             "files": ["summary.json", "answer.txt"],
-            "status": "ok",
-            "limits_sentence": "",
-            "obstacles": {"sentences": []},
-            "cost": {"design_s": 1.0, "total_s": 2.0},
             "answer_sha256": digest_of(b"none"),
         }
         sign(record)

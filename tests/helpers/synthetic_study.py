@@ -126,7 +126,6 @@ def summary() -> dict[str, Any]:
                      "date": "2026-01-31", "version": "0.1.0", "files": {}},
         "status": "ok",
         "limits": {},
-        "limits_sentence": "",
         "obstacles": NOTHING_MISSED,
         "tried": 1,
         "edge": {"beyond_runs": False, "factors": {}, "front_share": 0.1, "direct_front_share": None,

@@ -51,12 +51,9 @@ def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
             "limits": {RESPONSES[2]: limit},
             "every_limit": [{"response": RESPONSES[2], **limit}],
         }
-    words = {"kept": "Limit kept", "broken": "LIMIT BROKEN", "undecided": "LIMIT UNDECIDED"}[verdict]
     if verdict != "kept":
         missed = {"point": None, "excess": 1.0, "relaxed": 261.0, "response": RESPONSES[2], **limit}
         record["obstacles"] = record["obstacles"] | {"limits": [missed]}
-    command = "The probability over the unknown inputs is computed by: doe study study.toml --robust."
-    record["limits_sentence"] = f"{words} at the pick. {'' if odds else command}".strip()
     record["limits"] = {RESPONSES[2]: {**limit, "odds": odds}}
     return record | {"status": "ok" if verdict == "kept" else verdict}
 
@@ -100,7 +97,7 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
     ("record", "words", "role"),
     [
         (limited(), "Every limit is kept at the pick.", "statement"),
-        (limited(odds=[0.57, 0.51, 0.63]), "Limit kept at the pick.", "warning"),
+        (limited(odds=[0.57, 0.51, 0.63]), "Not every limit is kept at the pick over", "warning"),
         (limited(odds=[0.97, 0.93, 0.99]), "Every limit is kept at the pick and over the unknown inputs.", "statement"),
     ],
 )

@@ -72,7 +72,7 @@ def _judged(summary: Summary) -> list[Block]:
         # The dangers above say which limits are missed, and by how much.
         return [table, *([_command_for_odds(summary)] if summary.limits else ())]
     if min(odds, default=1.0) < NEARLY_ALL:
-        return [table, Paragraph(summary.limits_sentence, "warning")]
+        return [table, Paragraph("Not every limit is kept at the pick over the unknown inputs.", "warning")]
     everywhere = " and over the unknown inputs" if odds else ""
     return [table, Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement"), _command_for_odds(summary)]
 
