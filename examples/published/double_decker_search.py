@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.double_decker import Stack
 from rbdyn.quasistatic.finite_search import (
     CONVERGED,
@@ -29,9 +30,11 @@ from rbdyn.quasistatic.finite_search import (
     Search,
     search_points,
 )
-from rbdyn.quasistatic.full_system import Stop, System, evaluate, groove_forces, solution_at, system_of
+from rbdyn.quasistatic.full_system import Stop, System, evaluate, solution_at, system_of
+from rbdyn.quasistatic.row.ball import ball_forces, deflection
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.newton import ACCEPTED
+from rbdyn.quasistatic.row.ring import groove_centre
 
 # Only x and z of the rings are free.
 SQUARE = np.array([math.nan, 0.0, math.nan, 0.0, 0.0])
@@ -54,6 +57,23 @@ class SearchEnd(NamedTuple):
     steps: int
     residual: float
     offsets: Array
+
+
+@entry
+def groove_forces(control: Any, row: Any, q: Any, balls: Any, out: Any) -> None:
+    """Fill ``out`` (Z, 2) by the force (axial, radial) [N] of each ball of ``balls`` (2 Z,) on its outer groove.
+
+    It is the force of the inner ring plus the centrifugal force less the residual of the ball.
+    """
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        x, y = balls[2 * j], balls[2 * j + 1]
+        inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
+        outer = deflection(x, y, row.outer_reach[j])
+        (ra, rr), (fa, fr, _), _, _, _, _, pull, _ = ball_forces(
+            control, 1.0, row, a_axial, a_radial, x, y, inner, outer
+        )
+        out[j, 0], out[j, 1] = fa - ra, fr + pull - rr
 
 
 def _on_middle_ring(control: Any, system: System, u: Array) -> Array:

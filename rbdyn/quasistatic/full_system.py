@@ -127,23 +127,6 @@ def evaluate(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) ->
 
 
 @entry
-def groove_forces(control: Any, row: Any, q: Any, balls: Any, out: Any) -> None:
-    """Fill ``out`` (Z, 2) by the force (axial, radial) [N] of each ball of ``balls`` (2 Z,) on its outer groove.
-
-    It is the force of the inner ring plus the centrifugal force less the residual of the ball.
-    """
-    for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
-        x, y = balls[2 * j], balls[2 * j + 1]
-        inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
-        outer = deflection(x, y, row.outer_reach[j])
-        (ra, rr), (fa, fr, _), _, _, _, _, pull, _ = ball_forces(
-            control, 1.0, row, a_axial, a_radial, x, y, inner, outer
-        )
-        out[j, 0], out[j, 1] = fa - ra, fr + pull - rr
-
-
-@entry
 def _finish(task: Any, state: Any, figures: Any) -> None:
     """Stiffness and figures at a solution, with lifted balls at rest."""
     state.work[:, LOADED] = 1.0

@@ -31,7 +31,6 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
-    RACES,
     BallResult,
     DoubleDeckerReport,
     Remark,
@@ -52,42 +51,32 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# What the manual says of the columns of a sweep.
-COLUMNS: tuple[Column[Any], ...] = (
-    Column("{key}", unit="of the key", meaning="value of each key that is swept"),
-    *Column[Any](
-        "{}", meaning="axial preload, diametral clearance, or loss of each ball's diameter, of these studies"
-    ).of(("preload_N", "clearance_um", "wear_um")),
-    *Column[Any]("{}", meaning="displacement of the inner ring").of(
-        ("x_mm", "y_mm", "z_mm", "tilt_x_mrad", "tilt_y_mrad")
-    ),
-    *Column[Any]("force_{}_N", meaning="reaction of the bearing").of("xyz"),
-    *Column[Any]("moment_{}_Nm", meaning="its moments").of("xy"),
-    *Column[Any]("stiffness_{}_N_per_um", meaning="diagonal of the stiffness").of("xyz"),
-    *Column[Any]("stiffness_tilt_{}_Nm_per_mrad", meaning="the same of tilts").of("xy"),
-    *Column[Any]("{}_deg", meaning="extremes of the contact angles").of(
-        f"{race}_angle_{end}" for race in RACES for end in ("min", "max")
-    ),
-    *Column[Any]("{}_angle_ball_1_deg", meaning="contact angles of the first ball").of(RACES),
-    Column("loaded_balls", meaning="balls that touch the inner race"),
-    *Column[Any]("{}_load_max_N", meaning="largest contact loads").of(RACES),
-    *Column[Any]("{}_pressure_MPa", meaning="largest Hertz pressures").of(RACES),
-    *Column[Any]("L10_{}", meaning="life").of(("Mrev", "h")),
-    *Column[Any]("{}_temperature_C", meaning="with `[thermal]`: temperatures of oil, rings and balls").of(
-        ("oil", "outer", "inner", "rollers")
-    ),
-    *Column[Any]("{}", meaning="with `[thermal]`: gain of its loop, and the friction that heats the bearing").of(
-        ("thermal_gain", "friction_W")
-    ),
-    Column("middle_ring_speed_rpm", meaning="of a double-decker: speed of the middle ring"),
-    Column("residual_N", meaning="what the equations leave over"),
-    Column("iterations", meaning="steps of the solver"),
-    Column("status", meaning="ok, or why there is no equilibrium or no steady temperature"),
-    Column("notes", meaning="topics of the notes on this point"),
-)
+# What the columns of a sweep mean.
+MEANINGS = {
+    "{key}": "value of each key that is swept",
+    "preload_N clearance_um wear_um": "axial preload, diametral clearance, or loss of each ball's diameter, of these studies",
+    "x_mm y_mm z_mm tilt_x_mrad tilt_y_mrad": "displacement of the inner ring",
+    "force_x_N force_y_N force_z_N": "reaction of the bearing",
+    "moment_x_Nm moment_y_Nm": "its moments",
+    "stiffness_x_N_per_um stiffness_y_N_per_um stiffness_z_N_per_um": "diagonal of the stiffness",
+    "stiffness_tilt_x_Nm_per_mrad stiffness_tilt_y_Nm_per_mrad": "the same of tilts",
+    "inner_angle_min_deg inner_angle_max_deg outer_angle_min_deg outer_angle_max_deg": "extremes of the contact angles",
+    "inner_angle_ball_1_deg outer_angle_ball_1_deg": "contact angles of the first ball",
+    "loaded_balls": "balls that touch the inner race",
+    "inner_load_max_N outer_load_max_N": "largest contact loads",
+    "inner_pressure_MPa outer_pressure_MPa": "largest Hertz pressures",
+    "L10_Mrev L10_h": "life",
+    "oil_temperature_C outer_temperature_C inner_temperature_C rollers_temperature_C": "with `[thermal]`: of oil, rings and balls",
+    "thermal_gain friction_W": "with `[thermal]`: gain of its loop, and the friction that heats the bearing",
+    "middle_ring_speed_rpm": "of a double-decker: speed of the middle ring",
+    "residual_N": "what the equations leave over",
+    "iterations": "steps of the solver",
+    "status": "ok, or why there is no equilibrium or no steady temperature",
+    "notes": "topics of the notes on this point",
+}
 SWEEPS: Sheet[Any] = Sheet(
     "",
-    COLUMNS,
+    [Column(key, meaning=meaning) for keys, meaning in MEANINGS.items() for key in keys.split()],
     file="sweep.csv, preload.csv, clearance.csv, wear.csv",
     content="A row a point of `rbdyn ball --sweep` and of the studies over preload, clearance and wear; columns of a double-decker's "
     "rows begin with `inner_row_` and `outer_row_`.",
