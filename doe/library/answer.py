@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rbdyn.base import html, terminal
-from rbdyn.base.blocks import Block, Detail, Section, Tiles, Widget, has_content
+from rbdyn.base.blocks import Block, Detail, Section, Table, Widget, has_content
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.result import write_json
@@ -128,7 +128,9 @@ class Answer(Mapping[str, Any]):
 def _still(section: Section) -> Section:
     """The section without empty blocks and interactive pictures, and with tables for tiles: a cell has no scripts or styles."""
     blocks = [block for block in section.blocks if has_content(block) and not isinstance(block, Widget)]
-    return replace(section, blocks=[block.table if isinstance(block, Tiles) else block for block in blocks])
+    return replace(
+        section, blocks=[replace(block, tiles=None) if isinstance(block, Table) else block for block in blocks]
+    )
 
 
 def _rendered(section: Section) -> str:

@@ -84,7 +84,8 @@ class Bullets:
 class Table:
     """A table whose first column names the row; a ``folded`` one opens on demand, a ``sortable`` one sorts by any column.
 
-    ``text_columns``: further columns that hold text rather than numbers.
+    ``text_columns``: further columns that hold text rather than numbers. ``tiles``: headings of columns without a unit; where they
+    are given, a page shows each row as a tile, its second cell prominent.
     """
 
     caption: str
@@ -95,6 +96,7 @@ class Table:
     text_columns: Sequence[int] = ()
     sortable: bool = False
     detail: Detail = Detail.LEAST
+    tiles: Sequence[str] | None = None
 
     def without_empty_columns(self) -> Self:
         """The same table without its empty columns."""
@@ -105,42 +107,6 @@ class Table:
             rows=[[row[place] for place in full] for row in self.rows],
             text_columns=[full.index(place) for place in self.text_columns if place in full],
         )
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One prominent figure: its name, value and unit, further figures of that unit by name, and remarks without a unit."""
-
-    name: str
-    value: str
-    unit: str
-    further: Sequence[tuple[str, str]]
-    remarks: Sequence[tuple[str, str]] = ()
-
-
-@dataclass(frozen=True)
-class Tiles:
-    """Prominent figures next to each other; ``value`` describes their values."""
-
-    caption: str
-    value: str
-    tiles: Sequence[Tile]
-    detail: Detail = Detail.LEAST
-
-    @property
-    def table(self) -> Table:
-        """The same figures as a table, one row each."""
-        cells = [dict([*tile.further, *tile.remarks]) for tile in self.tiles]
-        names = list(dict.fromkeys(name for row in cells for name in row))
-        rows = [
-            [
-                f"{tile.name} [{tile.unit}]" if tile.unit else tile.name,
-                tile.value,
-                *(row.get(name, "") for name in names),
-            ]
-            for tile, row in zip(self.tiles, cells, strict=True)
-        ]
-        return Table(self.caption, ("", self.value, *names), rows, detail=self.detail)
 
 
 @dataclass(frozen=True)
@@ -164,7 +130,7 @@ class Widget:
     detail: Detail = Detail.LEAST
 
 
-Block = Paragraph | Verdict | Remarks | Heading | Bullets | Table | Tiles | Figures | Widget
+Block = Paragraph | Verdict | Remarks | Heading | Bullets | Table | Figures | Widget
 
 
 @dataclass(frozen=True)
@@ -185,7 +151,7 @@ def with_notes(notes: Iterable[Note | Mapping[str, Any]], blocks: Iterable[Block
 def has_content(block: Block) -> bool:
     """Whether a block has content: a table rows, a list items, a paragraph words."""
     match block:
-        case Table(rows=content) | Bullets(items=content) | Tiles(tiles=content) | Figures(pictures=content):
+        case Table(rows=content) | Bullets(items=content) | Figures(pictures=content):
             return bool(content)
         case Paragraph(text=content) | Heading(text=content) | Remarks(listed=content):
             return bool(content)

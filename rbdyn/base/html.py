@@ -1,6 +1,6 @@
 """Blocks as HTML; every text is escaped here."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from itertools import groupby
 
@@ -14,8 +14,6 @@ from rbdyn.base.blocks import (
     Remarks,
     Section,
     Table,
-    Tile,
-    Tiles,
     Verdict,
     Widget,
     has_content,
@@ -30,7 +28,9 @@ def section(part: Section, widget: Callable[[str], str] = lambda name: "") -> st
     body = []
     blocks = [block for block in part.blocks if has_content(block)]
     # Small tables that follow each other are set next to each other where there is room.
-    for together, group in groupby(blocks, lambda block: isinstance(block, Table) and not block.folded):
+    for together, group in groupby(
+        blocks, lambda block: isinstance(block, Table) and not block.folded and block.tiles is None
+    ):
         pieces = [widget(block.name) if isinstance(block, Widget) else render(block) for block in group]
         body += [f'<div class="tables">{"".join(pieces)}</div>'] if together else pieces
     heading = f'<h2 id="{part.key}_title">{escape(part.title)}</h2>'
@@ -52,10 +52,12 @@ def render(block: Block) -> str:
             return f"<h3>{escape(text)}</h3>"
         case Bullets(items):
             return f"<ul>{''.join(f'<li>{prose(item)}</li>' for item in items)}</ul>"
-        case Tiles():
-            return _tiles(block)
         case Table():
-            return _table(block)
+            return (
+                _table(block)
+                if block.tiles is None
+                else f'<dl class="tiles">{"".join(_tile(block, row) for row in block.rows)}</dl>'
+            )
         case Figures(pictures, caption, key):
             name = f' id="{key}"' if key else ""
             words = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
@@ -70,16 +72,16 @@ def prose(text: str) -> str:
     return escape(text).replace(" %", "&nbsp;%").replace(" ± ", "&nbsp;±&nbsp;")
 
 
-def _tiles(block: Tiles) -> str:
-    return f'<dl class="tiles">{"".join(map(_tile, block.tiles))}</dl>'
-
-
-def _tile(tile: Tile) -> str:
-    unit = f' <span class="unit">{escape(tile.unit)}</span>' if tile.unit else ""
-    lines = [f"{name} {value} {tile.unit}".rstrip() for name, value in tile.further]
-    lines += [f"{name} {value}" for name, value in tile.remarks]
-    further = "".join(f'<span class="beneath">{escape(line)}</span>' for line in lines)
-    return f'<div class="tile"><dt>{escape(tile.name)}</dt><dd><strong>{escape(tile.value)}{unit}</strong>{further}</dd></div>'
+def _tile(table: Table, row: Sequence[str]) -> str:
+    """A row as a tile: its name, the prominent value, and the other cells that are not empty, each with the unit of the name."""
+    name, _, unit = row[0].rstrip("]").partition(" [")
+    small = f' <span class="unit">{escape(unit)}</span>' if unit else ""
+    further = "".join(
+        f'<span class="beneath">{escape(f"{head} {cell}" if head in (table.tiles or ()) else f"{head} {cell} {unit}".rstrip())}</span>'
+        for head, cell in zip(table.header[2:], row[2:], strict=True)
+        if cell
+    )
+    return f'<div class="tile"><dt>{escape(name)}</dt><dd><strong>{escape(row[1])}{small}</strong>{further}</dd></div>'
 
 
 def _table(table: Table) -> str:

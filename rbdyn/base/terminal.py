@@ -8,19 +8,7 @@ from collections.abc import Iterable, Sequence
 from textwrap import shorten, wrap
 from typing import NamedTuple
 
-from rbdyn.base.blocks import (
-    ALARMS,
-    Block,
-    Bullets,
-    Detail,
-    Heading,
-    Paragraph,
-    Remarks,
-    Table,
-    Tiles,
-    Verdict,
-    has_content,
-)
+from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.notes import CODES, DANGER, NOTE, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
@@ -56,7 +44,7 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
     shown = [block for block in blocks if block.detail <= detail and has_content(block)]
     written = ""
     for block in sorted(shown, key=lambda block: not isinstance(block, Verdict)):
-        titled = isinstance(block, Heading) or (isinstance(block, Table | Tiles) and block.caption)
+        titled = isinstance(block, Heading) or (isinstance(block, Table) and block.caption)
         written += ("\n" if titled and written and not written.endswith("\n\n") else "") + (
             _few_notes(block, page) if isinstance(block, Remarks) and detail < Detail.ALL else _render(block, page)
         )
@@ -110,8 +98,6 @@ def _render(block: Block, page: Page) -> str:
             return page.title(text)
         case Bullets(items):
             return "".join(map(page.lines, items))
-        case Tiles():
-            return _table(block.table, page)
         case Table():
             return _table(block, page)
     return ""

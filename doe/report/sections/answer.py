@@ -28,15 +28,16 @@ from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, L
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
 from doe.workflow.tolerances import FactorTolerance
-from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table, Tile, Tiles
+from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table
 from rbdyn.base.identity import identity_line
-from rbdyn.base.table import Column
+from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
 from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
 # Meaning of a clearance of the scene, by its key.
 MEANINGS = {clearance.key: clearance.meaning for clearance in CLEARANCES}
+GRADE = "grade of the parts"
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
 SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
@@ -164,7 +165,7 @@ def _clearances(summary: Summary) -> list[Block]:
         meaning += least_words(summary)
     widest = summary.tolerances_sentence
     return [
-        Tiles("Chosen clearances", "pick", [_tile(summary, factor) for factor in inputs]),
+        _chosen(summary, inputs),
         Paragraph(summary.clearance_class),
         Paragraph(meaning, "small"),
         *_temperatures(summary.confirmation),
@@ -213,18 +214,28 @@ def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
     return "" if share is None else f"{gain_text}{of_hundred(share)}"
 
 
-def _tile(summary: Summary, factor: Factor) -> Tile:
-    tolerance = tolerance_of(summary, factor)
-    further = {
-        "tolerance": f"± {rounded_down(tolerance)}" if tolerance else "",
-        "baseline": factor.text(summary.confirmation["baseline"].factors[factor.name]),
-        "in operation": factor.text(in_operation(summary, factor, "pick")[0]),
-        "baseline in operation": factor.text(in_operation(summary, factor, "baseline")[0]),
-    }
-    entries = [entry for entry in further.items() if entry[1]]
-    grade = next((width.grade for width in _widths(summary, factor) if width.grade), None)
-    remarks = [("grade of the parts", grade)] if grade else []
-    return Tile(factor.words, factor.text(summary.pick[factor.name]), factor.unit, entries, remarks)
+def _chosen(summary: Summary, inputs: Sequence[Factor]) -> Table:
+    """The pick of each factor with its tolerance, the baseline, both in operation, and the grade of the parts."""
+
+    def tolerance(factor: Factor) -> str:
+        width = tolerance_of(summary, factor)
+        return f"± {rounded_down(width)}" if width else ""
+
+    baseline = summary.confirmation["baseline"].factors
+    columns: tuple[Column[Factor], ...] = (
+        Column("", words="", cell=lambda factor: label(factor.name)),
+        Column("", words="pick", cell=lambda factor: factor.text(summary.pick[factor.name])),
+        Column("", words="tolerance", cell=tolerance),
+        Column("", words="baseline", cell=lambda factor: factor.text(baseline[factor.name])),
+        Column("", words="in operation", cell=lambda factor: factor.text(in_operation(summary, factor, "pick")[0])),
+        Column(
+            "",
+            words="baseline in operation",
+            cell=lambda factor: factor.text(in_operation(summary, factor, "baseline")[0]),
+        ),
+        Column("", words=GRADE, cell=lambda factor: next((w.grade for w in _widths(summary, factor) if w.grade), "")),
+    )
+    return replace(Sheet("Chosen clearances", columns, inputs).block.without_empty_columns(), tiles=(GRADE,))
 
 
 def _widths(summary: Summary, factor: Factor) -> list[Made | FactorTolerance]:
