@@ -13,7 +13,7 @@ Limits. The noise is removed alike from values at input sets. The probability is
 Worth. Gains are emulated over all inputs; the joint residuals of a row may occur at any input set. p(t) is the probability that
 all gains are positive, given the value t of an input. Its flip is where p(t) crosses a half. Its worth is
 E max(p, 1 - p) - max(p, 1 - p): the increase in the chance of the right choice by knowing it. The apparent worth of an input
-that does nothing is subtracted. If a measurement has an error, p is conditional on the reading instead. The probability with all ranges
+that does nothing is subtracted. The probability with all ranges
 half as wide about their medians shows how much depends on the ranges themselves, which are opinions.
 
 Intervals of worths and flips are by resampling: half of the rows without replacement, emulated by the hyperparameters of all.
@@ -273,34 +273,32 @@ class _Gain:
 class _Slices:
     """Slices of the ranges of inputs that could be measured; the last input does nothing.
 
-    fresh, read : averages over the sets of each slice, by true values and by readings: a row a slice, 1/count at its sets
-    coarse : (k, j), 1 where a set is in a slice for pairs of inputs, by readings
+    averaging : averages over the sets of each slice: a row a slice, 1/count at its sets
+    coarse : (k, j), 1 where a set is in a slice for pairs of inputs
     bins : slices of an input
     """
 
-    fresh: sparse.csr_array
-    read: sparse.csr_array
+    averaging: sparse.csr_array
     coarse: Array
     bins: int
 
     @classmethod
-    def of(cls, fresh: Array, read: Array, bins: int) -> "_Slices":
-        """Slices of quantiles (k, i + 1) of true values and readings; the last input does nothing."""
-        member, halves = _members(read, bins), _members(read, PAIR_BINS)
-        return cls(_averaging(_members(fresh, bins)), _averaging(member), halves.T.toarray(), bins)
+    def of(cls, sets: Array, bins: int) -> "_Slices":
+        """Slices of quantiles (k, i + 1); the last input does nothing."""
+        return cls(_averaging(_members(sets, bins)), _members(sets, PAIR_BINS).T.toarray(), bins)
 
     def estimate(self, better: Array) -> "_Estimate":
         """Worths and flips from probabilities (k,) at the sets."""
-        p, flips = float(better.mean()), [_flip(curve) for curve in self._curves(self.fresh, better)[:-1]]
-        alone = _worths(self._curves(self.read, better), p)
+        p, curves = float(better.mean()), self._curves(better)
+        flips, alone = [_flip(curve) for curve in curves[:-1]], _worths(curves, p)
         worths = alone[:-1] - alone[-1]
         quantiles = np.array([np.nan if place is None else place for place, _ in flips])
         return _Estimate(worths, quantiles, np.array([above for _, above in flips]), self._pairs(better, p, worths))
 
-    def _curves(self, averaging: sparse.csr_array, better: Array) -> Array:
+    def _curves(self, better: Array) -> Array:
         """Mean probability (i + 1, bins) in each slice; in one without sets the mean of all."""
-        empty = np.diff(averaging.indptr) == 0
-        return np.where(empty, better.mean(), averaging @ better).reshape(-1, self.bins)
+        empty = np.diff(self.averaging.indptr) == 0
+        return np.where(empty, better.mean(), self.averaging @ better).reshape(-1, self.bins)
 
     def _pairs(self, better: Array, p: float, worths: Array) -> Array:
         """Worths of all pairs of inputs (p,).
@@ -345,19 +343,12 @@ def _averaging(members: sparse.csr_array) -> sparse.csr_array:
 
 @one_thread
 def decisive_inputs(
-    quantiles: Array,
-    gains: Array,
-    variances: Array,
-    fresh: Array,
-    seed: int,
-    read: Array | None = None,
-    knowable: Sequence[int] | None = None,
+    quantiles: Array, gains: Array, variances: Array, fresh: Array, seed: int, knowable: Sequence[int] | None = None
 ) -> DecisiveInputs:
     """Which inputs are decisive, from rows at quantiles (n, d) of the inputs, the last of which does nothing.
 
     gains, variances : (n, m); variances are smooth over the inputs
     fresh : (k, d), quantiles of many input sets, k a power of two
-    read : (k, d), quantiles of their readings with the errors of measurements; the true values where left out
     knowable : places of the inputs that have one true value; all where left out
     """
     random = np.random.default_rng(seed)
@@ -373,17 +364,16 @@ def decisive_inputs(
     better, halved = (_chances([gain.of(every) for gain in gains_of]) for gains_of in (gains_at, narrow))
     halves = [np.sort(random.permutation(count)[: count // 2]) for _ in range(HALVES)]
     places = list(range(inputs - 1) if knowable is None else knowable)
-    true_sets, readings = (sets[:, [*places, -1]] for sets in (fresh, fresh if read is None else read))
-    fewer = _Slices.of(true_sets[:POINTS], readings[:POINTS], FEWER_BINS)
-    whole = _Slices.of(true_sets, readings, BINS)
+    sets = fresh[:, [*places, -1]]
+    fewer, whole = _Slices.of(sets[:POINTS], FEWER_BINS), _Slices.of(sets, BINS)
     by = _Estimates(
         whole.estimate(better),
-        _Slices.of(true_sets, readings, BINS // 2).estimate(better),
+        _Slices.of(sets, BINS // 2).estimate(better),
         whole.estimate(_chances([gain.of(every, sharp=True) for gain in gains_at])),
         fewer.estimate(better[:POINTS]),
         [fewer.estimate(_chances([gain.of(rows) for gain in few])) for rows in halves],
         [
-            _Slices.of(true_sets[rows], readings[rows], FEWER_BINS).estimate(better[rows])
+            _Slices.of(sets[rows], FEWER_BINS).estimate(better[rows])
             for rows in np.split(np.arange(len(fresh)), AVERAGE_PARTS)
         ],
     )

@@ -1,6 +1,6 @@
 """Unknown inputs: their distributions and dependence, nested sets of them, and screening of those that matter.
 
-Declared inputs depend on each other through a Gaussian copula, those of a posterior sample by being drawn as its rows. The last
+Inputs of a posterior sample depend on each other, being drawn as its rows. The last
 input of a set does nothing: it shows the effect of chance.
 
 Screening is by main effects, in a two-level design of its own or in the very runs of an answer. Sources: Box, Hunter and Hunter,
@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import special, stats
+from scipy import stats
 from scipy.linalg import hadamard
 from scipy.spatial import KDTree
 from scipy.stats import qmc
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError
-from rbdyn.scene.uncertain import Correlation, Law, Sampled
+from rbdyn.scene.uncertain import Law, Sampled
 
 # Quantiles are kept this far from 0 and 1.
 EDGE = 1e-12
@@ -64,34 +63,7 @@ def _distribution(law: Law) -> Any:
     assert low is not None and high is not None
     if law.law == "log_uniform":
         return stats.loguniform(low, high)
-    if law.law == "triangular":
-        return stats.triang((float(law.mode or 0.0) - low) / (high - low), low, high - low)
     return stats.uniform(low, high - low)
-
-
-def copula(names: Sequence[str], pairs: Sequence[Correlation], source: str = "scene") -> Array | None:
-    """Cholesky factor (d, d) of normal correlations that have the stated rank correlations; None without any.
-
-    A rank correlation rho is one of 2 sin(pi rho/6) of the normal scores (Pearson 1907). Raises InputError, which names the
-    ``source``, if the correlations contradict each other.
-    """
-    if not pairs:
-        return None
-    matrix, places = np.eye(len(names)), {name: place for place, name in enumerate(names)}
-    for pair in pairs:
-        i, j = (places[key] for key in pair.keys)
-        matrix[i, j] = matrix[j, i] = 2.0 * np.sin(np.pi * pair.rank / 6.0)
-    try:
-        return np.asarray(np.linalg.cholesky(matrix), float)
-    except np.linalg.LinAlgError:
-        ranks_of = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
-        why = "these rank correlations contradict each other; bring them nearer to 0"
-        raise InputError([f"{source}: uncertain.correlation: {ranks_of}: {why}"]) from None
-
-
-def dependent(quantiles: Array, factor: Array | None) -> Array:
-    """Quantiles (n, d) that depend on each other by the copula, from independent ones."""
-    return quantiles if factor is None else special.ndtr(special.ndtri(quantiles.clip(EDGE, 1.0 - EDGE)) @ factor.T)
 
 
 def ranks(column: Sequence[Any] | Array) -> Array:
@@ -118,19 +90,17 @@ def nested(inputs: int, points: int, seed: int) -> Array:
 class Joint:
     """Dependence of the inputs, of which there are ``inputs``.
 
-    factor : (d, d), Cholesky factor of the correlations of their normal scores; None without any
     rows, columns : (r, s), quantiles of a sample, and the places (s,) of its inputs
     """
 
     inputs: int
-    factor: Array | None = None
     rows: Array | None = None
     columns: tuple[int, ...] = ()
 
     @property
     def independent(self) -> bool:
         """Whether no input depends on another."""
-        return self.factor is None and self.rows is None
+        return self.rows is None
 
     def sets(self, points: int, seed: int) -> Array:
         """Quantiles (points, d + 1) of input sets; of a power of two the first half are those of half as many."""
@@ -138,7 +108,7 @@ class Joint:
 
     def placed(self, even: Array) -> Array:
         """Quantiles (n, d + 1) of input sets, from evenly spread ones."""
-        sets = np.column_stack([dependent(even[:, :-1], self.factor), even[:, -1]])
+        sets = even.copy()
         if self.rows is not None:
             sets[:, self.columns] = self.rows[(even[:, self.columns[0]] * len(self.rows)).astype(np.int64)]
         return sets
@@ -146,17 +116,9 @@ class Joint:
     def redrawn(self, sets: Array, shared: Array, fresh: Array) -> Array:
         """Input sets (n, d + 1) that share the inputs where ``shared`` (d + 1,) with ``sets``, the others being drawn anew.
 
-        The others are conditional on the shared ones. They come from ``fresh`` evenly spread quantiles (n, d + 1), by the copula,
-        or from a near row of the sample.
+        They come from ``fresh`` evenly spread quantiles (n, d + 1), those of a sample from a row near the shared ones.
         """
-        keep, redraw = (np.flatnonzero(shared[:-1] == which) for which in (True, False))
         new_sets = np.where(shared, sets, fresh)
-        if self.factor is not None:
-            scores, even = (special.ndtri(quantiles[:, :-1].clip(EDGE, 1.0 - EDGE)) for quantiles in (sets, fresh))
-            whole = self.factor @ self.factor.T
-            slopes = np.linalg.solve(whole[np.ix_(keep, keep)], whole[np.ix_(keep, redraw)])
-            root = np.linalg.cholesky(whole[np.ix_(redraw, redraw)] - whole[np.ix_(redraw, keep)] @ slopes)
-            new_sets[:, redraw] = special.ndtr(scores[:, keep] @ slopes + even[:, redraw] @ root.T)
         if self.rows is not None:
             columns = np.array(self.columns)
             common = shared[columns]

@@ -279,7 +279,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     nominal, variances, turns, numerical = _nominal(rows)
     measured = _measured(rows, rig, variances, turns, numerical)
     settings = case.scene.calibrate
-    match = matched(rows.simulate, measured, _unknowns(case, inputs), settings.seed, settings.waves)
+    match = matched(rows.simulate, measured, _unknowns(inputs), settings.seed, settings.waves)
     cells = [(row.number, name) for row, name in places]
     prior_cells = match.cells.mean(
         match.unknowns.quantiles(np.random.default_rng(0).standard_normal((BEFORE, len(inputs))))
@@ -371,13 +371,12 @@ def _conditions_needed(outputs: int, fewest: int, seed: int) -> int:
     return MOST_CONDITIONS
 
 
-def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
-    factor = case.joint(inputs).factor
+def _unknowns(inputs: Sequence[Input]) -> Unknowns:
     laws = [unknown_input.law for unknown_input in inputs]
     choices = {place: law for place, law in enumerate(laws) if isinstance(law, Law) and law.law == "choices"}
 
     def quantiles_at(scores: Array) -> Array:
-        quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
+        quantiles = special.ndtr(scores)
         for place, law in choices.items():
             quantiles[:, place] = unknown.quantiles_of(law, unknown.values_of(law, quantiles[:, place]))
         return quantiles

@@ -169,12 +169,11 @@ class Case:
         return 1.0 if unknown_input.law.times is None else float(value_of(self.scene_of_sets, unknown_input.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
-        """The joint distribution of the inputs. Raises InputError if correlations contradict each other."""
+        """The joint distribution of the inputs."""
         keys = [unknown_input.key for unknown_input in inputs]
-        pairs = [pair for pair in self.uncertain.correlation if set(keys).issuperset(pair.keys)]
         columns = tuple(place for place, key in enumerate(keys) if key in self.sample)
         rows = np.column_stack([unknown.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
-        return Joint(len(keys), unknown.copula(keys, pairs, self.home), rows, columns)
+        return Joint(len(keys), rows, columns)
 
 
 def laws_of(inputs: Sequence[Input]) -> dict[str, Law | Sampled]:

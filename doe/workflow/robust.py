@@ -343,15 +343,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     inputs, columns = [case.every[place] for place in places], [*places, -1]
     fresh_sets = joint.sets(FRESH, seed + 1)[:, columns]
     knowable = [place for place, unknown_input in enumerate(inputs) if unknown_input.law.kind == "unknown"]
-    analysis = decisive_inputs(
-        pairs.quantiles[:, columns],
-        gains,
-        variances,
-        fresh_sets,
-        seed,
-        _input_readings(case, inputs, fresh_sets, seed),
-        knowable,
-    )
+    analysis = decisive_inputs(pairs.quantiles[:, columns], gains, variances, fresh_sets, seed, knowable)
     front = None
     if study.file.robust.front != "none":
         front, more_runs, new_failures = find_robust_front(study, case, pairs, pick, simulations)
@@ -427,20 +419,6 @@ def case_of_study(study: Problem) -> Case:
         case = replace(case, outputs=tuple(duty.columns), duty=duty)
         refuse(impossible(case))
     return case
-
-
-def _input_readings(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:
-    """Quantiles (k, d + 1) of measurements of input sets: measurable inputs have the error of their measurement."""
-    random, readings = np.random.default_rng(seed), fresh.copy()
-    for place, unknown_input in enumerate(inputs):
-        if unknown_input.law.measurable is not None:
-            values = abs(case.unit(unknown_input)) * np.array(
-                unknown.values_of(unknown_input.law, fresh[:, place]), float
-            )
-            readings[:, place] = unknown.ranks(
-                values + unknown_input.law.measurable * random.standard_normal(len(values))
-            )
-    return readings
 
 
 def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: DecisiveInputs) -> tuple[Pair | None, Decision]:

@@ -28,15 +28,9 @@ from rbdyn.base.faults import (
 )
 
 # Required keys of each law, and optional ones.
-NEEDS = {
-    "uniform": ("low", "high"),
-    "log_uniform": ("low", "high"),
-    "triangular": ("low", "mode", "high"),
-    "normal": ("mean", "sd"),
-    "choices": ("values",),
-}
+NEEDS = {"uniform": ("low", "high"), "log_uniform": ("low", "high"), "normal": ("mean", "sd"), "choices": ("values",)}
 MAY = {"normal": ("low", "high"), "choices": ("weights",)}
-NUMBERS = ("low", "high", "mode", "mean", "sd", "values", "weights")
+NUMBERS = ("low", "high", "mean", "sd", "values", "weights")
 MOST_CHOICES = 6
 # Settings of the run of an input set: one impact window in each replicate, since more sets help more than longer runs.
 RUNS = (
@@ -72,15 +66,13 @@ FARTHEST, NARROWEST = 6.0, 1e-6
 class Law(Strict):
     """Distribution of an input: one unknown true value, or a value that varies from case to case."""
 
-    law: Literal["uniform", "log_uniform", "triangular", "normal", "choices"]
-    """Distribution: uniform or log_uniform between low and high; triangular with its peak at mode; normal with mean and sd,
+    law: Literal["uniform", "log_uniform", "normal", "choices"]
+    """Distribution: uniform or log_uniform between low and high; normal with mean and sd,
     optionally truncated at low and high; or choices among values."""
     low: Number | None = None
     """Lowest value."""
     high: Number | None = None
     """Highest value."""
-    mode: Number | None = None
-    """Most probable value, for law = "triangular"."""
     mean: Number | None = None
     """Mean, for law = "normal"."""
     sd: Positive | None = None
@@ -93,8 +85,6 @@ class Law(Strict):
     """Key whose value, other than 0, multiplies the numbers. The key itself gives a range relative to the scene's value."""
     kind: Literal["unknown", "varies"] = "unknown"
     """unknown: one true value, which a measurement could determine; varies: a value that differs between bearings or days."""
-    measurable: Positive | None = None
-    """Standard deviation of a possible measurement, in the unit of the key."""
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -118,18 +108,14 @@ class Law(Strict):
             yield f"values = {values}: name each value once; weights give its probability"
         if self.times is not None:
             yield f"times = '{self.times}': choices are no numbers to multiply; leave it out"
-        if self.measurable is not None:
-            yield f"measurable = {self.measurable:g}: a choice is not measured to a deviation; leave it out"
 
     def _range_faults(self) -> Iterator[str]:
-        low, high, mode = self.low, self.high, self.mode
+        low, high = self.low, self.high
         if low is not None and high is not None:
             if not low < high:
                 yield f"low = {low:g}: not below high = {high:g}; exchange them"
             elif high - low < FINEST * max(abs(low), abs(high)):
                 yield f"low = {low!r}: high = {high!r} is too near to it; widen the range"
-            elif mode is not None and not low <= mode <= high:
-                yield f"mode = {mode:g}: not between low = {low:g} and high = {high:g}; put it there"
         if self.law == "log_uniform" and low is not None and low < SMALLEST:
             yield f"low = {low:g}: law = 'log_uniform' needs a positive one, {SMALLEST:g} at least; raise it"
 
@@ -155,20 +141,10 @@ class Sampled:
     law: Literal["sample"] = "sample"
     times: None = None
     kind: Literal["unknown"] = "unknown"
-    measurable: None = None
 
     def model_dump(self, **_: Any) -> dict[str, Any]:
         """The law as in a record."""
         return {"law": self.law, "rows": len(self.values), "low": self.values[0], "high": self.values[-1]}
-
-
-class Correlation(Strict):
-    """Correlation of two inputs."""
-
-    keys: Annotated[list[str], Field(min_length=2, max_length=2)]
-    """The two keys; each pair at most once."""
-    rank: Annotated[float, Field(gt=-1.0, lt=1.0)]
-    """Spearman's rank correlation of the two inputs."""
 
 
 class Uncertain(Strict):
@@ -196,8 +172,6 @@ class Uncertain(Strict):
     sample: str | None = None
     """CSV file of a posterior sample, one row for each input set, with keys as columns, which replaces the laws of these keys. The
     path is relative to the folder of this file."""
-    correlation: list[Correlation] = []
-    """Rank correlations of inputs."""
 
     @property
     def laws(self) -> Mapping[str, Law]:
@@ -223,14 +197,10 @@ class Uncertain(Strict):
         fixed = paths(own.get("set", []))
         stated = {*self.laws, *self.estimated, *fixed}
         laws = {**{key: law for key, law in base.laws.items() if key not in stated}, **self.laws}
-        pairs = {frozenset(pair.keys): pair for pair in (*base.correlation, *self.correlation)}
         merged = {key: value for key, value in {**under, **own}.items() if key in type(self).model_fields} | laws
         merged["estimated"] = [key for key in base.estimated if key not in stated] + self.estimated
         merged["set"] = [text for key, text in paths(under.get("set", [])).items() if key not in stated] + [
             *fixed.values()
-        ]
-        merged["correlation"] = [
-            pair for keys, pair in pairs.items() if pair in self.correlation or keys <= laws.keys()
         ]
         return merged
 
@@ -258,7 +228,7 @@ class Uncertain(Strict):
             if "." in key and key.partition(".")[0] in NO_INPUTS
         ]
         faults += no_power_of_two("points = ", self.points)
-        return or_refuse(self, [*faults, *self._overlaps(), *self._correlation_faults(), *self._set_faults()])
+        return or_refuse(self, [*faults, *self._overlaps(), *self._set_faults()])
 
     def _overlaps(self) -> Iterator[str]:
         """Faults of keys with a law whose table has a law too."""
@@ -268,17 +238,6 @@ class Uncertain(Strict):
             for end in range(1, len(parts)):
                 if (table := ".".join(parts[:end])) in laws:
                     yield f'"{key}": {table} has a law too, which replaces it; remove one of them'
-
-    def _correlation_faults(self) -> Iterator[str]:
-        laws, pairs = self.laws, set[frozenset[str]]()
-        for keys in (pair.keys for pair in self.correlation):
-            yield from (f"correlation.keys: {key} has no law here; add one" for key in keys if key not in laws)
-            pair = frozenset(keys)
-            if len(pair) == 1:
-                yield f"correlation.keys = {keys}: a key cannot be correlated with itself; name two keys"
-            elif pair in pairs:
-                yield f"correlation.keys = {keys}: this pair occurs twice; keep one"
-            pairs.add(pair)
 
     def _set_faults(self) -> list[str]:
         laws = [path for key in self.laws if (path := tuple(key.split(".")))[0] not in NO_INPUTS]

@@ -43,7 +43,6 @@ class Input(NamedTuple):
 LAWS = {
     "uniform": "evenly",
     "log_uniform": "evenly by ratio",
-    "triangular": "most likely near the middle",
     "normal": "normal",
     "choices": "one of these",
     "sample": "by a sample of measurements",
@@ -57,14 +56,12 @@ class InputLaw(Record):
     rows: int | None = None
     low: Any = None
     high: Any = None
-    mode: float | None = None
     mean: float | None = None
     sd: float | None = None
     values: list[Any] | None = None
     weights: list[float] | None = None
     times: str | None = None
     kind: str | None = None
-    measurable: float | None = None
 
     @property
     def words(self) -> str:
@@ -112,12 +109,6 @@ def inputs_of(
         f'uncertain."{key}": is {role} too; remove it from one of them'
         for key in keys
         if (role := others.reason_for(tuple(key.split("."))))
-    ]
-    faults += [
-        f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; remove it'
-        for pair in uncertain.correlation
-        for key in pair.keys
-        if key in sample
     ]
     faults += [
         f'uncertain.estimated: "{key}" has no documented range; write "{key}" = {{law = ...}}'

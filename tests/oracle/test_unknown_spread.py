@@ -98,6 +98,12 @@ def test_positive_outputs_are_emulated_by_their_logarithm() -> None:
 SLOPES, CORRELATIONS = np.array([1.0, 2.0, 1.0]), np.array([[1.0, 0.6, 0.0], [0.6, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
+def _sample() -> Joint:
+    """Inputs of a sample whose scores have these correlations."""
+    rows = np.random.default_rng(4).standard_normal((1000, 3)) @ np.linalg.cholesky(CORRELATIONS).T
+    return Joint(3, np.column_stack([ranks(column) for column in rows.T]), (0, 1, 2))
+
+
 def _shapley_of_linear() -> list[float]:
     """Closed form for two correlated inputs of slopes a, b: half the explained variance in each order (Owen and Prieur 2017)."""
     a, b, rho = 1.0, 2.0, 0.6
@@ -107,32 +113,27 @@ def _shapley_of_linear() -> list[float]:
     return [each / (both + 1.0) for each in effects]
 
 
-@pytest.mark.parametrize("kind", ["copula", "sample"])
-def test_shapley_effects_of_inputs_that_go_together(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shapley_effects_of_inputs_that_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("doe.unknown.propagation.REFITS", 4)  # intervals are not the subject
-    factor = np.linalg.cholesky(CORRELATIONS)
-    joint = Joint(3, factor)
-    if kind == "sample":
-        rows = np.random.default_rng(4).standard_normal((1000, 3)) @ factor.T
-        joint = Joint(3, None, np.column_stack([ranks(column) for column in rows.T]), (0, 1, 2))
+    joint = _sample()
     quantiles, random = joint.sets(256, 5), np.random.default_rng(5)
     values = 50.0 + stats.norm.ppf(quantiles[:, :3].clip(1e-4, 1.0 - 1e-4)) @ SLOPES + 0.3 * random.standard_normal(256)
     *found, floor = shapley(emulated(Runs(quantiles, values, np.full(256, 0.09), np.full(256, 3))), joint, 1)
-    assert [each.value for each in found] == pytest.approx(_shapley_of_linear(), abs=0.02 if kind == "copula" else 0.04)
+    assert [each.value for each in found] == pytest.approx(_shapley_of_linear(), abs=0.04)
     assert floor.value < 0.02
     assert sum(each.value for each in (*found, floor)) == pytest.approx(1.0, abs=0.01)
 
 
 def test_redrawn_sets_are_as_likely_as_the_rest() -> None:
-    """What shares an input with a set goes with it as the copula says, the shared input to the bit."""
-    joint, even = Joint(3, np.linalg.cholesky(CORRELATIONS)), nested(8, 4096, 1)
+    """What shares an input with a set goes with it as the rows say, the shared input to the bit."""
+    joint, even = _sample(), nested(8, 4096, 1)
     sets = joint.placed(even[:, :4])
     again = joint.redrawn(sets, np.array([True, False, False, False]), even[:, 4:])
     assert np.array_equal(again[:, 0], sets[:, 0])
     scores, other = stats.norm.ppf(sets[:, :3]), stats.norm.ppf(again[:, :3])
-    assert np.corrcoef(other.T) == pytest.approx(CORRELATIONS, abs=0.02)
-    assert np.corrcoef(scores[:, 1], other[:, 1])[0, 1] == pytest.approx(0.36, abs=0.03)
-    assert np.corrcoef(scores[:, 2], other[:, 2])[0, 1] == pytest.approx(0.0, abs=0.03)
+    assert np.corrcoef(other.T) == pytest.approx(CORRELATIONS, abs=0.06)
+    assert np.corrcoef(scores[:, 1], other[:, 1])[0, 1] == pytest.approx(0.36, abs=0.1)
+    assert np.corrcoef(scores[:, 2], other[:, 2])[0, 1] == pytest.approx(0.0, abs=0.06)
 
 
 def _g_function(quantiles: Array) -> Array:

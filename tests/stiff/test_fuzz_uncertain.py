@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import spearmanr
 
 from doe.study_file.study import StudyFile
 from doe.unknown import inputs
@@ -77,12 +76,12 @@ def law_of(draw: random.Random, key: str) -> dict[str, Any]:
         low, high = 0.9, 0.9 + draw.uniform(0.01, 0.1)
     elif times:
         low, high = (end / (0.5 * sum(RANGES[times])) for end in (low, high))
-    kind = draw.choice(["uniform", "log_uniform", "triangular", "normal", "normal"])
+    kind = draw.choice(["uniform", "log_uniform", "normal", "normal"])
     law = {"law": kind, **({"kind": "varies"} if draw.random() < 0.1 else {}), **({"times": times} if times else {})}
     if kind == "normal":
         middle, sd = 0.5 * (low + high), (high - low) / 6.0
         return {**law, "mean": middle, "sd": sd, **({"low": low, "high": high} if draw.random() < 0.5 else {})}
-    return {**law, "low": low, "high": high, **({"mode": draw.uniform(low, high)} if kind == "triangular" else {})}
+    return {**law, "low": low, "high": high}
 
 
 def table_of(draw: random.Random, folder: Path) -> dict[str, Any]:
@@ -100,9 +99,6 @@ def table_of(draw: random.Random, folder: Path) -> dict[str, Any]:
         rows = [",".join(repr(draw.uniform(*RANGES[key])) for key in columns) for _ in range(draw.choice([1, 2, 40]))]
         (folder / "sample.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
         table["sample"] = "sample.csv"
-    if len(keys) > 1 and draw.random() < 0.6:
-        pairs = [draw.sample(keys, 2) for _ in range(draw.choice([1, 1, 2]))]
-        table["correlation"] = [{"keys": pair, "rank": draw.choice([-0.9, -0.4, 0.5, 0.8])} for pair in pairs]
     return table
 
 
@@ -113,15 +109,12 @@ def spoilt(draw: random.Random, table: dict[str, Any]) -> dict[str, Any]:
         declared = [key for key, law in table.items() if isinstance(law, dict) and "law" in law]
         one = draw.choice(declared) if declared else "cage.mass_g"
         law = table[one] if one in table else table.setdefault(one, law_of(draw, one))
-        kind = draw.randrange(10)
+        kind = draw.choice((0, 1, *range(3, 10)))
         if kind == 0:
-            names = ["low", "high", "mode", "mean", "sd", "times", "values", "weights", "measurable"]
+            names = ["low", "high", "mean", "sd", "times", "values", "weights"]
             law[draw.choice([*(3 * [name for name in names if name in law]), *names])] = draw.choice(EXTREMES)
         elif kind == 1:
             table[draw.choice(KEYS)] = law
-        elif kind == 2:
-            pair = {"keys": [one, draw.choice([one, *declared])], "rank": 0.5}
-            table["correlation"] = [*table.get("correlation", []), pair]
         elif kind == 3:
             before = table["set"] if isinstance(table.get("set"), list) else []
             table["set"] = [*before, draw.choice([f"{one}=1.0", "numerics.seed=3", "x", "=", *KEYS, *SETS])]
@@ -130,7 +123,7 @@ def spoilt(draw: random.Random, table: dict[str, Any]) -> dict[str, Any]:
         elif kind == 5:
             table[draw.choice(["points", "seed", "inputs", "sample", "defaults", "set"])] = draw.choice(EXTREMES)
         elif kind == 6:
-            law["law"] = draw.choice(["uniform", "normal", "triangular", "log_uniform", "choices", "beta"])
+            law["law"] = draw.choice(["uniform", "normal", "log_uniform", "choices", "beta"])
         elif kind == 7:
             law.pop(draw.choice(sorted(law)))
         elif kind == 8 and "values" in law:
@@ -163,10 +156,6 @@ def check(case: Case, table: dict[str, Any], design: list[str], seed: int) -> in
     assert keys == sorted(set(keys)) and declared <= {*keys} and {*case.sample} <= {*keys}
     assert all(key in keys or any(key in remark for remark in case.remarks) for key in table.get("estimated", ()))
     joint = case.joint(case.every)
-    for pair in table.get("correlation", ()):
-        sets = joint.sets(1024, seed)
-        first, second = (sets[:, keys.index(key)] for key in pair["keys"])
-        assert spearmanr(first, second).statistic == pytest.approx(pair["rank"], abs=0.08), pair
     listed = inputs.table_of({each.key: each.law for each in case.every}, joint.sets(4, seed))
     for each in case.every:
         assert math.isfinite(case.unit(each)) and case.unit(each) != 0.0

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
-from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
+from doe.unknown.inputs import nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.base.faults import InputError, read_toml, validated
 from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.state import light_contact
@@ -205,7 +205,6 @@ def test_declarations_over_others_replace_them_key_by_key() -> None:
         "set": ["numerics.turns=60", "numerics.replicates=3", "model.drag_coefficient=0.5"],
         "cage.mass_g": wide,
         "cage.bar_width_mm": wide,
-        "correlation": [{"keys": ["cage.mass_g", "cage.bar_width_mm"], "rank": 0.5}],
     }
     plain = Uncertain.model_validate(under)
 
@@ -221,16 +220,9 @@ def test_declarations_over_others_replace_them_key_by_key() -> None:
     )
     assert over(**{"cage.mass_g": narrow}).laws["cage.mass_g"].low == 45.0
     fixed = over(set=["cage.mass_g=45", "cage.imbalance_um=2"])
-    assert (
-        set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"] and not fixed.correlation
-    )
+    assert set(fixed.laws) == {"cage.bar_width_mm"} and fixed.estimated == ["cage.land_width_mm"]
     law = over(**{"model.drag_coefficient": {"law": "uniform", "low": 0.3, "high": 1.0}})
     assert "model.drag_coefficient=0.5" not in law.assignments and len(law.laws) == 3
-    pair = {"keys": ["cage.bar_width_mm", "cage.mass_g"], "rank": -0.2}
-    assert [
-        entry.rank
-        for entry in over(**{"cage.mass_g": narrow, "cage.bar_width_mm": wide, "correlation": [pair]}).correlation
-    ] == [-0.2]
 
 
 def test_relative_values_multiply_what_the_scene_has() -> None:
@@ -272,7 +264,6 @@ def test_unknown_inputs_are_no_part_of_a_run() -> None:
             "cage.mass_g.sd: law = 'uniform' has none",
         ),
         ({"cage.mass_g": {"law": "log_uniform", "low": 0.0, "high": 2.0}}, "needs a positive one"),
-        ({"cage.mass_g": {"law": "triangular", "low": 0.0, "mode": 3.0, "high": 2.0}}, "mode = 3: not between"),
         (
             {"model.drag": {"law": "choices", "values": ["off", "cylinder"], "weights": [1.0]}},
             "must have one number for each",
@@ -282,7 +273,6 @@ def test_unknown_inputs_are_no_part_of_a_run() -> None:
             "no numbers to multiply",
         ),
         ({"points": 100}, "points = 100: no power of two; take 64"),
-        ({"correlation": [{"keys": ["cage.mass_g", "cage.imbalance_um"], "rank": 0.3}]}, "cage.mass_g has no law here"),
         ({"cage.mass_g": 3.0}, "cage.mass_g = 3.0: must be a table of keys"),
     ],
 )
@@ -317,7 +307,6 @@ def test_laws_are_their_distributions() -> None:
     for law, whole in (
         (Law(law="uniform", low=2.0, high=5.0), stats.uniform(2.0, 3.0)),
         (Law(law="log_uniform", low=0.1, high=10.0), stats.loguniform(0.1, 10.0)),
-        (Law(law="triangular", low=1.0, mode=2.0, high=5.0), stats.triang(0.25, 1.0, 4.0)),
         (Law(law="normal", mean=3.0, sd=0.5), stats.norm(3.0, 0.5)),
     ):
         values = np.array(values_of(law, levels))
@@ -328,30 +317,6 @@ def test_laws_are_their_distributions() -> None:
     choice = Law(law="choices", values=["a", "b", "c"], weights=[2.0, 1.0, 1.0])
     assert values_of(choice, np.array([0.1, 0.49, 0.51, 0.76, 1.0])) == ["a", "a", "b", "c", "c"]
     assert quantiles_of(choice, ["a", "b", "c"]) == pytest.approx([0.25, 0.625, 0.875])
-
-
-def test_ranks_correlate_as_asked() -> None:
-    pair = Uncertain.model_validate(
-        {
-            "a.x": {"law": "uniform", "low": 0.0, "high": 1.0},
-            "a.y": {"law": "log_uniform", "low": 0.1, "high": 9.0},
-            "correlation": [{"keys": ["a.x", "a.y"], "rank": 0.6}],
-        }
-    )
-    draws = dependent(nested(2, 4096, 1), copula(list(pair.laws), pair.correlation))
-    assert stats.spearmanr(*draws.T).statistic == pytest.approx(0.6, abs=0.01)
-    assert draws.mean(axis=0) == pytest.approx([0.5, 0.5], abs=0.005)
-
-
-def test_correlations_that_contradict_are_refused() -> None:
-    names = ["a.x", "a.y", "a.z"]
-    told = {name: {"law": "uniform", "low": 0.0, "high": 1.0} for name in names}
-    pairs = [
-        {"keys": [one, other], "rank": rank}
-        for one, other, rank in (("a.x", "a.y", 0.9), ("a.y", "a.z", 0.9), ("a.x", "a.z", -0.9))
-    ]
-    with pytest.raises(InputError, match="contradict each other"):
-        copula(names, Uncertain.model_validate({**told, "correlation": pairs}).correlation)
 
 
 def test_input_sets_nest_and_repeat() -> None:
