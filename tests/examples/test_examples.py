@@ -6,7 +6,6 @@ import importlib.util
 import json
 import math
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -259,20 +258,6 @@ def test_unit_extremes_of_several_scenes(outer, monkeypatch):
     assert [row[:3] for row in report.tables[0].rows] == [["scene", "2", "0"], ["cylindrical_roller.toml", "2", "0"]]
     assert [row["of"] for row in report.record["cases"]] == ["scene"] * 2 + ["cylindrical_roller.toml"] * 2
     assert not report.failed and max(row["power_gap"] for row in report.record["cases"]) < variants.LARGEST_GAP
-
-
-@pytest.mark.slow
-def test_unit_a_script_of_studies_writes_and_refuses(tmp_path):
-    """Unit: tables on standard output and files in the folder; a scene with nothing to study is one sentence, exit code 2."""
-    folder = EXAMPLES / "benchmarks"
-    battery = [sys.executable, folder / "ball_battery.py", "--scenes", "3", "--out", tmp_path]
-    ran = subprocess.run(battery, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stderr
-    assert "convex solves 100.00 % (43.8 to 100.0) of 3 random scenes" in ran.stdout
-    assert {path.name for path in tmp_path.iterdir()} == {"battery.json", "battery.csv", "battery.png"}
-    plain = [sys.executable, folder / "slicing.py", EXAMPLES / "cylindrical_roller.toml"]
-    refused = subprocess.run(plain, capture_output=True, text=True, check=False)
-    assert refused.returncode == 2 and refused.stderr.startswith("bearing.roller_profile = 'cylinder'")
 
 
 def test_unit_static_loads_bear_the_shaft():

@@ -4,24 +4,11 @@ from __future__ import annotations
 
 import math
 
-import ball_solvers
-import method_bias
 import numpy as np
 import pytest
-import replication
-import slicing
 
 from rbdyn.accuracy import tolerances
-from rbdyn.accuracy.tolerances import (
-    OUTPUTS,
-    Bias,
-    about,
-    check_replicates,
-    judged,
-    overall,
-    replicates_needed,
-    turns_needed,
-)
+from rbdyn.accuracy.tolerances import OUTPUTS, about, check_replicates, judged, overall, replicates_needed, turns_needed
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 
@@ -116,81 +103,7 @@ def test_unit_mixed_tolerances_conclude_what_they_can(outer):
     assert "Looser ones are undecided: errors of 5 % hide differences of 0 %" in told
 
 
-def test_unit_methods_conclude_only_what_errors_allow(outer):
-    """Unit: a method is called without bias only by a sharp row; failures and open balances count for nothing."""
-
-    def rows(error):
-        return [
-            method_bias.Row("ours", "rtol 0.1", "ok", 1.0, 1e-2, Bias(*bias(0.0, error))),
-            method_bias.Row("ours", "rtol 0.01", "ok", 1.2, 1e-4, Bias(*bias(0.002, error))),
-            method_bias.Row("ours", "rtol 0.001", "ok", 1.4, 1e-5, Bias(*bias(0.001, error))),
-            method_bias.Row("Verlet", "568 steps a turn", "ok", 0.5, 1e-4, Bias(*bias(0.3, error))),
-            method_bias.Row("RK4", "284 steps a turn", "failed: not finite", None, None, None),
-        ]
-
-    noisy = method_bias.conclusion(rows(0.43), outer)
-    assert noisy.startswith("Which method keeps its statistics is undecided: errors of 43 % hide")
-    sharp = method_bias.conclusion(rows(0.003), outer)
-    assert "ours 1.20 ms (rtol 0.01, errors at most 0.3 %)" in sharp
-    assert "Verlet" not in sharp and "undecided" not in sharp
-    none = method_bias.conclusion(rows(0.003)[3:], outer)
-    assert none == "No method shows biases of at most 1 % and a power balance closed to 0.5 %."
-
-
-def test_unit_slices_conclude_only_what_errors_allow(outer):
-    """Unit: the load, which does not scatter, is told at any noise; the outputs only where their errors allow."""
-
-    def rows(error):
-        return [
-            slicing.Row(*bias(size, error), slices, load, 1000.0)
-            for slices, load, size in ((9, 0.02, 0.0), (31, 0.004, 0.003), (61, 0.001, 0.001), (241, 1e-4, 0.0))
-        ]
-
-    noisy, sharp = slicing.conclusion(rows(0.2), outer), slicing.conclusion(rows(0.003), outer)
-    load = "31 slices are the fewest whose load is right within 0.5 %"
-    assert noisy.startswith(load) and sharp.startswith(load)
-    assert "undecided: errors of 20 % hide differences" in noisy and "measure at most" not in noisy
-    assert sharp.endswith("At 31 the biases of the outputs measure at most 1 % (their errors at most 0.3 %).")
-    coarse = [slicing.Row(*bias(0.0, 0.003), 9, 0.02, 900.0)]
-    assert slicing.conclusion(coarse, outer) == "not even 9 slices keep the load within 0.5 %"
-
-
-def test_unit_replicates_conclude_only_what_the_pool_allows(outer):
-    """Unit: a pool of four does not tell a slope of -0.5 from none, nor a half-width to a factor of two."""
-    draw = np.random.default_rng(2)
-    turns = (10.0, 20.0, 40.0, 80.0)
-
-    def study(pool, size):
-        samples = {n: {name: 1.0 + size * draw.normal(size=pool) / math.sqrt(n) for name in OUTPUTS} for n in turns}
-        rows = replication.replication_rows(samples, dict.fromkeys(turns, 1.0), (2, 4, 8, 16, 32))
-        slopes = {name: replication.slope(turns, [samples[n][name] for n in turns]) for name in OUTPUTS}
-        return " ".join(replication.conclusion(rows, slopes, outer, pool))
-
-    few = study(4, 0.15)
-    assert "undecided: errors of" in few and "as independent turns do" not in few
-    assert "within 1 %: undecided; " in few
-    many = study(400, 0.1)
-    assert "undecided" not in many and "as independent turns do" in many
-    assert "within 1 %: more than 32 replicates of 80 turns; by the square root about" in study(400, 2.0)
-
-
 def test_unit_a_single_replicate_is_refused(make_scene):
     """Unit: one mean has no error to judge by."""
     with pytest.raises(InputError, match=r"numerics\.replicates = 1: .* give at least 2"):
         check_replicates(make_scene("numerics.replicates=1"))
-
-
-def test_unit_solvers_are_told_apart_only_by_enough_scenes():
-    """Unit: 19 of 20 beside 20 of 20 is no difference, 950 beside 1000 of 1000 is; Wilson's interval as published."""
-    assert ball_solvers.share(81, 263) == pytest.approx((0.2553, 0.3662), abs=2e-4)  # Newcombe 1998, Table I
-    assert ball_solvers.share(0, 20) == pytest.approx((0.0, 0.1611), abs=2e-4)
-
-    def told(total):
-        rows = [
-            ball_solvers.Success(name, total, solved, median, median, median, 5.0, {})
-            for name, solved, median in (("sure", 1.0, 60.0), ("quick", 0.95, 20.0))
-        ]
-        return ball_solvers.conclusion([], rows)
-
-    assert "Take quick" in told(20) and "do not separate its reliability from sure" in told(20)
-    assert "Take sure" in told(1000) and "do not separate" not in told(1000)

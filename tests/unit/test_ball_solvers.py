@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
-import ball_battery
 import ball_solvers
 import minpack
 import numpy as np
@@ -220,19 +217,6 @@ def test_unit_battery_poses_what_its_scenes_pose():
         assert np.array_equal(constraint_of(scene), fast.fixed, equal_nan=True)
 
 
-def test_unit_battery_is_seeded_and_covers_its_ranges():
-    drawn = cases(400)
-    assert drawn[:30] == cases(30) and drawn[:30] != cases(30, seed=2)
-    factors = [case.operation["inner_speed_rpm"] * case.bearing["pitch_diameter_mm"] for case in drawn]
-    assert min(factors) == 0.0 and 2e6 < max(factors) <= 3e6
-    assert {case.bearing["kind"] for case in drawn} == {"angular_contact_ball", "deep_groove_ball"}
-    assert any(case.operation.get("tilt") == "fixed" for case in drawn)
-    assert any(case.operation["outer_speed_rpm"] < 0.0 for case in drawn)
-    changes = [case.bearing.get("clearance_change_um", 0.0) for case in drawn]
-    assert min(changes) < 0.0 < max(changes)
-    assert cases(1, friction_limit=0.2)[0].model["friction_limit"] == 0.2
-
-
 def test_unit_solver_study_of_a_scene(tmp_path):
     from rbdyn.accuracy import write
 
@@ -248,40 +232,6 @@ def test_unit_solver_study_of_a_scene(tmp_path):
     assert found.record["nearby"][0] == {**found.record["nearby"][0], "solver": "convex", "solved": 1.0}
     assert "Take convex" in found.sentences[-1]
     assert set(write(found, tmp_path)) == {"solvers.json", "solvers.csv", "solvers.png"}
-
-
-def test_unit_perturbations_leave_the_rest_of_the_scene_alone():
-    scene = Scene.load(BALLS)
-    problems = ball_solvers.perturbed(scene, 5)
-    assert len({problem.load[0] for problem in problems}) == 5
-    for problem in problems:
-        assert 20.0 <= problem.load[0] <= 2000.0 and 20.0 <= problem.load[2] <= 2000.0
-        assert np.array_equal(problem.fixed, problem_of(scene).fixed, equal_nan=True)
-        assert problem.row.inner_stiffness == problem_of(scene).row.inner_stiffness
-
-
-def test_unit_battery_study(tmp_path):
-    """Three scenes, all of fixed shares; times are there, causes add up."""
-    from rbdyn.accuracy import write
-
-    found = ball_battery.study(Scene.load(BALLS), scenes=3)
-    solvers = {row["solver"]: row for row in found.record["solvers"]}
-    assert set(solvers) == set(ball_battery.SOLVERS) > set(ball_solvers.WHOLE)
-    for row in solvers.values():
-        assert round(row["solved"] * 3) + sum(row["causes"].values()) == row["problems"] == 3
-        assert 0.0 < row["median_us"] <= row["longest_us"]
-    assert solvers["convex"]["solved"] == 1.0
-    assert [row["solver"] for row in found.record["by_control"]] == ["outer", "inner", "half"]
-    json.dumps(found.record, allow_nan=False)
-    assert set(write(found, tmp_path)) == {"battery.json", "battery.csv", "battery.png"}
-
-
-def test_unit_an_equilibrium_elsewhere_is_counted(problem, ours):
-    other = ours._replace(outer_load=ours.outer_load * 1.01)
-    case = cases(1)[0]
-    runs = [ball_battery.Run(case, "convex", ours, 1.0), ball_battery.Run(case, "convex", ours, 1.0)]
-    theirs = [ball_battery.Run(case, "x", other, 1.0), ball_battery.Run(case, "x", ours, 1.0)]
-    assert ball_battery._elsewhere(theirs, runs) == 1
 
 
 def test_unit_progress_and_failed_references(problem):
