@@ -18,7 +18,7 @@ from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_sheet
-from doe.report.sections.record import notes_of, readable
+from doe.report.sections.record import readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
 from doe.report.sections.search import (
     adaptive_record,
@@ -136,7 +136,7 @@ def blocks(record: Summary | Mapping[str, Any]) -> list[Block]:
     ]
     return readable(
         [
-            Verdict(notes_of(clean)),
+            Verdict(tuple(clean.notes)),
             *first_screen(clean),
             *notes(clean, {}).blocks,
             *(replace(block, detail=Detail.ALL) for block in details),

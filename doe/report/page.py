@@ -18,7 +18,7 @@ from doe.report.sections import answer, bearing, chain, design, duty, fit, front
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
-from doe.report.sections.record import Record, drop_undefined, factors, notes_of, part, readable, record_table
+from doe.report.sections.record import Record, drop_undefined, part, readable, record_table
 from doe.report.summary import Summary, restored
 from doe.workflow.asked import Asked, Factor, Response
 from doe.workflow.surface_front import EstimatedPoint, Point, RobustPoint
@@ -56,7 +56,7 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
     data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
-    opening = "".join(map(html.render, readable([Verdict(notes_of(record))], record.asked)))
+    opening = "".join(map(html.render, readable([Verdict(tuple(record.notes))], record.asked)))
     return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
 
 
@@ -107,7 +107,7 @@ def _json(record: Mapping[str, Any]) -> str:
 
 def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     """Factors, surfaces, runs, fronts and motion, ready for JSON."""
-    inputs = factors(summary)
+    inputs = summary.asked.factors
     names = summary.asked.names
     marks = picks(summary)
     record = {

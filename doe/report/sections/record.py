@@ -10,9 +10,9 @@ from dataclasses import replace
 from typing import Any
 
 from doe.pareto.manufacture import Interval, percent
-from doe.workflow.asked import Asked, Factor
+from doe.workflow.asked import Asked
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import Note
 from rbdyn.base.words import improvement, label, quantity, shown
 
 # A record of a study, or a part of it.
@@ -34,16 +34,6 @@ def part(record: Record, *keys: str) -> Any:
     for key in keys:
         value = value.get(key) if isinstance(value, Mapping) else getattr(value, key, None)
     return value
-
-
-def factors(summary: Record) -> list[Factor]:
-    """Factors in the study's order."""
-    return list(summary.asked.factors)
-
-
-def responses(summary: Record) -> list[dict[str, Any]]:
-    """Responses in the study's order: name, goal and their other settings."""
-    return [response.as_dict() for response in summary.asked.responses]
 
 
 def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -97,11 +87,6 @@ def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]
     words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
     ratios = {label(each.name): each.label for each in (asked.responses if asked else ()) if each.is_ratio}
     return [_without_unit(_spelt(block, words), ratios) for block in blocks if has_content(block)]
-
-
-def notes_of(summary: Record) -> Notes:
-    """Notes of a record."""
-    return tuple(part(summary, "notes") or ())
 
 
 def _without_unit(block: Block, ratios: Mapping[str, str]) -> Block:

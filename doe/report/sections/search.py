@@ -13,7 +13,7 @@ import numpy as np
 
 from doe.adaptive.emulators import LEAST_DEVIATION
 from doe.pareto.front import NOISE_DRAWS, noisy_hypervolume
-from doe.report.sections.record import Record, factors, part
+from doe.report.sections.record import Record, part
 from doe.report.still import COLOURS, SMALL, Still, name_marks
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
 from doe.workflow.problem import Problem
@@ -111,7 +111,7 @@ def search_stills(summary: Record) -> tuple[list[Still], list[Still]]:
         words = f"Hypervolume of the search rises from {ends}"
         progress.append(Still(words, partial(_progress, lines), height=HIGH, bottom_margin=BOTTOM))
     if spent := spent_runs(summary):
-        first, *others = factors(summary)
+        first, *others = summary.asked.factors
         for other in others:
             words = f"{sum(map(len, spent.values()))} runs over {label(first.name)} and {label(other.name)}"
             draw = partial(_where, spent, part(summary, "pick"), first.name, other.name)
