@@ -79,6 +79,7 @@ class StudyAnswer(Answer):
         from doe.report.sections.duty import duty_figures
         from doe.report.sections.fit import fit_rows
 
+        searched = self.summary.adaptive
         fits = fit_rows([*self.summary.fit.responses.values()])
         return {
             "gains": self._gains(),
@@ -93,7 +94,7 @@ class StudyAnswer(Answer):
                 }
                 for run in self.summary.design.points
             ],
-            "front": self._front(),
+            "front": [point.row for point in (searched or self.summary.front).front],
             "confirmation": [
                 {"point": name, **point.factors, "response": response, **value.as_dict()}
                 for name, point in self.summary.confirmation.items()
@@ -103,15 +104,6 @@ class StudyAnswer(Answer):
             **{name: fits[name] for name in ("quality", "anova", "coefficients")},
             **({"duty": duty_figures(self.summary).records} if self.summary.duty else {}),
         }
-
-    def _front(self) -> Rows:
-        """Points of the front: those of the adaptive search where there was one."""
-        from doe.workflow.surface_front import EstimatedPoint
-
-        searched = self.record.get("adaptive")
-        if searched is None:
-            return [point.row for point in self.summary.front.front]
-        return [EstimatedPoint.from_dict(point).row for point in searched["front"]]
 
     def _gains(self) -> Rows:
         gains, points, rows = self.summary.gains, self.summary.confirmation, []

@@ -7,8 +7,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from doe import clearance
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
@@ -20,24 +18,16 @@ from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_sheet
 from doe.report.sections.record import readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
-from doe.report.sections.search import (
-    adaptive_record,
-    archive_table,
-    compared_record,
-    in_few_runs,
-    limiting_sentence,
-    search_sentences,
-)
+from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences
 from doe.report.summary import Summary, restored
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
-from doe.workflow.adaptive import Adaptive
 from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.duty import DutyAnswer
-from doe.workflow.pick import SearchedPick
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, StudyDesign
+from doe.workflow.search_record import SearchResult, predicted_rows
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
@@ -75,7 +65,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         **fit_files(outcome.surfaces),
         "front.csv": front_sheet(study.factors, study.responses, result.front.front).records
         if outcome.adaptive is None
-        else archive_table(study, outcome.adaptive),
+        else predicted_rows(study, outcome.adaptive),
         "confirmation.csv": confirmation_sheet(study.factors, result.confirmation).records,
         "part_dimensions.csv": part_sheet(outcome.chains).records,
     }
@@ -98,9 +88,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
         pictures.append("robust_front.png")
         plots.robust_front(outcome.robust.front, folder / pictures[-1])
-    if outcome.adaptive is not None:
+    if result.adaptive is not None:
         pictures.append("adaptive_search.png")
-        plots.adaptive_search(result, folder / pictures[-1])
+        plots.adaptive_search(result, result.adaptive, folder / pictures[-1])
     if gain_stills(result):
         pictures.append("duty_gains.png")
         plots.duty_gains(result, folder / pictures[-1])
@@ -183,7 +173,7 @@ def summary(outcome: StudyResult) -> Summary:
         inputs=outcome.inputs,
         seeds={"design": study.file.design.seed, "front": study.file.front.seed, "adaptive": study.file.adaptive.seed},
         duty=_duty(outcome),
-        adaptive=None if outcome.adaptive is None else _adaptive_record(outcome, outcome.adaptive),
+        adaptive=_search(outcome),
         robust=outcome.robust,
         tolerances=None if tolerances is None else tolerances.by_factor,
         tolerances_gains=None if tolerances is None else tolerances.by_gain,
@@ -201,32 +191,18 @@ def _duty(outcome: StudyResult) -> DutyAnswer | None:
     return replace(outcome.duty, points=points)
 
 
-def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]:
-    """The search, its fronts compared with others, and all of it in ``sentences``; ``held`` is the one on the limits of the pick."""
-    sentences = search_sentences(outcome)
-    sentences_record = {"held": limiting_sentence(outcome), "sentences": sentences, "sentence": " ".join(sentences)}
-    volumes = (
-        {} if outcome.front_comparison is None else compared_record(outcome.study, adaptive, outcome.front_comparison)
+def _search(outcome: StudyResult) -> SearchResult | None:
+    """The search with what to say of it."""
+    if outcome.adaptive is None or outcome.front_comparison is None:
+        return None
+    return SearchResult.of(
+        outcome.study,
+        outcome.adaptive,
+        outcome.front_comparison,
+        limiting_sentence(outcome),
+        search_sentences(outcome),
+        outcome.searched_pick,
     )
-    pick = outcome.searched_pick
-    chosen = {} if pick is None else {"chosen": _chosen_record(pick)}
-    return adaptive_record(outcome.study, adaptive) | {"compared": volumes} | sentences_record | chosen
-
-
-def _chosen_record(pick: SearchedPick) -> dict[str, Any]:
-    """Why the pick is this point of the searched front, and the share of its parts that still dominate the baseline.
-
-    ``share``: of draws of the simulation's errors in which it is the pick; ``next``: the most frequent other row, if any.
-    """
-    aware, others = pick.aware, np.where(np.arange(len(pick.shares)) == pick.row, 0.0, pick.shares)
-    rival = int(others.argmax())
-    return {
-        "row": pick.row,
-        "reason": pick.reason,
-        "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
-        "share": float(pick.shares[pick.row]),
-        "next": {"row": rival, "share": float(others[rival])} if others[rival] > 0.0 else None,
-    }
 
 
 def reference_sheet(factors: Sequence[str], responses: Sequence[str], rows: Sequence[Row] = ()) -> Sheet[Row]:

@@ -130,9 +130,9 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
         "compared": {name: _point(point, summary.asked) for name, point in marks.items()},
         "motion": {name: _moving(run["moving"]) for name, run in motion.items() if part(run, "moving")},
     }
-    if emulators := part(summary, "adaptive", "emulators"):
-        region = [part(summary, "adaptive", "region", factor.name) for factor in inputs]
-        record["emulators"] = emulators | {"region": region}
+    if summary.adaptive is not None:
+        region = [summary.adaptive.region[name] for name in summary.asked.columns]
+        record["emulators"] = summary.adaptive.emulators.as_dict() | {"region": region}
     return record
 
 

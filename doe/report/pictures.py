@@ -16,10 +16,12 @@ from doe.report.sections.duty import gain_stills
 from doe.report.sections.front_pictures import drawn_pairs, near
 from doe.report.sections.record import Record
 from doe.report.sections.search import search_stills
+from doe.report.summary import Summary
 from doe.response_surface import Surface
 from doe.workflow.asked import Asked
 from doe.workflow.judgement import RobustFront
 from doe.workflow.problem import Problem
+from doe.workflow.search_record import SearchResult
 from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 
@@ -71,10 +73,10 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
     plt.close(figure)
 
 
-def adaptive_search(record: Record, path: Path) -> None:
-    """Hypervolume against runs compared with other fronts, and where each run was spent and why, of the record of a study."""
-    progress, places = search_stills(record)
-    still.save([*progress, *places], COLUMNS, path)
+def adaptive_search(summary: Summary, search: SearchResult, path: Path) -> None:
+    """Hypervolume against runs compared with other fronts, and where each run was spent and why."""
+    progress, places = search_stills(summary, search)
+    still.save([progress, *places], COLUMNS, path)
 
 
 def duty_gains(record: Record, path: Path) -> None:

@@ -16,6 +16,7 @@ from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
 from doe.workflow.runs import StudyDesign
+from doe.workflow.search_record import SearchResult
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
@@ -61,7 +62,7 @@ class Summary(Record, kw_only=True):
     inputs: str
     seeds: dict[str, int]
     duty: DutyAnswer | None = None
-    adaptive: Any = None
+    adaptive: SearchResult | None = None
     robust: Robust | None = None
     tolerances: dict[str, FactorTolerance] | None = None
     tolerances_gains: dict[str, KeptGain] | None = None

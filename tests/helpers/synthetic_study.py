@@ -238,6 +238,28 @@ def pocket_chain() -> ChainResult:
     return solve(Chain.model_validate({"closing_link": limits, "link": links}), samples=1000)
 
 
+def searched(emulators: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The record of a made-up search in few runs."""
+    front = [point([0.5, 1.0 - 0.1 * k, -1.6 + 0.1 * k]) for k in range(4)]
+    batches = [(20, 0.8, "improvement"), (26, 0.9, "check")]
+    return {
+        "front": front, "pick": {**front[1], "reason": "the knee"}, "runs": 26, "fresh": 20, "hypervolume": 0.9,
+        "hypervolume_fresh": 0.88, "hypervolume_fresh_error": 0.02, "stopped": "the budget is spent", "extended": [],
+        "history": [{"runs": runs, "hypervolume": volume, "deviation": 0.01, "gained": None, "left": 0.02, "left_error": 0.01,
+                     "why": why} for runs, volume, why in batches],
+        "region": {name: [c - REACH * s, c + REACH * s] for name, c, s in zip(FACTORS, CENTRE, STEP, strict=True)},
+        "points": [{"factors": each["factors"], "replicates": 8, "why": "design"} for each in front],
+        "predicted_front_points": 4, "predicted_front": [],
+        "missed": {name: {"bias": 0.1, "spread": 1.0} for name in RESPONSES},
+        "emulators": emulators or {"centre": CENTRE, "half_range": STEP, "points": [], "responses": {}},
+        "failed": 0, "seed": 1, "seconds": 3.0, "emulator_seconds": 1.0,
+        "compared": {"ideal": {}, "nadir": {}, "search": [volume for _, volume, _ in batches], "surfaces": 0.7,
+                     "fresh": {"hypervolume": 0.88, "error": 0.02}},
+        "held": "What limits the pick: nothing.",
+        "sentences": ["The pick has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."],
+    }  # fmt: skip
+
+
 def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
     """Record of ``doe.clearance.motion_record``: rollers going round at even speed."""
     turn = 2.0 * math.pi

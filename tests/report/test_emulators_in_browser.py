@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from short_studies import EXAMPLES
-from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
+from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, searched, summary
 
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.page import html_report
-from doe.report.sections.search import emulators_record
 from doe.workflow.problem import Problem
+from doe.workflow.search_record import Emulated
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,8 @@ def with_emulators(record: dict[str, Any]) -> tuple[dict[str, Any], Emulators]:
     found = SimpleNamespace(search=SimpleNamespace(emulators=emulators))
     region = {each["name"]: [each["low"], each["high"]] for each in record["asked"]["factors"]}
     region[FACTORS[2]][1] += 0.1
-    return record | {"adaptive": {"emulators": emulators_record(study, found), "region": region}}, emulators
+    search = searched(Emulated.of(study, found).as_dict()) | {"region": region}
+    return record | {"adaptive": search}, emulators
 
 
 def test_oracle_scripts_evaluate_emulators_as_python_does(browser):

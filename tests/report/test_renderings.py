@@ -6,7 +6,7 @@ import html
 import re
 
 import pytest
-from synthetic_study import RESPONSES, motion, summary
+from synthetic_study import RESPONSES, motion, searched, summary
 
 from doe.report.files import answer_text, blocks
 from doe.report.page import html_report, sections
@@ -46,8 +46,9 @@ def record() -> dict:
             "limits": {RESPONSES[2]: limit},
             "every_limit": [{"response": RESPONSES[2], **limit}],
         }
+    whole["limits"] = {RESPONSES[2]: {**limit, "odds": None}}
     whole["edge"]["sentence"] = "The pick lies 0.05 mm inside of the region."
-    whole["adaptive"] = {"sentences": ["The pick has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."]}
+    whole["adaptive"] = searched()
     whole["tolerances_sentence"] = "95 % of the parts keep the gain of 3.25 ± 0.41 %."
     return whole
 

@@ -15,10 +15,11 @@ from short_studies import SHORT, run_design, run_study, short_study, silent
 from doe import clearance
 from doe.clearance import Simulations
 from doe.report.files import write
-from doe.report.sections.search import adaptive_record, spent_sentence
+from doe.report.sections.search import spent_sentence
 from doe.running.store import STORE, Store
-from doe.workflow.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
+from doe.workflow.adaptive import advice, border_of, check_adaptive, compare_fronts, find_adaptive, region_in_units
 from doe.workflow.problem import Problem
+from doe.workflow.search_record import SearchResult
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError
 
@@ -164,8 +165,8 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
     path = written(tmp_path, (pocket, f"{pocket}allowed = [0.15, 0.40]\n"), budget=60)
     found = search(path, tmp_path, 1)
     study = Problem.load(path)
-    record = adaptive_record(study, found)
-    assert {move["factor"] for move in record["extended"]} == {"pocket_clearance_mm"}
+    record = SearchResult.of(study, found, compare_fronts(study, found, found.front.points))
+    assert {move.factor for move in record.extended} == {"pocket_clearance_mm"}
     assert 0.15 <= found.edges[2, 0] < 0.2159 or found.edges[2, 1] > 0.3841
     assert found.front.points[:, 2].min() >= 0.15 and found.front.points[:, 2].max() <= 0.40
     assert "Its region grew: pocket clearance to 0." in spent_sentence(study, found)

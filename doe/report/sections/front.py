@@ -90,8 +90,7 @@ def _fronts(asked: Asked, result: SurfaceFront, searched: Sequence[Point] = ()) 
 
 def fronts(summary: Summary) -> list[Front]:
     """The front on the surfaces and those compared with it, each sorted by the first response and thinned."""
-    searched = (summary.adaptive or {}).get("front", [])
-    return _fronts(summary.asked, summary.front, [EstimatedPoint.from_dict(point) for point in searched])
+    return _fronts(summary.asked, summary.front, () if summary.adaptive is None else summary.adaptive.front)
 
 
 def picks(summary: Summary) -> dict[str, Point]:
