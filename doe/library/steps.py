@@ -19,7 +19,6 @@ from rbdyn.base.words import counted, quantity, with_error
 
 if TYPE_CHECKING:
     from doe.dimension_chain import ChainResult
-    from doe.response_surface import Surface
     from doe.response_surface.statistics import Fit
     from doe.workflow.asked import Asked
     from doe.workflow.design import DesignResult
@@ -164,8 +163,8 @@ def fit(
         study, notes = _study_or_table(study_path, table, factors, responses, model)
         output.claim(study.path, *_read_later(study, table))
         stack.enter_context(registered(study.path, folder))
-        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
-        surfaces = with_rivals(surfaces)
+        study, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
+        surfaces = with_rivals(study.surfaces)
         record = fits_of(surfaces).as_dict() | notes_record((*reading, *notes, *unrivalled(surfaces)))
         columns = (
             f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
@@ -217,10 +216,8 @@ def _read_later(study: "Problem", data: Path | None) -> list[Path]:
     return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]
 
 
-def _surfaces(
-    study: "Problem", data: Path | None, out: Path | None, effort: Effort
-) -> "tuple[Problem, list[Surface], Notes]":
-    """The study with its region, surfaces of it, of a table or of simulated runs, and notes on both.
+def _surfaces(study: "Problem", data: Path | None, out: Path | None, effort: Effort) -> "tuple[Problem, Notes]":
+    """The study with its region and its surfaces, of a table or of simulated runs, and notes on both.
 
     Raises InputError, RunError, KeyboardInterrupt.
     """
@@ -230,14 +227,14 @@ def _surfaces(
 
     if data is not None:
         runs = read_runs(study, data)
-        return study, fit_surfaces(study, runs), runs.notes
+        return study.with_surfaces(fit_surfaces(study, runs)), runs.notes
     with effort.folder(out) as folder:
         study, notes = region_that_runs(study, folder, effort)
         if effort.notice is not None:
             effort.notice(f"{counted(len(study.design.coded), 'design run')}, {effort.threads} at once")
         with effort.simulations(folder, study.path) as simulations:
             runs = run_design(study, simulations, simulations.progress("design runs"))
-        return with_remaining(study, runs), fit_surfaces(study, runs), notes
+        return with_remaining(study, runs).with_surfaces(fit_surfaces(study, runs)), notes
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -314,16 +311,16 @@ def front(
         check_goals(study)
         values = None if point is None else _point(study, _point_text(point))
         output.claim(path, *_read_later(study, table))
-        study, surfaces, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
-        pareto = with_survival(study, surfaces, find_front(study, surfaces))
+        study, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
+        pareto = with_survival(study, find_front(study))
         if pareto.violations is not None:
             raise out_of_reach(study, pareto.points[0], pareto.violations)
         if pareto.tolerance_violations is not None:
             reading = (*reading, Note("tolerances", tolerances_out_of_reach(study, pareto.tolerance_violations)))
-        extrapolated = extrapolation_notes(surfaces, study.coded(pareto.points[pareto.pick]))
+        extrapolated = extrapolation_notes(study.surfaces, study.coded(pareto.points[pareto.pick]))
         notes = [*extrapolated, *reading]
-        stated = None if values is None else StatedPoint.at(study, surfaces, pareto, np.array(values))
-        result = replace(SurfaceFront.of(study, surfaces, pareto), notes=notes or None, point=stated)
+        stated = None if values is None else StatedPoint.at(study, pareto, np.array(values))
+        result = replace(SurfaceFront.of(study, pareto), notes=notes or None, point=stated)
         identity, asked = study_identity("doe front", study, table), Asked.of(study)
         answer = FrontAnswer(result.as_dict(), folder, result=result, asked=asked, identity=identity)
         sheet = front_sheet(study.factors, study.responses, result.front)

@@ -62,7 +62,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     runs = run_sheet(study.factors, study.responses, result.design.points)
     tables = {
         runs.file: runs.records,
-        **fit_files(outcome.surfaces),
+        **fit_files(outcome.study.surfaces),
         "front.csv": front_sheet(study.factors, study.responses, result.front.front).records
         if outcome.adaptive is None
         else predicted_rows(study, outcome.adaptive),
@@ -81,7 +81,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     for name, rows in tables.items():
         save_table(rows, folder / name)
     pictures = []
-    for surface in outcome.surfaces:
+    for surface in outcome.study.surfaces:
         pictures.append(f"surface_{NO_WORD.sub('_', surface.name)}.png")
         plots.response_surface(study, surface, folder / pictures[-1])
     plots.pareto_front(outcome, folder / "pareto_front.png")
@@ -149,9 +149,9 @@ def summary(outcome: StudyResult) -> Summary:
         edge=outcome.edge,
         asked=Settings.of_runs(study),
         design=StudyDesign.of(study, outcome.design, outcome.runs),
-        fit=fits_of(outcome.surfaces),
-        front=SurfaceFront.of(study, outcome.surfaces, outcome.front),
-        pick_on_surfaces=EstimatedPoint.predicted(study, outcome.surfaces, outcome.pick.point),
+        fit=fits_of(outcome.study.surfaces),
+        front=SurfaceFront.of(study, outcome.front),
+        pick_on_surfaces=EstimatedPoint.predicted(study, outcome.pick.point),
         pick=study.by_factor(outcome.pick.point),
         operating_clearances_mm=outcome.clearances.operating,
         clearance_class=outcome.clearances.class_sentence,

@@ -86,7 +86,7 @@ def duty_gains(record: Record, path: Path) -> None:
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
     """Pairs of goals: the fronts, and baseline and pick both on the surfaces and simulated."""
-    study, surfaces, asked = outcome.study, outcome.surfaces, Asked.of(outcome.study)
+    study, surfaces, asked = outcome.study, outcome.study.surfaces, Asked.of(outcome.study)
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
     if outcome.front.tolerance_aware is not None:
         clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))

@@ -20,7 +20,6 @@ from doe.clearance import Simulations
 from doe.duty import Run, main_scene, scenes_of
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
-from doe.response_surface import Surface
 from doe.running.runner import Progress
 from doe.running.store import Failure, grouped
 from doe.threads import one_thread
@@ -200,9 +199,11 @@ def border_of(study: Problem) -> Border | None:
     return Border(low, high, possible)
 
 
-def advice(study: Problem, surfaces: list[Surface]) -> list[str]:
+def advice(study: Problem) -> list[str]:
     """Advice to search adaptively, for surfaces with significant lack of fit; else none."""
-    lacking = [surface.name for surface in surfaces if (p := surface.lack_of_fit.p) is not None and p < SIGNIFICANT]
+    lacking = [
+        surface.name for surface in study.surfaces if (p := surface.lack_of_fit.p) is not None and p < SIGNIFICANT
+    ]
     if not lacking:
         return []
     design = len(study.design.coded)

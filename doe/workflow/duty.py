@@ -181,14 +181,14 @@ def own_pick(study: Problem, runs: Runs, pick: Array) -> OwnPick:
 
     ``study`` is that of the point alone. Raises InputError where it has no front.
     """
-    surfaces = fit_surfaces(study, runs)
-    front = find_front(study, surfaces)
+    study = study.with_surfaces(fit_surfaces(study, runs))
+    front = find_front(study)
     if front.violations is not None:
         raise out_of_reach(study, front.points[0], front.violations)
     point = study.rounded_within(front.points[front.pick])
-    values = predict_all(surfaces, study.coded(point)[None])[0]
+    values = predict_all(study.surfaces, study.coded(point)[None])[0]
     from_pick = study.file.model_copy(update={"baseline": study.by_factor(pick)})
-    over_pick = predicted_gains(replace(study, file=from_pick), surfaces, point)
+    over_pick = predicted_gains(replace(study, file=from_pick), point)
     responses = dict(zip(study.responses, values.tolist(), strict=True))
     return OwnPick(study.by_factor(point), responses, front.pick_reason, {gain.response: gain for gain in over_pick})
 

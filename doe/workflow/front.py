@@ -45,9 +45,7 @@ AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
 
 
 @one_thread
-def find_front(
-    study: Problem, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
-) -> ParetoFront:
+def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int = 0) -> ParetoFront:
     """The Pareto front on the surfaces with its uncertainty, and the tolerance-aware front if the study asks for it.
 
     Its points keep every limit with the probability that the study asks for. The back-off follows from the standard
@@ -60,11 +58,11 @@ def find_front(
     goals, settings, reach = study.goals, study.file.front, study.reach
     check_goals(study)
     box = tolerance_box(study)
-    doubt, remaining = SurfaceDoubt(study, surfaces, simulated), study.remaining
+    doubt, remaining = SurfaceDoubt(study, simulated), study.remaining
 
     def plain(errors: Doubt, closest: bool = False) -> ParetoFront:
         return front(
-            lambda points: predict_all(surfaces, study.coded(points)),
+            lambda points: predict_all(study.surfaces, study.coded(points)),
             study.actual(-reach),
             study.actual(reach),
             goals=goals,
@@ -82,13 +80,13 @@ def find_front(
             # Before any point is simulated nothing is expected but the surfaces.
             errors = doubt.expected if simulated else doubt.at_share(SHARES[-1])
             pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
-    pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
+    pareto = replace(pareto, uncertainty=_uncertainty(study, pareto))
     if box is None or pareto.violations is not None:
         return pareto
     with named_faults(study, goals, study.actual, " after manufacture"):
         try:
             aware = _backed_off(
-                study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt.at_share(share)), failed
+                study, lambda share: _tolerance_aware(study, pareto, box, doubt.at_share(share)), failed
             )
         except InfeasibleError as error:
             return replace(pareto, tolerance_violations=error.violations)
@@ -96,9 +94,7 @@ def find_front(
 
 
 @one_thread
-def with_survival(
-    study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
-) -> ParetoFront:
+def with_survival(study: Problem, pareto: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None) -> ParetoFront:
     """The front with the intervals of the shares of parts that dominate the baseline.
 
     The ``confirmed`` points, which were simulated, narrow the errors of the surfaces.
@@ -106,7 +102,7 @@ def with_survival(
     aware = pareto.tolerance_aware
     if aware is None:
         return pareto
-    draws = draws_of(study, surfaces, confirmed)
+    draws = draws_of(study, confirmed)
     plain, pick = (
         survival(study, draws, point, aware.box)
         for point in (study.coded(pareto.points[pareto.pick]), aware.points[aware.pick])
@@ -132,22 +128,20 @@ def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int
     raise AssertionError("the last share either returns or raises")
 
 
-def _uncertainty(study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
+def _uncertainty(study: Problem, pareto: ParetoFront) -> FrontUncertainty:
     assert pareto.baseline_values is not None
-    coefficients = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
+    coefficients = draw_all(study.surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([pareto.points, study.baseline])
-    values = predict_draws(surfaces, coefficients, study.coded(points), study.file.front.seed)
+    values = predict_draws(study.surfaces, coefficients, study.coded(points), study.file.front.seed)
     baseline = values[:, -1], pareto.baseline_values
     pick = pareto.goals, pareto.values, pareto.pick, study.file.front.pick
     return front_uncertainty(values[:, :-1], *pick, *baseline)
 
 
-def _tolerance_aware(
-    study: Problem, surfaces: Sequence[Surface], pareto: ParetoFront, box: ToleranceBox, doubt: Doubt
-) -> ToleranceAware:
+def _tolerance_aware(study: Problem, pareto: ParetoFront, box: ToleranceBox, doubt: Doubt) -> ToleranceAware:
     reach = study.reach
     return tolerance_aware_front(
-        quadratics(surfaces, len(study.factors)),
+        quadratics(study.surfaces, len(study.factors)),
         box,
         -reach,
         reach,
@@ -274,13 +268,13 @@ class ErrorField:
 class SurfaceDoubt:
     """Errors of the surfaces of limited responses, from the misses at the design runs and at points ``simulated``."""
 
-    def __init__(self, study: Problem, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
-        self._surfaces, self._probability = surfaces, study.file.confirmation.limit_probability
+    def __init__(self, study: Problem, simulated: Sequence[Confirmed] = ()) -> None:
+        self._surfaces, self._probability = study.surfaces, study.file.confirmation.limit_probability
         self._fields: dict[int, ErrorField] = {}
         # The error of one more simulation counts too.
         self._more: dict[int, float] = {}
         for index in sorted({index for index, _, _ in study.goals.limited}):
-            surface = surfaces[index]
+            surface = study.surfaces[index]
             all_misses = _at_design(surface)
             if simulated:
                 coded = study.coded(np.array([point.point for point in simulated]))
@@ -362,12 +356,7 @@ SURFACE_DRAWS = 500  # draws of the surfaces of all responses
 Draws = Callable[[Array], Iterator[Array]]
 
 
-def draws_of(
-    study: Problem,
-    surfaces: Sequence[Surface],
-    confirmed: Mapping[str, Confirmed] | None = None,
-    draws: int = SURFACE_DRAWS,
-) -> Draws:
+def draws_of(study: Problem, confirmed: Mapping[str, Confirmed] | None = None, draws: int = SURFACE_DRAWS) -> Draws:
     """Draws of the surfaces, conditioned on the ``confirmed`` points."""
     points = list((confirmed or {}).values())
     simulated = None
@@ -376,7 +365,7 @@ def draws_of(
             np.array([getattr(point, name) for point in points]) for name in ("point", "values", "standard_error")
         )
         simulated = Simulated(study.coded(positions), values, errors)
-    return partial(drawn_responses, surfaces, draws=draws, seed=study.file.front.seed, simulated=simulated)
+    return partial(drawn_responses, study.surfaces, draws=draws, seed=study.file.front.seed, simulated=simulated)
 
 
 def keeping(study: Problem, draws: Draws, point: Array, free: Rows, least_gains: Array) -> PartCount:

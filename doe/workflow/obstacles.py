@@ -4,12 +4,11 @@ A missed limit is judged at the best point by simulation. It may be relaxed to w
 probability, or factors may move beyond their bounds: the surfaces, shifted to the simulated point, are extrapolated there.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from doe.pareto import ParetoFront
-from doe.response_surface import Surface
 from doe.study_file.study import PointResponse
 from doe.workflow.confirmation import Confirmed, Limit, Verdict, every_limit
 from doe.workflow.front import tolerances_out_of_reach
@@ -151,7 +150,6 @@ class Obstacles(Record):
 
 def obstacles_of(
     study: Problem,
-    surfaces: Sequence[Surface],
     front: ParetoFront,
     pick: Confirmed,
     chains: Mapping[str, str],
@@ -173,7 +171,7 @@ def obstacles_of(
         reachable,
         tuple(MissedLimit.of(study, limit) for limit in missed),
         list(place_of(study, pick.point).bounds) if missed else [],
-        tuple(_beyond(study, surfaces, pick)) if missed else (),
+        tuple(_beyond(study, pick)) if missed else (),
         dict(chains),
         tolerances,
     )
@@ -190,14 +188,14 @@ def without_broken(study: Problem, pick: Confirmed) -> Problem:
     return study.with_file(response=responses)
 
 
-def _beyond(study: Problem, surfaces: Sequence[Surface], pick: Confirmed) -> Iterator[Beyond]:
+def _beyond(study: Problem, pick: Confirmed) -> Iterator[Beyond]:
     """The least moves of each factor at a bound, else of all of them together, that meet all limits."""
     ends = study.ends
     sides = sides_of(pick.point[None], ends)[0]
     places = np.flatnonzero(sides).tolist()
-    ways = [moved for place in places if (moved := _least_move(study, surfaces, pick, sides, [place])) is not None]
+    ways = [moved for place in places if (moved := _least_move(study, pick, sides, [place])) is not None]
     if not ways and len(places) > 1:
-        ways = [moved for moved in [_least_move(study, surfaces, pick, sides, places)] if moved is not None]
+        ways = [moved for moved in [_least_move(study, pick, sides, places)] if moved is not None]
     for moved in ways:
         changed = np.flatnonzero(moved != pick.point).tolist()
         yield Beyond(
@@ -206,16 +204,16 @@ def _beyond(study: Problem, surfaces: Sequence[Surface], pick: Confirmed) -> Ite
         )
 
 
-def _least_move(
-    study: Problem, surfaces: Sequence[Surface], pick: Confirmed, sides: Array, places: list[int]
-) -> Array | None:
+def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]) -> Array | None:
     """The nearest point (k,) to the pick, along these factors outward, at which the surfaces meet the limits; None without one."""
     ends, outward = study.ends, np.zeros(pick.point.size)
     outward[places] = (0.5 * (ends[:, 1] - ends[:, 0]) * sides)[places]
     shares = np.linspace(0.0, 1.0, STEPS + 1)[1:]
     points = np.array([study.rounded(pick.point + share * outward) for share in shares])
     values = (
-        pick.values + predict_all(surfaces, study.coded(points)) - predict_all(surfaces, study.coded(pick.point[None]))
+        pick.values
+        + predict_all(study.surfaces, study.coded(points))
+        - predict_all(study.surfaces, study.coded(pick.point[None]))
     )
     broken = np.zeros(len(points), dtype=bool)
     for limit in every_limit(study, pick):

@@ -17,7 +17,6 @@ from doe.designs.remaining import Remaining
 from doe.pareto import ParetoFront
 from doe.pareto.front import pick_shares
 from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware
-from doe.response_surface import Surface
 from doe.response_surface.adequacy import REACH
 from doe.running.store import Failure
 from doe.workflow.adaptive import Adaptive, emulator_draws
@@ -60,11 +59,7 @@ class SearchedPick:
 
 
 def searched_pick(
-    study: Problem,
-    surfaces: Sequence[Surface],
-    searched: Adaptive,
-    simulated: Sequence[Confirmed] = (),
-    failed: int = 0,
+    study: Problem, searched: Adaptive, simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> SearchedPick:
     """The point of the searched front by the study's rule, at the ends of its tolerances where the study asks for that.
 
@@ -83,10 +78,10 @@ def searched_pick(
     costs, violations = front.costs, goals.violations(front.values - below, front.values + above)
     aware, suffix = None, ""
     if (box := tolerance_box(study)) is not None:
-        neighbours, base = neighbourhood(study, surfaces, searched, coded, front.values), None
+        neighbours, base = neighbourhood(study, searched, coded, front.values), None
         if baseline_values is not None:
             coded_baseline = study.coded(study.baseline)[None]
-            base = neighbourhood(study, surfaces, searched, coded_baseline, baseline_values[None])
+            base = neighbourhood(study, searched, coded_baseline, baseline_values[None])
         aware = simulated_aware(box, neighbours, goals, base, below, above)
         costs, violations = aware.costs, aware.violations
         if not (violations <= 0.0).all(axis=1).any():
@@ -117,11 +112,9 @@ def _share_words(shares: Array, row: int) -> str:
     return f"; it is the pick in {100.0 * shares[row]:.0f} of 100 draws of the simulation's errors{rival}"
 
 
-def neighbourhood(
-    study: Problem, surfaces: Sequence[Surface], searched: Adaptive, coded: Array, values: Array
-) -> Neighbourhood:
+def neighbourhood(study: Problem, searched: Adaptive, coded: Array, values: Array) -> Neighbourhood:
     """Responses near coded points (n, k) with responses (n, m): the surfaces, corrected by the runs of the search."""
-    forms, runs = quadratics(surfaces, len(study.factors)), searched.front.searched
+    forms, runs = quadratics(study.surfaces, len(study.factors)), searched.front.searched
     return Neighbourhood.of(forms, coded, values, study.coded(runs.points), runs.values)
 
 
@@ -194,12 +187,7 @@ class Selection:
 
 
 def choose(
-    study: Problem,
-    surfaces: Sequence[Surface],
-    surface_front: ParetoFront,
-    searched: Adaptive | None,
-    baseline: Confirmed,
-    simulations: Simulations,
+    study: Problem, surface_front: ParetoFront, searched: Adaptive | None, baseline: Confirmed, simulations: Simulations
 ) -> Selection:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
@@ -210,7 +198,7 @@ def choose(
     front, lost = surface_front, 0
     while True:
         simulated = [baseline, *(point for point, _, _ in trials)] if trials else []
-        candidate = None if searched is None else searched_pick(study, surfaces, searched, simulated, len(trials))
+        candidate = None if searched is None else searched_pick(study, searched, simulated, len(trials))
         points = choices(study, front, searched, candidate)
         if any(np.array_equal(points["pick"].point, point.point) for point, _, _ in trials):
             break
@@ -221,15 +209,15 @@ def choose(
             lost += 1
             if searched is not None or lost > LOST:
                 raise
-            study = _without(study, surfaces, points["pick"].point)
-            front = find_front(study, surfaces, simulated, len(trials))
+            study = _without(study, points["pick"].point)
+            front = find_front(study, simulated, len(trials))
             continue
         trials.append((confirmed["pick"], front, candidate))
         limits_kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
         if limits_kept or len(trials) == study.file.confirmation.tries:
             break
         if searched is None:
-            front = find_front(study, surfaces, [baseline, *(point for point, _, _ in trials)], len(trials))
+            front = find_front(study, [baseline, *(point for point, _, _ in trials)], len(trials))
             if front.violations is not None and not _promises_less(study, front, [point for point, _, _ in trials]):
                 break
     best = min(range(len(trials)), key=lambda place: _badness(limits_of(study, trials[place][0])))
@@ -254,9 +242,9 @@ def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confi
     return bool((front.violations / bounds).max() < missed)
 
 
-def _without(study: Problem, surfaces: Sequence[Surface], point: Array) -> Problem:
+def _without(study: Problem, point: Array) -> Problem:
     """The study without the part of its region where a point (k,) failed."""
-    remaining = study.remaining or Remaining(surfaces[0].data.points, np.empty((0, point.size)))
+    remaining = study.remaining or Remaining(study.surfaces[0].data.points, np.empty((0, point.size)))
     failed = np.vstack([remaining.failed, study.coded(point)])
     return replace(study, remaining=replace(remaining, failed=failed))
 
@@ -414,7 +402,6 @@ def place_of(study: Problem, point: Array) -> Place:
 
 def edge_of(
     study: Problem,
-    surfaces: Sequence[Surface],
     pick: Confirmed,
     front: Array,
     searched: Array | None,
@@ -433,7 +420,7 @@ def edge_of(
     for index, side in names:
         gains, source = gains_beyond.get(index), "simulation"
         if gains is None:
-            gains, source = _gains_on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
+            gains, source = _gains_on_surfaces(study, pick.point, index, side), "the surfaces"
         unit, scale = ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
         bound = float(ends[index, int(side > 0)])
         per_unit = {name: BeyondBound(gain * scale, finite(error * scale)) for name, (gain, error) in gains.items()}
@@ -452,16 +439,14 @@ def sides_of(points: Array, ends: Array) -> Whole:
     return np.where(np.abs(offsets) >= 1.0 - 2.0 * NEAR, np.sign(offsets), 0.0).astype(np.int64)
 
 
-def _gains_on_surfaces(
-    study: Problem, surfaces: Sequence[Surface], point: Array, index: int, side: int
-) -> dict[str, tuple[float, float]]:
+def _gains_on_surfaces(study: Problem, point: Array, index: int, side: int) -> dict[str, tuple[float, float]]:
     """Gains per unit of the factor outward, with the error of the slope: that of the coefficients and the model's own."""
     goals = study.goals
     coded = study.coded(point)
     outward_point = coded + side * STEP * np.eye(coded.size)[index]
     gains = {}
     for column, response in enumerate(goals.objectives):
-        surface = surfaces[response]
+        surface = study.surfaces[response]
         ends = [float(surface.predict(position)) for position in (coded, outward_point)]
         values = np.zeros(len(study.responses))
         values[response] = ends[0]

@@ -1,11 +1,11 @@
 """A study resolved once and handed to every step: goals, design, region, tolerances, and its scenes at any point."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import compress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
+    from doe.response_surface import Surface
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,12 @@ class Problem(Study):
 
     built: dict[tuple[Any, ...], Scene] = field(default_factory=dict, compare=False, repr=False)
     """Scenes by their class and overrides."""
+    surfaces: tuple["Surface", ...] = field(default=(), compare=False, repr=False)
+    """Surfaces of its responses, once they are fitted."""
+
+    def with_surfaces(self, surfaces: "Iterable[Surface]") -> Self:
+        """The same with fitted surfaces."""
+        return replace(self, surfaces=tuple(surfaces))
 
     @cached_property
     def goals(self) -> "Goals":

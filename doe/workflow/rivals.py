@@ -4,14 +4,13 @@ The pick is chosen before it is simulated: by predicted responses, at the ends o
 point with worse predictions may turn out better in every response.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from doe.pareto import Goals, ParetoFront
-from doe.response_surface import Surface
 from doe.workflow.adaptive import Adaptive
 from doe.workflow.confirmation import ORDER, Confirmed, limits_of, point_words, verdict_of
 from doe.workflow.pick import SearchedPick
@@ -36,7 +35,6 @@ class Forecast:
     """
 
     study: Problem
-    surfaces: Sequence[Surface]
     front: ParetoFront
     searched: Adaptive | None
     searched_pick: SearchedPick | None
@@ -70,9 +68,9 @@ class Forecast:
 
     def _on_surfaces(self, goals: Goals, coded: Array) -> Prediction:
         if (aware := self.front.tolerance_aware) is not None:
-            judged = aware.box.judge(quadratics(self.surfaces, len(self.study.factors)), goals, coded)
+            judged = aware.box.judge(quadratics(self.study.surfaces, len(self.study.factors)), goals, coded)
             return Prediction(judged.costs[0], not (judged.violations[0] > 0.0).any())
-        values = predict_all(self.surfaces, coded)
+        values = predict_all(self.study.surfaces, coded)
         return Prediction(goals.costs(values)[0], not (goals.violations(values, values)[0] > 0.0).any())
 
 

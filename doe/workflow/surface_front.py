@@ -1,6 +1,5 @@
 """The Pareto front on the surfaces as its record: points, picks, gains, limits, and the front with tolerances."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -9,7 +8,6 @@ import numpy as np
 from doe.pareto import ParetoFront
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import REFERENCE, dominates
-from doe.response_surface import Surface
 from doe.workflow.confirmation import point_words
 from doe.workflow.front import SurfaceDoubt, open_errors
 from doe.workflow.pick import place_of
@@ -44,10 +42,12 @@ class EstimatedPoint(Point):
         )
 
     @classmethod
-    def predicted(cls, study: Problem, surfaces: Sequence[Surface], point: Array) -> "EstimatedPoint":
+    def predicted(cls, study: Problem, point: Array) -> "EstimatedPoint":
         """A point (k,) in factor units by the surfaces."""
         coded = study.coded(point)[None]
-        return EstimatedPoint.of(study, point, predict_all(surfaces, coded)[0], half_widths(surfaces, coded)[0])
+        return EstimatedPoint.of(
+            study, point, predict_all(study.surfaces, coded)[0], half_widths(study.surfaces, coded)[0]
+        )
 
     @property
     def row(self) -> dict[str, float | None]:
@@ -140,7 +140,7 @@ class ToleranceFront(Record, kw_only=True):
     survival: Survival
 
     @classmethod
-    def of(cls, study: Problem, surfaces: list[Surface], aware: ToleranceAware) -> Self:
+    def of(cls, study: Problem, aware: ToleranceAware) -> Self:
         """A tolerance-aware front."""
         goals = [response for response in study.file.response if response.goal != "none"]
         sign = np.array([-1.0 if response.goal == "max" else 1.0 for response in goals])
@@ -167,16 +167,14 @@ class ToleranceFront(Record, kw_only=True):
             plain_pick_inside=aware.plain_inside,
             nominal_loss_percent=aware.nominal_loss_percent,
             robust_gain_percent=finite(aware.robust_gain_percent),
-            pick_gains_percent={
-                gain.response: gain.percent for gain in predicted_gains(study, surfaces, points[aware.pick])
-            },
+            pick_gains_percent={gain.response: gain.percent for gain in predicted_gains(study, points[aware.pick])},
             survival=Survival(
                 plain_pick=aware.plain_survives,
                 pick=aware.pick_survives,
                 standard_error=aware.survival_error,
                 plain_pick_interval=None if aware.plain_interval is None else list(aware.plain_interval),
                 pick_interval=None if aware.pick_interval is None else list(aware.pick_interval),
-                open_errors=open_errors(surfaces),
+                open_errors=open_errors(study.surfaces),
             ),
         )
 
@@ -193,17 +191,17 @@ class StatedPoint(EstimatedPoint):
     statement: str
 
     @classmethod
-    def at(cls, study: Problem, surfaces: list[Surface], front: ParetoFront, point: Array) -> Self:
+    def at(cls, study: Problem, front: ParetoFront, point: Array) -> Self:
         """A point (k,) in factor units, compared with a front."""
-        gains, place = predicted_gains(study, surfaces, point), place_of(study, point)
-        costs = study.goals.costs(predict_all(surfaces, study.coded(point)[None])[0])
+        gains, place = predicted_gains(study, point), place_of(study, point)
+        costs = study.goals.costs(predict_all(study.surfaces, study.coded(point)[None])[0])
         return cls(
-            **vars(cls.predicted(study, surfaces, point)),
+            **vars(cls.predicted(study, point)),
             predicted_gains={gain.response: gain for gain in gains},
             dominated_by=int(dominates(front.costs, costs).sum()),
             beyond_runs=place.beyond,
             at_bounds=place.at_bounds,
-            constraints=surface_limits(study, surfaces, point),
+            constraints=surface_limits(study, point),
             sentences=[gain.sentence for gain in gains],
             statement=f"{statement(gains)} {place.sentence('The point')}".rstrip(),
         )
@@ -240,20 +238,17 @@ class SurfaceFront(Record, kw_only=True):
     point: StatedPoint | None = None
 
     @classmethod
-    def of(cls, study: Problem, surfaces: list[Surface], front: ParetoFront) -> Self:
+    def of(cls, study: Problem, front: ParetoFront) -> Self:
         """A front with its uncertainty."""
         sure, aware = front.uncertainty, front.tolerance_aware
         assert sure is not None
-        rows = zip(front.points, front.values, half_widths(surfaces, study.coded(front.points)), strict=True)
+        rows = zip(front.points, front.values, half_widths(study.surfaces, study.coded(front.points)), strict=True)
         points = [
             FrontPoint(**vars(EstimatedPoint.of(study, *row)), non_dominated_probability=float(probability))
             for row, probability in zip(rows, sure.non_dominated, strict=True)
         ]
-        gains, place = (
-            predicted_gains(study, surfaces, front.points[front.pick]),
-            place_of(study, front.points[front.pick]),
-        )
-        with_tolerances = None if aware is None else ToleranceFront.of(study, surfaces, aware)
+        gains, place = (predicted_gains(study, front.points[front.pick]), place_of(study, front.points[front.pick]))
+        with_tolerances = None if aware is None else ToleranceFront.of(study, aware)
         picks: dict[str, FrontPoint | RobustPick] = {rule: points[row] for rule, row in front.picks.items()}
         return cls(
             front=points,
@@ -270,14 +265,14 @@ class SurfaceFront(Record, kw_only=True):
                 at_bounds=place.at_bounds,
             ),
             picks=picks if with_tolerances is None else picks | {"tolerance_aware": with_tolerances.pick},
-            baseline=EstimatedPoint.predicted(study, surfaces, study.baseline),
+            baseline=EstimatedPoint.predicted(study, study.baseline),
             pick_dominates_baseline=Dominance(sure.pick_dominates, sure.pick_dominates_error, sure.draws),
             predicted_gains={
                 gain.response: replace(gain, selection_optimism_percent=100.0 * excess / abs(gain.baseline))
                 for gain, excess in zip(gains, sure.optimism.tolist(), strict=True)
             },
             statement=f"{statement(gains)} {place.sentence('The pick' if aware is None else f'The {WITHOUT}')}".rstrip(),
-            constraints=surface_limits(study, surfaces, front.points[front.pick]),
+            constraints=surface_limits(study, front.points[front.pick]),
             archive=front.archive_size,
             feasible_share=front.feasible,
             evaluations=front.evaluations,
@@ -293,11 +288,11 @@ def _extreme(study: Problem, front: ParetoFront, rows: Rows) -> dict[str, float]
     return {study.responses[index]: float(front.values[row, index]) for index, row in pairs}
 
 
-def surface_limits(study: Problem, surfaces: list[Surface], point: Array) -> list[SurfaceLimit]:
+def surface_limits(study: Problem, point: Array) -> list[SurfaceLimit]:
     """Every limit at a point (k,) in factor units."""
     coded = study.coded(point)
-    values, errors = predict_all(surfaces, coded[None])[0], half_widths(surfaces, coded[None])[0]
-    doubt = SurfaceDoubt(study, surfaces)
+    values, errors = predict_all(study.surfaces, coded[None])[0], half_widths(study.surfaces, coded[None])[0]
+    doubt = SurfaceDoubt(study)
     return [
         SurfaceLimit(
             response=study.responses[index],

@@ -482,15 +482,15 @@ class PredictedGain(Record):
         return f"{change}, {verdict} and outside the scatter of single runs ({scatter})."
 
 
-def predicted_gains(study: Problem, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
+def predicted_gains(study: Problem, point: Array) -> list[PredictedGain]:
     """Gains at a point (k,) in factor units over the study's baseline, for every response that has a goal."""
     goals = study.goals
     coded = study.coded(np.stack([study.baseline, point]))
-    values = predict_all(surfaces, coded)
+    values = predict_all(study.surfaces, coded)
     costs, slopes = goals.costs(values), goals.slopes(values)
     gains = []
     for column, index in enumerate(goals.objectives):
-        surface = surfaces[index]
+        surface = study.surfaces[index]
         rows = [slopes[end, column] * jacobian(surface, coded[end]) for end in (0, 1)]
         scale = 100.0 / abs(float(values[0, index])) if values[0, index] else math.nan
         shared = contrast_error(rows[0] - rows[1], surface.covariance)

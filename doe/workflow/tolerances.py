@@ -17,7 +17,6 @@ import numpy as np
 from doe.pareto.goals import Goals
 from doe.pareto.manufacture import random_offsets
 from doe.pareto.tolerance import RIM, Neighbourhood, WidestTolerances, widest_tolerances
-from doe.response_surface import Surface
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import Draws, draws_of, keeping, open_errors
@@ -278,7 +277,6 @@ def _begun(words: str) -> str:
 
 def widest_tolerances_of(
     study: Problem,
-    surfaces: Sequence[Surface],
     point: Array,
     settings: Tolerances,
     confirmed: Mapping[str, Confirmed] | None = None,
@@ -297,10 +295,10 @@ def widest_tolerances_of(
     """
     if study.rigid.all():
         return None
-    parts = _PickParts(study, surfaces, point, settings, confirmed or {}, neighbours, scene)
+    parts = _PickParts(study, point, settings, confirmed or {}, neighbours, scene)
     simulated = (confirmed["baseline"], confirmed["pick"]) if confirmed and "pick" in confirmed else None
     demands = demands_of(study, settings, parts.percent, simulated)
-    draws = search_draws or draws_of(study, surfaces, confirmed)
+    draws = search_draws or draws_of(study, confirmed)
     tolerances = parts.tolerances(demands, draws)
     if not any(demand.least is not None for demand in demands) and not parts.goals.limited:
         return replace(tolerances, widest=_none(tolerances.widest), free={}, grades={})
@@ -337,7 +335,6 @@ class _PickParts:
     """Parts about a pick: their responses, the predicted gains there, and the widest tolerances for demands on these."""
 
     study: Problem
-    surfaces: Sequence[Surface]
     point: Array
     settings: Tolerances
     confirmed: Mapping[str, Confirmed]
@@ -365,7 +362,7 @@ class _PickParts:
         if self.neighbours is not None and self.simulated_baseline is not None:
             return [self.simulated_baseline[None], self.neighbours.values]
         places = (self.study.baseline, self.point)
-        return [predict_all(self.surfaces, self.study.coded(place)[None]) for place in places]
+        return [predict_all(self.study.surfaces, self.study.coded(place)[None]) for place in places]
 
     @cached_property
     def gain(self) -> Array:
@@ -385,21 +382,21 @@ class _PickParts:
 
     @cached_property
     def _centre_values(self) -> Array:
-        return predict_all(self.surfaces, self.study.coded(self.point)[None])
+        return predict_all(self.study.surfaces, self.study.coded(self.point)[None])
 
     @cached_property
     def _reference(self) -> Array:
         """Costs (1, q) of the baseline."""
         if self.simulated_baseline is not None:
             return self.goals.costs(self.simulated_baseline[None])
-        return self.goals.costs(predict_all(self.surfaces, self.study.coded(self.study.baseline)[None]))
+        return self.goals.costs(predict_all(self.study.surfaces, self.study.coded(self.study.baseline)[None]))
 
     def _costs(self, parts: Array) -> Array:
         """Costs and violations (samples, q + c) of parts (samples, f), values of the factors that have a tolerance."""
         points = np.tile(self.point, (len(parts), 1))
         points[:, self.free_factors] = parts
         coded = self.study.coded(points)
-        values = predict_all(self.surfaces, coded)
+        values = predict_all(self.study.surfaces, coded)
         if (here := self.neighbours) is not None:
             values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
         return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
@@ -434,7 +431,7 @@ class _PickParts:
             names=self._names,
             promise=self._promise(demands),
             count_on_draws=count,
-            open_errors=open_errors(self.surfaces, searched=self.neighbours is not None),
+            open_errors=open_errors(self.study.surfaces, searched=self.neighbours is not None),
             **settings.model_dump(include={"probability", "distribution", "samples", "seed"}),
         )
         return replace(tolerances, sentence=_impossible(demands) or tolerances.sentence).among(free, self.point.size)

@@ -20,7 +20,6 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
 from doe.duty import Duty, scene_at
 from doe.pareto import ParetoFront
-from doe.response_surface import Surface
 from doe.running.runner import ANSWER, AgendaKeeper
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -227,7 +226,6 @@ class StudyResult:
     inputs: str
     design: Design
     runs: Runs
-    surfaces: list[Surface]
     front: ParetoFront
     adaptive: Adaptive | None
     searched_pick: SearchedPick | None
@@ -315,13 +313,7 @@ class StudyResult:
     def obstacles(self) -> Obstacles:
         """All that keeps the study from its demands."""
         return obstacles_of(
-            self.study,
-            self.surfaces,
-            self.front,
-            self.pick,
-            self.missed_chains,
-            self.tolerances,
-            self.adaptive is not None,
+            self.study, self.front, self.pick, self.missed_chains, self.tolerances, self.adaptive is not None
         )
 
     @property
@@ -354,7 +346,7 @@ class StudyResult:
     @property
     def rivals_sentences(self) -> list[str]:
         """Why no point that is better in every response as simulated is the pick; none where there is no such point."""
-        forecast = Forecast(self.study, self.surfaces, self.front, self.adaptive, self.searched_pick)
+        forecast = Forecast(self.study, self.front, self.adaptive, self.searched_pick)
         return rivals_sentences(forecast, self.confirmed)
 
 
@@ -386,15 +378,15 @@ def run_study(
         runs = run_design(study, simulations, watched)
         clock.lap("design_s", FRONT)
         study, turns = with_remaining(study, runs), runs.turns
-        surfaces, surface_front = _surfaces_and_front(study, runs, clock)
+        study, surface_front = _surfaces_and_front(study, runs, clock)
         searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
-        selection = choose(study, surfaces, surface_front, searched, original, simulations)
+        selection = choose(study, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
-        edge = _edge(study, surfaces, selection, searched, simulations)
+        edge = _edge(study, selection, searched, simulations)
         clock.lap("confirmation_s")
         robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
-    tolerances = _tolerances(without_broken(study, confirmed["pick"]), surfaces, searched, confirmed)
+    tolerances = _tolerances(without_broken(study, confirmed["pick"]), searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
@@ -404,8 +396,7 @@ def run_study(
         inputs=inputs,
         design=runs.design or study.design,
         runs=runs,
-        surfaces=surfaces,
-        front=with_survival(study, surfaces, selection.front, confirmed),
+        front=with_survival(study, selection.front, confirmed),
         adaptive=searched,
         searched_pick=selection.searched,
         front_comparison=None if searched is None else compare_fronts(study, searched, surface_front.points),
@@ -419,7 +410,7 @@ def run_study(
         published_comparisons={} if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=_failures(runs, searched, robustness, selection),
-        notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study, surfaces))), *runs.notes),
+        notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study))), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
@@ -430,12 +421,12 @@ def _failures(*steps: Runs | Adaptive | Robust | Selection | None) -> tuple[Fail
     return tuple(failure for step in steps if step for failure in step.failures)
 
 
-def _surfaces_and_front(study: Problem, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
-    surfaces = with_rivals(fit_surfaces(study, runs))
+def _surfaces_and_front(study: Problem, runs: Runs, clock: "_Clock") -> tuple[Problem, ParetoFront]:
+    study = study.with_surfaces(with_rivals(fit_surfaces(study, runs)))
     clock.lap("fit_s")
-    front = find_front(study, surfaces)
+    front = find_front(study)
     clock.lap("front_s")
-    return surfaces, front
+    return study, front
 
 
 def _searched(
@@ -454,28 +445,24 @@ def _searched(
         clock.lap("adaptive_s")
 
 
-def _edge(
-    study: Problem, surfaces: list[Surface], selection: Selection, searched: Adaptive | None, simulations: Simulations
-) -> Edge:
+def _edge(study: Problem, selection: Selection, searched: Adaptive | None, simulations: Simulations) -> Edge:
     """The edge of the region at the pick; after an adaptive search, the change beyond it is simulated."""
     pick, front = selection.confirmed["pick"], selection.front.points
     if searched is None:
-        return edge_of(study, surfaces, pick, front, None, None)
-    return edge_of(study, surfaces, pick, front, searched.front.points, simulations, searched.edges)
+        return edge_of(study, pick, front, None, None)
+    return edge_of(study, pick, front, searched.front.points, simulations, searched.edges)
 
 
-def _tolerances(
-    study: Problem, surfaces: list[Surface], searched: Adaptive | None, confirmed: Mapping[str, Confirmed]
-) -> PickTolerances | None:
+def _tolerances(study: Problem, searched: Adaptive | None, confirmed: Mapping[str, Confirmed]) -> PickTolerances | None:
     pick, settings = confirmed["pick"], study.file.tolerances
     if settings is None:
         return None
     scene = study.confirmation_scene(pick.point)
     if searched is None:
-        return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, scene=scene)
-    neighbours = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
+        return widest_tolerances_of(study, pick.point, settings, confirmed, scene=scene)
+    neighbours = neighbourhood(study, searched, study.coded(pick.point)[None], pick.values[None])
     draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
-    return widest_tolerances_of(study, surfaces, pick.point, settings, confirmed, neighbours, draws, scene)
+    return widest_tolerances_of(study, pick.point, settings, confirmed, neighbours, draws, scene)
 
 
 def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, PublishedComparison]:

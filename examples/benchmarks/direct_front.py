@@ -212,7 +212,7 @@ def compare(study: Problem, settings: Settings, folder: Path, workers: int | Non
     effort = Effort(workers)
     with progress_bar("design runs", False) as progress, effort.simulations(folder, study.path) as simulations:
         surfaces = fit_surfaces(study, run_design(study, simulations, progress))
-    on_surfaces = find_front(study, surfaces)
+    on_surfaces = find_front(study.with_surfaces(surfaces))
     with Store(folder / STORE, study.path.stem) as store, progress_bar("direct front", False) as progress:
         simulations = Simulations(store, workers, None, False, lambda title: progress)
         found = find_direct(study, settings, on_surfaces, simulations)

@@ -23,7 +23,11 @@ def front_of(folder, *replacements):
     """The record of the edited example on the published table."""
     study = edited_study(folder, *replacements)
     surfaces = table_surfaces(study)
-    return study, surfaces, SurfaceFront.of(study, surfaces, find_front(study, surfaces)).as_dict()
+    return (
+        study,
+        surfaces,
+        SurfaceFront.of(study.with_surfaces(surfaces), find_front(study.with_surfaces(surfaces))).as_dict(),
+    )
 
 
 def command(study, *arguments):
@@ -188,7 +192,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     study = edited_study(tmp_path, *TOLERANCES)
     surfaces = table_surfaces(study)
     point = np.array([0.0136, 0.184, 0.301])
-    found = widest_tolerances_of(study, surfaces, point, Tolerances(gains=study.responses))
+    found = widest_tolerances_of(study.with_surfaces(surfaces), point, Tolerances(gains=study.responses))
     ratios = list(study.known_tolerances.values())
     assert found.half_widths / ratios == pytest.approx([found.half_widths[0] / ratios[0]] * 3)
     # Counted afresh: parts that keep half of every gain.

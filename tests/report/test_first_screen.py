@@ -149,7 +149,7 @@ def predicted(tmp_path_factory):
         tmp_path_factory.mktemp("rivals"), *TOLERANCES, ("[front]\n", '[front]\ntolerance_aware = "quantile"\n')
     )
     surfaces = table_surfaces(study)
-    front = find_front(study, surfaces)
+    front = find_front(study.with_surfaces(surfaces))
     return study, surfaces, front, {"baseline": Choice(study.baseline, ""), **choices(study, front, None)}
 
 
@@ -164,7 +164,7 @@ def simulated(study, surfaces, points, shares, error=1e-6):
 
 def test_without_a_better_point_there_is_nothing_to_explain(predicted):
     study, surfaces, front, points = predicted
-    forecast = Forecast(study, surfaces, front, None, None)
+    forecast = Forecast(study.with_surfaces(surfaces), front, None, None)
     assert (
         rivals_sentences(
             forecast,
@@ -179,7 +179,7 @@ def test_a_better_point_was_predicted_worse_at_the_ends_of_its_tolerances(predic
     study, surfaces, front, points = predicted
     name = next(name for name in points if name not in ("baseline", "pick"))
     confirmed = simulated(study, surfaces, points, {name: 0.1})
-    forecast = Forecast(study, surfaces, front, None, None)
+    forecast = Forecast(study.with_surfaces(surfaces), front, None, None)
     (sentence,) = rivals_sentences(forecast, confirmed)
     assert sentence.startswith(
         f"Point {'pick without tolerances' if name == 'without_tolerances' else name} is better than"

@@ -48,7 +48,9 @@ def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
     for letter, factor in zip("ABC", study.file.factor, strict=True):
         data[letter] = (data[factor.name] - factor.centre) / factor.step
     second = "A + B + C + A:B + A:C + B:C + I(A**2) + I(B**2) + I(C**2)"
-    for gain, terms in zip(predicted_gains(study, surfaces, PAPER_PICK), ("A + B + C", second, second), strict=True):
+    for gain, terms in zip(
+        predicted_gains(study.with_surfaces(surfaces), PAPER_PICK), ("A + B + C", second, second), strict=True
+    ):
         model = smf.ols(f"{gain.response} ~ {terms}", data).fit()
         a, b, c = -0.6, 0.74, -0.3
         change = [a, b, c] if terms == "A + B + C" else [a, b, c, a * b, a * c, b * c, a * a, b * b, c * c]
@@ -60,7 +62,7 @@ def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
 
 def test_promise_of_the_published_pick_is_less_than_claimed_and_hidden_in_single_runs(table):
     study, surfaces = table[0], of_the_textbook(table[1])
-    impact, whirl, power = predicted_gains(study, surfaces, PAPER_PICK)
+    impact, whirl, power = predicted_gains(study.with_surfaces(surfaces), PAPER_PICK)
     # Table 8 claims 9.26, 2.87 and 1.45 %, of one run at the centre and a value that eq 22 does not give (193.2).
     assert impact.percent == pytest.approx(5.27, abs=0.01) and impact.error_percent == pytest.approx(4.17, abs=0.01)
     assert whirl.percent == pytest.approx(2.54, abs=0.01) and power.percent == pytest.approx(0.75, abs=0.01)
@@ -75,7 +77,7 @@ def test_promise_of_the_published_pick_is_less_than_claimed_and_hidden_in_single
 
 def test_gain_of_the_baseline_over_itself_is_nothing_without_error(table):
     study, surfaces = table
-    for gain in predicted_gains(study, surfaces, study.baseline):
+    for gain in predicted_gains(study.with_surfaces(surfaces), study.baseline):
         assert gain.percent == 0.0 and gain.error_percent == pytest.approx(0.0, abs=1e-9)
 
 
@@ -93,7 +95,7 @@ def test_gain_of_a_transformed_response_is_judged_in_its_own_units(tmp_path, tra
         tmp_path, ('model = "linear"\ngoal = "min"', f'model = "linear"\ntransform = {word}\ngoal = "min"')
     )
     surfaces = table_surfaces(study)
-    gain = predicted_gains(study, surfaces, PAPER_PICK)[0]
+    gain = predicted_gains(study.with_surfaces(surfaces), PAPER_PICK)[0]
     points = to_coded(np.stack([study.baseline, PAPER_PICK]), study.centre, study.step)
     # To first order, the quantiles of the drawn difference.
     drawn = predict_draws(surfaces, draw_all(surfaces, 20000, 1), points)[:, :, 0]
@@ -168,7 +170,7 @@ def test_front_of_the_published_table_has_the_hypervolume_of_a_dense_one(table):
 
 def test_front_of_the_published_table_knows_its_errors(table):
     study, surfaces = table
-    found, again = find_front(study, surfaces), find_front(study, surfaces)
+    found, again = find_front(study.with_surfaces(surfaces)), find_front(study.with_surfaces(surfaces))
     assert np.array_equal(found.points, again.points)
     sure = found.uncertainty
     assert np.array_equal(sure.non_dominated, again.uncertainty.non_dominated)

@@ -415,9 +415,9 @@ def test_a_study_is_not_lost_where_runs_fail(failing, tmp_path):
     assert runs.notes[0].code == "lost-runs" and runs.notes[0].count("the cage seized") == 1
     assert "3 other runs in the rest of the region are in their place" in runs.notes[0]
     rest = with_remaining(failing, runs)
-    front = find_front(rest, fit_surfaces(rest, runs))
+    front = find_front(rest.with_surfaces(fit_surfaces(rest, runs)))
     assert front.points[:, 0].min() >= 0.35 and rest.remaining.holds(rest.coded(front.points)).all()
-    everywhere = find_front(failing, fit_surfaces(failing, runs))
+    everywhere = find_front(failing.with_surfaces(fit_surfaces(failing, runs)))
     assert everywhere.points[:, 0].min() < 0.31
     again = run_design(failing, tmp_path, 2, silent)
     assert np.array_equal(again.values, runs.values) and again.failures == runs.failures

@@ -228,7 +228,7 @@ def test_reference_of_another_design_is_refused(tmp_path):
 def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
     study = Problem.load(short_study(tmp_path))
     surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
-    record = SurfaceFront.of(study, surfaces, find_front(study, surfaces)).as_dict()
+    record = SurfaceFront.of(study.with_surfaces(surfaces), find_front(study.with_surfaces(surfaces))).as_dict()
     pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
     assert all(pick[name] <= baseline[name] for name in study.responses)
     assert all(

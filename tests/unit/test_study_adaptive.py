@@ -265,8 +265,12 @@ def test_advice_where_surfaces_miss_more_than_noise():
 
     runs = read_runs(study, EXAMPLES / "ccd_table4.csv")
     bent = runs.values + 1e3 * np.sin(3.0 * runs.coded[:, :1])
-    (sentence,) = advice(study, fit_surfaces(study, type(runs)(runs.coded, runs.actual, bent, runs.errors)))
+    (sentence,) = advice(
+        study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, bent, runs.errors)))
+    )
     assert "lack of fit is significant for impact_force_N" in sentence
     assert "in 80 runs beyond the 20 of the design" in sentence
     smooth = 5.0 + runs.coded @ np.ones((3, 3)) + np.random.default_rng(1).normal(0.0, 0.1, runs.values.shape)
-    assert advice(study, fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors))) == []
+    assert (
+        advice(study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors)))) == []
+    )

@@ -49,7 +49,7 @@ def test_a_target_is_gained_by_coming_nearer(tmp_path):
 
 def test_points_that_a_drawing_cannot_tell_apart_are_confirmed_once(tmp_path):
     study, surfaces = fitted(tmp_path)
-    front = find_front(study, surfaces)
+    front = find_front(study.with_surfaces(surfaces))
     chosen = choices(study, front, None)
     assert next(iter(chosen)) == "pick"
     assert "at the ends of their tolerances" in chosen["pick"].reason

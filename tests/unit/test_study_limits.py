@@ -161,7 +161,7 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
         for name, each in zip(study.responses, values, strict=True)
     ]
     pick = Confirmed(corner, np.ones(3), np.zeros(3), np.zeros(3))
-    edge = edge_of(study, surfaces, pick, np.array([corner, study.centre]), None, None)
+    edge = edge_of(study.with_surfaces(surfaces), pick, np.array([corner, study.centre]), None, None)
     ((factor, outward),) = edge.factors.items()
     assert (factor, outward.side, outward.per) == ("guide_clearance_mm", "upper", "µm")
     # Two a coded unit of 50 µm.
@@ -172,7 +172,7 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
         and "50 % of the front" in edge.sentence
     )
     inside = SimpleNamespace(point=study.centre)
-    assert not edge_of(study, surfaces, inside, study.centre[None], None, None).factors
+    assert not edge_of(study.with_surfaces(surfaces), inside, study.centre[None], None, None).factors
 
 
 def test_unit_one_rule_says_where_a_point_lies(tmp_path):
@@ -190,7 +190,7 @@ def test_unit_one_rule_says_where_a_point_lies(tmp_path):
     assert "at the upper bound of radial_clearance_mm" in corner and "surfaces extrapolate" in corner
     for share, words in ((0.5, "The pick lies inside the region; 50 %"), (0.9, "farther out than any run")):
         point = SimpleNamespace(point=study.actual(share * reach))
-        edge = edge_of(study, [], point, np.array([study.centre, study.actual(reach)]), None, None)
+        edge = edge_of(study, point, np.array([study.centre, study.actual(reach)]), None, None)
         assert words in edge.sentence and edge.beyond_runs == ("inside" not in edge.sentence)
 
 
@@ -251,6 +251,6 @@ def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
     elif outcome.tries < 4:
         # The next best point is one that was simulated, by what the drawing distinguishes.
         named = [outcome.confirmed.get(f"try_{number}", outcome.pick) for number in range(1, outcome.tries + 1)]
-        front = find_front(outcome.study, outcome.surfaces, [outcome.baseline, *named], outcome.tries)
+        front = find_front(outcome.study, [outcome.baseline, *named], outcome.tries)
         following = outcome.study.rounded_within(front.points[front.pick])
         assert any(np.array_equal(following, tried.point) for tried in named)

@@ -156,7 +156,9 @@ def stated_and_true(study, random, noise, samples):
     units = {"centre": study.centre, "step": study.step}
     surfaces = [fit(coded, column, name=name, **units) for name, column in zip(study.responses, values.T, strict=True)]
     point = study.actual(np.array([-0.5, 0.9, -0.8]))
-    found = widest_tolerances_of(study, surfaces, point, Tolerances(samples=samples, gains=study.responses))
+    found = widest_tolerances_of(
+        study.with_surfaces(surfaces), point, Tolerances(samples=samples, gains=study.responses)
+    )
     base, nominal = (np.array([each.predict(study.coded(at)) for each in surfaces]) for at in (study.baseline, point))
     keep = np.where(base > nominal, 0.5 * (base - nominal), base - nominal)
     parts = study.coded(point + found.half_widths * random_offsets(20_000, 3, "normal", 99))

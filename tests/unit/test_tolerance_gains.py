@@ -49,16 +49,11 @@ def planes(tmp_path):
 def widest(planes, confirmed=None, point=PICK, **settings):
     """The widest tolerances about a point of the planes, with the example's bearing; parts are spread evenly."""
     study, surfaces = planes
+    study = study.with_surfaces(surfaces)
     settings = {"distribution": "uniform", "samples": 10_000} | settings
-    few = draws_of(study, surfaces, confirmed, 2)
+    few = draws_of(study, confirmed, 2)
     return widest_tolerances_of(
-        study,
-        surfaces,
-        study.actual(point),
-        Tolerances(**settings),
-        confirmed,
-        search_draws=few,
-        scene=Scene.load(EXAMPLE),
+        study, study.actual(point), Tolerances(**settings), confirmed, search_draws=few, scene=Scene.load(EXAMPLE)
     )
 
 
