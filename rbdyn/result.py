@@ -1,18 +1,12 @@
 """What a simulation returns: a frozen record that saves and loads itself as JSON."""
 
-import functools
-import json
 import math
-import os
-import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from rbdyn.base.faults import InputError, check_bounds, path_of, read_text
+from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, derived, shown, spread, written
 from rbdyn.base.table import Column, Sheet, columns_of, within
@@ -22,10 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Saved = TypeVar("Saved")
-# Read from the installed files, which takes half a millisecond.
-version_of = functools.cache(version)
-
-
 # What tables say of figures and of their errors.
 OF_FIGURE, HALF_WIDTHS = "of the figure", "half widths of the 95 % intervals"
 
@@ -249,85 +239,3 @@ class SimulationResult(Brief, SavedRecord):
     def table(self) -> "pd.DataFrame":
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         return figure_sheet(self.quantities).frame.set_index("figure").astype(float)
-
-
-def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[str, Any]], Saved]) -> Saved:
-    """A ``what`` saved as JSON in the format ``form``, made by ``restore``.
-
-    Raises InputError when the file is missing, has another format or is not whole.
-    """
-    if not path_of(path).is_file():
-        raise InputError([f"{path}: cannot be read (no such file); check the path"])
-    text = read_text(Path(path))
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError):
-        data = None
-    saved = data.get("format") if isinstance(data, dict) else None
-    if saved != form:
-        same = isinstance(saved, str) and saved.partition("/")[0] == form.partition("/")[0]
-        if not isinstance(saved, str):
-            raise InputError([f"{path}: not a saved {what}; check the path"])
-        fix = "run the scene again" if same else f"name a saved {what}"
-        raise InputError([f"{path}: format is {saved}, not {form}; {fix}"])
-    try:
-        return restore(check_bounds(data, str(path)))
-    except (AttributeError, KeyError, TypeError, ValueError):
-        raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
-
-
-def read_json(path: Path | str) -> Any:
-    """JSON of a file. Raises OSError, and ValueError where it is no JSON or nested too deep."""
-    try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except RecursionError:
-        raise ValueError("nested too deep") from None
-
-
-def write_json(path: Path | str, data: dict[str, Any]) -> None:
-    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never a part of it."""
-    with whole_file(path) as new:
-        new.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def place_of_file(path: Path | str) -> Path:
-    """The path of a file to write. Raises InputError where no file can be."""
-    path = path_of(path)
-    if path.is_dir() or not path.name:
-        raise InputError([f"{path}: is a folder; name a file in it"])
-    if not path.parent.is_dir():
-        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
-    return path
-
-
-@contextmanager
-def whole_file(path: Path | str) -> Iterator[Path]:
-    """A file to write, which then replaces ``path``: a reader gets the old one or the new one.
-
-    A failure or an interruption leaves no part of the new one. Raises InputError for a path where no file can be.
-    """
-    path = place_of_file(path)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        with naming(lambda: path):
-            yield partial
-            os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-@contextmanager
-def naming(path: Callable[[], Path]) -> Iterator[None]:
-    """Let an error of the disk name a file, which it does not do where writing fails: ``path`` finds it then."""
-    try:
-        yield
-    except OSError as error:
-        if error.filename is None and error.errno is not None:
-            error.filename = str(path())
-        raise
-
-
-def versions() -> dict[str, str]:
-    """Versions that the bits of a result depend on."""
-    packages = {name: version_of(name) for name in ("rbdyn", "numpy", "numba")}
-    return {**packages, "python": platform.python_version(), "machine": platform.machine()}

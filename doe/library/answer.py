@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rbdyn.base import html, terminal
 from rbdyn.base.blocks import Block, Detail, Section, Table, Widget, has_content
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.files import write_json
 from rbdyn.base.identity import Identity, identity_line
-from rbdyn.result import write_json
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from doe.running.store import STORE, at_work
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, path_of, refuse
+from rbdyn.base.files import write_json
 from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.page import REPORT_FILES, with_report
-from rbdyn.result import write_json
 
 if TYPE_CHECKING:
     from doe.library.answer import Answer

@@ -33,12 +33,12 @@ from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Verdict
+from rbdyn.base.files import versions, write_json
 from rbdyn.base.records import save_table
 from rbdyn.base.storage import digest_of, sign
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
-from rbdyn.result import versions, write_json
 
 FORMAT = "doe.study/2"
 # A row of a table by its columns.

@@ -35,8 +35,8 @@ from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError
+from rbdyn.base.files import read_json, write_json
 from rbdyn.base.words import counted, with_error
-from rbdyn.result import read_json, write_json
 from rbdyn.scene import Scene
 
 # Seeds of the evaluations begin here, apart from those of design and confirmation.

@@ -24,7 +24,7 @@ from typing import Any
 from rbdyn.accuracy import study
 from rbdyn.accuracy.report import Report, Reporter, processor
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.result import versions, whole_file
+from rbdyn.base.files import versions, whole_file
 from rbdyn.scene import Scene
 
 NEVER = "*Not measured yet.*\n"

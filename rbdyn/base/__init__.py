@@ -1,9 +1,9 @@
 """Shared parts of both packages, without any bearing: input, records, files, words and commands.
 
 - ``faults``: what a user typed, its number types, and errors that say how to fix them; ``arrays``
-- ``records``: results as JSON, tables and CSV; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
+- ``records``: results as JSON, tables and CSV; ``files``: whole JSON files; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
 - ``tables``: tables of a user, text and workbooks
-- ``intervals``: errors of sums and differences, several that hold together
+- ``estimate``: values with their errors, sums, differences and intervals of them
 - ``words``: how values, errors and counts are written; ``blocks``: what is said; ``terminal``, ``html``: its renderings
 - ``loading``, ``streams``, ``command``: what commands share; ``folder``, ``lock``: where they write; ``pace``: how long runs take
 """

@@ -91,7 +91,7 @@ def hand_out(
     file can be.
     """
     if path is not None:
-        from rbdyn.result import whole_file
+        from rbdyn.base.files import whole_file
 
         check_out(path, force, reads)
         with whole_file(path) as new:
@@ -105,7 +105,7 @@ def hand_out(
 def check_out(path: Path | None, force: bool, reads: Sequence[Path]) -> None:
     """Raise the InputError of ``hand_out`` before anything is computed."""
     if path is not None:
-        from rbdyn.result import place_of_file
+        from rbdyn.base.files import place_of_file
 
         if path.is_file() and not force:
             raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])

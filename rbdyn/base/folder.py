@@ -22,9 +22,9 @@ from typing import Any, TypeVar
 
 from rbdyn.base import lock
 from rbdyn.base.faults import InputError, files_read, read_bytes, record_read, recorded_reads, refuse
+from rbdyn.base.files import naming, read_json, write_json
 from rbdyn.base.storage import digest_of
 from rbdyn.base.streams import Uninterrupted
-from rbdyn.result import naming, read_json, write_json
 
 T = TypeVar("T")
 # File that names the command and the input of a folder of results, and the folder of files that are not yet whole.

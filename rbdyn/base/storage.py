@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbdyn.base.digests import source_digest
-from rbdyn.result import naming, versions
+from rbdyn.base.files import naming, versions
 
 
 class Checkpoint:

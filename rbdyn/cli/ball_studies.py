@@ -12,6 +12,7 @@ import numpy as np
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.command import FAILED, checkpoint_message, deliver, progress_bar
 from rbdyn.base.faults import InputError, MethodError, axis_values
+from rbdyn.base.files import write_json
 from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import identity_of
 from rbdyn.base.records import plain
@@ -25,7 +26,6 @@ from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
 from rbdyn.quasistatic.runout.turn import RingPath
 from rbdyn.quasistatic.sweep import SweepResult, notes_by_topic
-from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.base.blocks import Block, Detail, Table, with_notes
 from rbdyn.base.faults import refuse
+from rbdyn.base.files import versions, write_json
 from rbdyn.base.notes import DANGER, Note, Notes, of_level
 from rbdyn.base.records import plain, save_table
 from rbdyn.base.words import counted, quantity, shown, with_error
-from rbdyn.result import SimulationResult, versions, write_json
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
@@ -20,7 +21,7 @@ from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
-from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status, versions
+from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
 from rbdyn.scene.thermal import simulated_scene

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.compiled.kernel import COMPILING
@@ -34,7 +35,7 @@ from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
-from rbdyn.result import SimulationResult, versions
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
 
 # Above this relative gap of the power balance a note asks for a tighter tolerance.

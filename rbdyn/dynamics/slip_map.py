@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
+from rbdyn.base.files import versions
 from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
@@ -33,7 +34,7 @@ from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of
 from rbdyn.dynamics.statistics.replicate import Replicate
-from rbdyn.result import Quantity, figure_columns, versions
+from rbdyn.result import Quantity, figure_columns
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:

@@ -41,10 +41,10 @@ from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
 from rbdyn.thermal.fixed_point import VAGUE, State, learned, model_of, steady_state
-from rbdyn.thermal.input_ranges import Ranges, input_ranges
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
 from rbdyn.thermal.network import NODES, carried_off
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import counted
 from rbdyn.life.balls import FASTEST
 from rbdyn.mounting.cage import OperatingClearance
-from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_record, solve_double_decker
 from rbdyn.quasistatic.result import (
@@ -41,9 +41,9 @@ from rbdyn.quasistatic.row.ball import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, clearance_of, constraint_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
-from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.fits import growth_record, row_change
 from rbdyn.scene.notes import clearance_notes, speed_notes
 
 # Solvers by the names in a scene: ``solver(row, control, load, constraint, start) -> Solution``.

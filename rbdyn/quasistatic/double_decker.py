@@ -28,7 +28,6 @@ from rbdyn.base.faults import RPM, MethodError
 from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
-from rbdyn.mounting.fits import layer_changes
 from rbdyn.mounting.rings import GrooveChange
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
@@ -36,6 +35,7 @@ from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
 from rbdyn.quasistatic.row.ring import Row, component_lengths
 from rbdyn.scene.ball import BallRow, DoubleDeckerScene
+from rbdyn.scene.fits import layer_changes
 
 # Newton on the middle ring: target of the residual over the largest force, and its limit where rounding allows no better.
 AIM, ACCEPTED = 1e-11, 1e-8

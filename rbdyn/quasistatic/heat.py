@@ -27,13 +27,13 @@ from rbdyn.life.friction import (
     deep_groove_angle,
     deep_groove_moments,
 )
-from rbdyn.mounting.fits import race_film_temperature
 from rbdyn.properties.catalogue import diameter_series
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.quasistatic.result import Rating, overloads, reference_capacities
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, cage_speed, constraint_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.fits import race_film_temperature
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, part_temperatures
 from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient

@@ -22,13 +22,13 @@ from rbdyn.contact.hertz_line import BALLS, SHAKEDOWN, dent_sentence, overload_s
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning, turning_rings
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL, dynamic_capacity, rated_capacities, row_life
-from rbdyn.mounting.fits import race_film_temperature
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallRow, BallScene
+from rbdyn.scene.fits import race_film_temperature
 
 if TYPE_CHECKING:
     import pandas as pd

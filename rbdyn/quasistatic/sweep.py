@@ -24,6 +24,7 @@ from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, number_list, refuse, validated
+from rbdyn.base.files import read_record, versions, write_json
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain, save_table
 from rbdyn.base.storage import Checkpoint, code_version, run_key
@@ -42,7 +43,6 @@ from rbdyn.quasistatic.result import (
     tipping,
 )
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
-from rbdyn.result import read_record, versions, write_json
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.thermal import first_guess_faults

@@ -22,10 +22,10 @@ from rbdyn.quasistatic.heat import Heat, at_temperatures, balance, term_shares
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.row.model import clearance_of, row_of
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
-from rbdyn.thermal.input_ranges import Ranges, input_ranges
 from rbdyn.thermal.losses import HeatModel, gain, log_viscosity
 from rbdyn.thermal.network import NODES, carried_off
 

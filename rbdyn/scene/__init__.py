@@ -6,7 +6,8 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
 - ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
-- ``thermal``: heat balance; ``geometry``: radii, masses and speeds; ``notes``: suspicious values
+- ``thermal``: heat balance; ``input_ranges``: what the unknown inputs of the balance leave open
+- ``geometry``: radii, masses and speeds; ``fits``: rings, clearances and grooves as mounted; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys
 - ``key_columns``: columns of tables named by keys; ``duty``: points of operation
 """
@@ -333,7 +334,7 @@ class Scene(SceneFile):
         return None if self.mounting is None else self._cage_clearances(self.mounting)
 
     def _mounted_clearance(self, mounting: Mounting) -> "MountedClearance":
-        from rbdyn.mounting.fits import operating_clearance
+        from rbdyn.scene.fits import operating_clearance
 
         def worked_out() -> "MountedClearance":
             return operating_clearance(mounting, self.bearing, self.materials, *self.operation.speeds)
@@ -341,7 +342,7 @@ class Scene(SceneFile):
         return self.once("_mounted", worked_out) if mounting is self.mounting else worked_out()
 
     def _cage_clearances(self, mounting: Mounting) -> "CageClearances":
-        from rbdyn.mounting.fits import RunningSpeeds, cage_clearances
+        from rbdyn.scene.fits import RunningSpeeds, cage_clearances
 
         speeds = RunningSpeeds(*self.operation.speeds, self.geometry.motion.cage_speed)
         land = 1e-3 * self.land_diameter_mm
@@ -448,7 +449,7 @@ class Scene(SceneFile):
         """Temperature of the cage, stated or by default [C]; None where the scene has no mounting."""
         if self.mounting is None:
             return None
-        from rbdyn.mounting.fits import cage_temperature_rise, mounted_rings
+        from rbdyn.scene.fits import cage_temperature_rise, mounted_rings
 
         material = self.material("rings")
         rings = mounted_rings(self.mounting, self.bearing, material, material, 0.0)
@@ -459,7 +460,7 @@ class Scene(SceneFile):
         """Temperatures of the oil in the cavity and in the films [C]."""
         if self.mounting is None or self.lubricant.film_temperature == "oil":
             return film_temperatures(self, None)
-        from rbdyn.mounting.fits import mounted_rings
+        from rbdyn.scene.fits import mounted_rings
 
         material = self.material("rings")
         return film_temperatures(self, mounted_rings(self.mounting, self.bearing, material, material, 0.0))

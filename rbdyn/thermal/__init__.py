@@ -5,7 +5,6 @@
 - ``heat``: heat of each node from the power lost in each term
 - ``oil_fraction``: share of oil in the cavity of a bearing under a jet, from its flow
 - ``fixed_point``: temperatures that their own heat keeps up, the gain of the loop, and the verdict where there are none
-- ``input_ranges``: what the unknown inputs of the balance leave open
 
 Pure functions of floats and arrays in SI, temperatures in C. A scene without [thermal] imports none of them; one with an oil flow
 imports the oil fraction.

@@ -18,11 +18,11 @@ from doe.running.runner import agenda_in
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Heading, Paragraph, Remarks, Table
 from rbdyn.base.faults import InputError
+from rbdyn.base.files import write_json
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import Note
 from rbdyn.base.streams import escaped
 from rbdyn.base.workbook import write_workbook
-from rbdyn.result import write_json
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BALL = EXAMPLES / "angular_contact_ball.toml"

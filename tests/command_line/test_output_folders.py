@@ -308,7 +308,7 @@ def test_commands_keep_to_the_rule(tmp_path, command):
 
 
 def test_two_processes_that_write_one_file_leave_a_whole_one(tmp_path):
-    code = "import sys; from rbdyn.result import write_json\nfor k in range(300): write_json(sys.argv[1], {'k': [k] * 999})"
+    code = "import sys; from rbdyn.base.files import write_json\nfor k in range(300): write_json(sys.argv[1], {'k': [k] * 999})"
     path = tmp_path / "result.json"
     both = [subprocess.Popen([sys.executable, "-c", code, str(path)]) for _ in range(2)]
     assert [process.wait(60) for process in both] == [0, 0]

@@ -173,7 +173,7 @@ def handed_out(case: str) -> dict[str, str]:
 def words_of(text: str) -> str:
     """Text without dates, durations, digests, versions, the name of the processor and spaces at the ends of lines."""
     from rbdyn.accuracy.report import processor
-    from rbdyn.result import versions
+    from rbdyn.base.files import versions
 
     for version in (processor(), *versions().values()):
         text = text.replace(str(version), "*")

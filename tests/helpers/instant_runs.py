@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from rbdyn.base.faults import RunError
-from rbdyn.result import Quantity, SimulationResult, versions
+from rbdyn.base.files import versions
+from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
 

@@ -19,8 +19,8 @@ from rbdyn.quasistatic.row.model import row_of
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.quasistatic.temperatures import slopes_at, steady_temperatures
 from rbdyn.scene import Scene
+from rbdyn.scene.input_ranges import QUANTILES, SETS, input_sets
 from rbdyn.scene.thermal import Temperatures
-from rbdyn.thermal.input_ranges import QUANTILES, SETS, input_sets
 from rbdyn.thermal.losses import gain
 from rbdyn.thermal.network import NODES
 

@@ -109,7 +109,7 @@ NOT_NEEDED = (
     "pandas", "matplotlib", "pymoo", "sklearn", "doe", "rich",
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
     "rbdyn.accuracy", "rbdyn.accuracy.variants", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
-    "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion", "rbdyn.dynamics.forces.observe",
+    "rbdyn.plots", "rbdyn.scene.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion", "rbdyn.dynamics.forces.observe",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_bvp
 
 from rbdyn.base.faults import InputError, validated
-from rbdyn.mounting.fits import operating_clearance
 from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted_clearance
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials, material_of
+from rbdyn.scene.fits import operating_clearance
 from rbdyn.scene.operation import Mounting, misfits
 
 STEEL = MATERIALS["bearing_steel"]

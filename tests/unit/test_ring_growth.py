@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.base.faults import InputError
-from rbdyn.mounting.fits import layer_changes, mounted_of, row_change
 from rbdyn.mounting.rings import Ring, groove_change, interface_pressure, loosening_speed, printed_growth
 from rbdyn.properties.materials import MATERIALS
+from rbdyn.scene.fits import layer_changes, mounted_of, row_change
 
 STEEL, CERAMIC = MATERIALS["bearing_steel"], MATERIALS["silicon_nitride"]
 SPEED = 40000.0 * math.pi / 30.0

@@ -21,8 +21,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import load_distribution, scales, start_state, static_share
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.run import Run
-from rbdyn.mounting import fits
-from rbdyn.scene import Scene
+from rbdyn.scene import Scene, fits
 from rbdyn.scene.bearing import Bearing
 
 

@@ -24,6 +24,7 @@ from doe.workflow.identification import (
 )
 from doe.workflow.input_sets import NORMAL
 from rbdyn.base.blocks import Block, Bullets, Paragraph, with_notes
+from rbdyn.base.files import read_json, write_json
 from rbdyn.base.identity import Identity
 from rbdyn.base.pace import duration
 from rbdyn.base.page import REPORT, with_report
@@ -32,7 +33,6 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown
 from rbdyn.base.workbook import NAME as WORKBOOK
-from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
 POSTERIOR = "doe.posterior/1"

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Paragraph, Table, with_notes
+from rbdyn.base.files import write_json
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown, with_error
-from rbdyn.result import write_json
 from rbdyn.scene.unknown import UnknownInput
 
 # Most inputs that a sentence names, and the least share of one.

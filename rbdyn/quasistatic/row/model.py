@@ -8,12 +8,12 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.contact.point_contact import PointContact, ball_on_race
-from rbdyn.mounting.fits import row_change
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.ring import Row, at_rest
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
+from rbdyn.scene.fits import row_change
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Least blend load [N], which keeps quotients finite where nothing turns.
