@@ -1,6 +1,8 @@
 """The steps of a study, and the whole study that joins them.
 
-- ``runs``: the design with its region, and its runs; ``surfaces``: goals, fits, predictions, random draws, a published table
+- ``problem``: a study resolved once, with its goals, region, tolerances, scenes and surfaces, which every step is handed
+- ``design``: the points of the runs; ``region``: where bearings run; ``effort``: how runs are made; ``runs``: their results
+- ``surfaces``: fits, predictions, random draws, a published table
 - ``confirmation``: simulated points, intervals, limits; ``front``: tolerances, the front on surfaces, back-off from limits
 - ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region
 - ``parts``: parts of a clearance and their grades; ``tolerances``: the widest tolerances of the pick

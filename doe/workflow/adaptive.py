@@ -111,7 +111,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     first_runs = _design_runs(study, runs, plan)
     evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
     region = region_in_units(study)
-    step = study.reach * study.step
+    step = study.half_ranges
     with named_faults(study, goals, lambda point: point, ""):
         try:
             search = adaptive_front(
@@ -159,7 +159,7 @@ def emulator_draws(study: Problem, adaptive: Adaptive, coded: Array, draws: int,
 
 def region_in_units(study: Problem) -> Region:
     """The region of the design, from -1 to 1, with its points at the resolution of the drawing."""
-    half = study.reach * study.step
+    half = study.half_ranges
     finest = np.array([factor.finest or np.nan for factor in study.file.factor]) / half
     apart = np.where(np.isnan(finest), ALIKE, finest * (1.0 + 1e-9))
     ones = np.ones(half.size)
@@ -168,8 +168,7 @@ def region_in_units(study: Problem) -> Region:
 
 def border_of(study: Problem) -> Border | None:
     """Ends to which the region may grow; None if it may not. Raises InputError if ``allowed`` lies inside the region."""
-    reach = study.reach * study.step
-    region_ends = np.column_stack([study.centre - reach, study.centre + reach])
+    reach, region_ends = study.half_ranges, study.ends
     ends = np.array(
         [factor.allowed or bounds for factor, bounds in zip(study.file.factor, region_ends.tolist(), strict=True)]
     )

@@ -465,8 +465,5 @@ class _PickParts:
 
 def _box(study: Problem, point: Array, extent: Array | None) -> tuple[Array, Array]:
     """Ends (k,) of the region in which parts may lie, at least ``extent`` (k,) from the point, if stated."""
-    reach = study.reach * study.step
-    region = study.centre - reach, study.centre + reach
-    if extent is None:
-        return region
-    return np.minimum(region[0], point - extent), np.maximum(region[1], point + extent)
+    low, high = study.ends.T
+    return (low, high) if extent is None else (np.minimum(low, point - extent), np.maximum(high, point + extent))

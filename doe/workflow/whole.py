@@ -156,7 +156,7 @@ def _widest_half_widths(study: Problem) -> Array:
     """Half widths (k,) of the region where the study computes tolerances later, else unknown."""
     if study.file.tolerances is None:
         return np.full(study.step.size, np.nan)
-    return np.asarray(study.reach * study.step)
+    return study.half_ranges
 
 
 def solve_chains(
