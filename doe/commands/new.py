@@ -44,8 +44,6 @@ BASELINE = """[baseline] # the original design, over which gains count
 """
 TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
 """
-# Responses that a study improves; others are watched where they have a limit.
-IMPROVED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
 HINT = """# Add to a factor: tolerance = 0.005, the half width that manufacture keeps; then [front] tolerance_aware = "quantile" and
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
@@ -176,14 +174,16 @@ def limits_of(texts: Sequence[str]) -> Limits:
 
 
 def _responses(limits: Limits) -> str:
-    """The responses that a study improves, and those that only have limits."""
-    watched = [name for name in limits if name not in IMPROVED]
-    return "\n".join(_response(name, limits.get(name, {})) for name in (*IMPROVED, *watched))
+    """The responses that a study improves, and those that are watched because they have limits."""
+    from rbdyn.dynamics.figures import FIGURES
+
+    improved = dict.fromkeys((figure.key for figure in FIGURES if figure.judged == "target"), 'goal = "min"')
+    goals = dict.fromkeys(limits, 'goal = "none" # watched, with its limits only') | improved
+    return "\n".join(_response(name, limits.get(name, {}), goals[name]) for name in improved | goals)
 
 
-def _response(name: str, limits: Mapping[str, float]) -> str:
+def _response(name: str, limits: Mapping[str, float], goal: str) -> str:
     bounds = [f"{bound} = {value!r}" for bound, value in limits.items()]
-    goal = 'goal = "min"' if name in IMPROVED else 'goal = "none" # watched, with its limits only'
     return "\n".join(["[[response]]", f'name = "{name}"', *bounds, 'model = "quadratic"', goal, ""])
 
 

@@ -4,7 +4,8 @@
 - ``run``: one replicate under way, and its method; ``recording``: the same in batches; ``ensemble``: runs side by side in threads
 - ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result;
   ``temperatures``: those that the friction of a bearing keeps up
-- ``statistics``: figures and their errors; ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
+- ``figures``: one list of them, which studies, maps, rigs and the manual follow; ``statistics``: their errors
+- ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
 - ``motion``: every motion and contact over time, on request; ``duty``: life over a duty by static loads, without a run
 
 Frame: the origin is the rest position of the centre of the outer ring, with x along the radial load. y is 90 degrees ahead

@@ -6,6 +6,7 @@ Studies, limits, maps and uncertainties name them as they name the figures of th
 import math
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,17 +25,18 @@ CLEARANCES, CONTACTS, (LIFE,) = of_kind("clearance"), of_kind("contact"), of_kin
 EXACT = [figure.key for figure in (*CLEARANCES, LIFE)]
 
 
-def part_figures(
-    scene: Scene, runs: Runs, figures: Mapping[str, Quantity], races: Mapping[str, Mapping[str, float]] | None = None
-) -> dict[str, Quantity]:
-    """Every figure of parts that the scene has, by its key; ``figures``: those that follow from batches, ``races`` of `race_report`.
+def races_of(scene: Scene, runs: Runs) -> dict[str, dict[str, float]]:
+    """``race_report`` at the largest loads of all runs."""
+    return race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
+
+
+def part_figures(scene: Scene, runs: Runs, figures: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Every figure of parts that the scene has, by its key; ``figures``: those that follow from batches.
 
     A clearance is exact for its scene, and so is the life; there is none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
     """
     exact = {name: Quantity(value, 0.0, 0.0, float(len(runs))) for name, value in _exact(scene).items()}
-    reports = [race_report(scene, *(run.largest_load(race) for race in (INNER_LOAD, OUTER_LOAD))) for run in runs]
-    if races is None:
-        races = race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
+    races, reports = races_of(scene, runs), [races_of(scene, [run]) for run in runs]
     contacts = {}
     for contact in CONTACTS:
         race, key = contact.source
@@ -68,15 +70,14 @@ def at_temperatures_with_errors(
             errors[kind] = {name: math.fsum(abs(other[name] - value) for other in moved) for name, value in at.items()}
     freedom = min((one.degrees_of_freedom for one in temperatures.values() if one.degrees_of_freedom), default=None)
     return {
-        name: figure
-        if name not in at
-        else Quantity(
-            figure.value,
-            errors["statistical_error"][name],
-            errors["numerical_error"][name],
-            figure.effective_samples,
-            freedom,
+        name: replace(
+            figure,
+            statistical_error=errors["statistical_error"][name],
+            numerical_error=errors["numerical_error"][name],
+            degrees_of_freedom=freedom,
         )
+        if name in at
+        else figure
         for name, figure in figures.items()
     }
 

@@ -24,10 +24,9 @@ from rbdyn.dynamics.parameters.validity import (
     left_out_notes,
     limit_notes,
     race_notes,
-    race_report,
     slip_notes,
 )
-from rbdyn.dynamics.part_figures import part_figures
+from rbdyn.dynamics.part_figures import part_figures, races_of
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
@@ -131,8 +130,8 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
-    inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
-    races = race_report(scene, inner_load, outer_load)
+    loads = {"inner": INNER_LOAD, "outer": OUTER_LOAD, "land": LAND_LOAD}
+    races = races_of(scene, runs)
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
@@ -164,11 +163,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         power_balance={"relative_gap": power_gap},
         power_terms_W=terms,
         rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
-        loads={
-            "max_inner_N": inner_load,
-            "max_outer_N": outer_load,
-            "max_land_N": max(run.largest_load(LAND_LOAD) for run in runs),
-        },
+        loads={f"max_{name}_N": max(run.largest_load(place) for run in runs) for name, place in loads.items()},
         races=races,
         clearance_um=clearance_report(scene),
         friction_check=maker,
@@ -187,7 +182,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         notes=notes,
         versions=versions(),
         scene=scene.model_dump(mode="json"),
-        part_figures=part_figures(scene, runs, figures, races),
+        part_figures=part_figures(scene, runs, figures),
     )
 
 

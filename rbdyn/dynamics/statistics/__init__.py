@@ -1,6 +1,6 @@
 """From batches to figures with errors.
 
-- ``metrics``: figures of replicates, orbit of the cage, numerical error by companions, filtered whirl of runs and rigs
+- ``replicate``: one run in batches; ``metrics``: figures with their errors, numerical error by companions, filtered whirl
 - ``batch_means``: statistical error of correlated series
 - ``error_bars``: both errors together with transient and slow change, and the notes on them
 """
