@@ -9,7 +9,7 @@ resolution of the drawing and judged again; the widest tolerances are narrowed u
 
 The cheapest tolerances are the Lagrange optimum of cost curves a + b/T^k with one multiplier L. By worst case
 T = (k b/(L |c|))^(1/(k+1)) with sum |c| T = W. By root sum square T = (k b/(2 L c^2))^(1/(k+2)) with sum c^2 T^2 = W^2. Each
-tolerance is limited to the narrowest and the widest of its process.
+tolerance is limited to the narrowest of its process.
 
 Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (1988).
 """
@@ -343,7 +343,7 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     def tolerance(curve: Cost, slope: float, log_multiplier: float) -> float:
         power, weight = (curve.k + 2, 2 * slope**2) if mode == "rss" else (curve.k + 1, abs(slope))
         optimum = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
-        return min(max(optimum, curve.narrowest_mm), curve.widest_mm or inf)
+        return max(optimum, curve.narrowest_mm)
 
     def tolerances(log_multiplier: float) -> list[float]:
         return [tolerance(curve, slope, log_multiplier) for curve, slope in zip(curves, slopes, strict=True)]

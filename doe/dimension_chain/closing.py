@@ -255,14 +255,14 @@ def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
     return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)
 
 
-def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
+def press_fit_factor(fit: PressFit, fit_mm: float) -> float:
     """Change of the raceway's diameter per interference of a tight fit; positive on the outer part, else negative.
 
-    A solid shaft in a ring of its own material widens the ring's outside by fit/outside. ``bore_nominal`` [mm] is the
-    diameter of a fit without ``fit_mm``. Raises MethodError unless shaft_bore < fit < outside and the raceway is on one of
+    A solid shaft in a ring of its own material widens the ring's outside by fit/outside. ``fit_mm``: diameter of the fit, the nominal
+    of the bore. Raises MethodError unless shaft_bore < fit < outside and the raceway is on one of
     the two parts.
     """
-    fit_mm, raceway_mm = fit.fit_mm or bore_nominal, fit.raceway_mm
+    raceway_mm = fit.raceway_mm
     outer = raceway_mm > fit_mm
     # By default the raceway bounds its part.
     shaft_bore_mm = (0.0 if outer else raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm

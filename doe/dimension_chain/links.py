@@ -51,7 +51,7 @@ class ClosingLink(Strict):
 
 
 class Cost(Strict):
-    """Cost of a tolerance T in mm, a + b/T^k, between the narrowest and the widest that the process gives."""
+    """Cost of a tolerance T in mm, a + b/T^k, from the narrowest that the process gives."""
 
     a: NonNegative = 0.0
     """Cost of the part without its tolerance."""
@@ -61,8 +61,6 @@ class Cost(Strict):
     """Exponent of the tolerance."""
     narrowest_mm: NonNegative = 0.0
     """Narrowest tolerance that the process gives."""
-    widest_mm: Positive | None = None
-    """Widest useful tolerance; by default without bound."""
 
 
 class PressFit(Strict):
@@ -75,8 +73,6 @@ class PressFit(Strict):
     raceway_mm: Positive
     """Diameter whose change the link is. If larger than the fit it is on the outer part and grows, if smaller it is on the
     inner part and shrinks."""
-    fit_mm: Positive | None = None
-    """Diameter of the fit; by default the nominal of bore."""
     shaft_bore_mm: NonNegative | None = None
     """Bore of the inner part; by default 0, or the raceway if it is on this part."""
     outside_mm: Positive | None = None

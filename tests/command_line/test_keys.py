@@ -120,10 +120,10 @@ def test_keys_as_json_and_a_word_that_no_key_has():
 
 # Each key that has a unit, by the last part of its name; every other has none.
 UNITS = {
-    "mm": """axial_offset ball_diameter bar_length bar_thickness bar_width bore crown_radius effective_length fit guide_clearance half_width housing_diameter
+    "mm": """axial_offset ball_diameter bar_length bar_thickness bar_width bore crown_radius effective_length guide_clearance half_width housing_diameter
         inner_shoulder_height interference_change land_diameter land_width lower mean narrowest nominal outer_shoulder_height outside_diameter outside pitch_diameter
         pocket_clearance pocket_contact_length pocket_radial_clearance raceway radial_clearance resolution roller_diameter roller_length
-        shaft_bore side_ring_width upper widest width x y z""",
+        shaft_bore side_ring_width upper width x y z""",
     "um": """amplitude ball_diameter_errors ball_diameter_spread clearance_change height imbalance inner_interference
         land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
         roller_diameter_errors roller_diameter_spread roller_roughness""",
