@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -325,26 +325,26 @@ def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
     return ["cage_orbit.png", "pocket_forces.png"]
 
 
-def motion_record(motions: "Mapping[str, History]") -> dict[str, Any]:
-    """Motions by name, small enough for a mail: the orbit of the cage in its guide, and frames of a film.
+class DrawnMotion(NamedTuple):
+    """A motion small enough for a mail.
 
-    Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS points;
-    ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the largest
-    pocket force, as by rbdyn.plots.drawing.motion_record.
+    ``orbit_um``: x and y of the cage in its guide over the whole motion, at most ORBIT_POINTS points; ``guide_radius_um``: None
+    without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the largest pocket force, as by
+    rbdyn.plots.drawing.motion_record.
     """
-    from rbdyn.plots.drawing import drawing
-    from rbdyn.plots.drawing import motion_record as frames
 
-    record = {}
-    for name, motion in motions.items():
-        thinned = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
-        x, y = motion.guide_eccentricity
-        clearance = motion.scene.guide_clearance_m
-        picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
-        record[name] = {
-            "t_s": np.round(motion.time[thinned], 8).tolist(),
-            "cage_orbit_um": {"x": np.round(1e6 * x[thinned], 2).tolist(), "y": np.round(1e6 * y[thinned], 2).tolist()},
-            "guide_radius_um": None if clearance is None else round(1e6 * clearance, 3),
-            "moving": frames(motion, picture),
-        }
-    return record
+    orbit_um: tuple[list[float], list[float]]
+    guide_radius_um: float | None
+    moving: dict[str, Any]
+
+
+def drawn_motion(motion: "History") -> DrawnMotion:
+    """What a page draws of a motion."""
+    from rbdyn.plots.drawing import drawing, motion_record
+
+    thinned = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
+    x, y = (np.round(1e6 * along[thinned], 2).tolist() for along in motion.guide_eccentricity)
+    clearance = motion.scene.guide_clearance_m
+    picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
+    radius = None if clearance is None else round(1e6 * clearance, 3)
+    return DrawnMotion((x, y), radius, motion_record(motion, picture))

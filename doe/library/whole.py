@@ -60,9 +60,9 @@ class StudyAnswer(Answer):
     @cached_property
     def summary(self) -> "Summary":
         """The record with its parts as attributes."""
-        from doe.report.summary import restored
+        from doe.report.summary import Summary
 
-        return restored(self.as_dict())
+        return Summary.from_dict(self.record)
 
     def blocks(self) -> list[Block]:
         from doe.report.files import blocks

@@ -19,7 +19,7 @@ from doe.report.sections.front import front_sheet
 from doe.report.sections.record import readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
 from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences
-from doe.report.summary import Summary, restored
+from doe.report.summary import Summary
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
 from doe.workflow.asked import Settings
@@ -57,8 +57,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     from doe.report import pictures as plots
 
     study = outcome.study
-    record = summary(outcome).as_dict()
-    result = restored(record)
+    result = summary(outcome)
+    record = result.as_dict()
     runs = run_sheet(study.factors, study.responses, result.design.points)
     tables = {
         runs.file: runs.records,
@@ -96,7 +96,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         plots.duty_gains(result, folder / pictures[-1])
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
-    texts = {"report.html": html_report(result, clearance.motion_record(motions)), "answer.txt": answer_text(result)}
+    drawn = {name: clearance.drawn_motion(motion) for name, motion in motions.items()}
+    texts = {"report.html": html_report(result, drawn), "answer.txt": answer_text(result)}
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     write_workbook(folder / WORKBOOK, [folder / name for name in tables], result.identity)
@@ -107,31 +108,30 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     return record
 
 
-def answer_text(record: Summary | Mapping[str, Any]) -> str:
+def answer_text(result: Summary) -> str:
     """answer.txt, of the record of ``doe study --json``."""
-    return terminal.text(blocks(record))
+    return terminal.text(blocks(result))
 
 
-def blocks(record: Summary | Mapping[str, Any]) -> list[Block]:
+def blocks(result: Summary) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
-    clean = restored(record)
     details = [
-        *in_few_runs(clean),
-        changes(clean),
-        *costs(clean),
-        duty_figures(clean).block,
-        *chains(clean, {}).blocks,
-        *reference(clean, {}).blocks,
-        *diagnostics(clean, {}).blocks,
+        *in_few_runs(result),
+        changes(result),
+        *costs(result),
+        duty_figures(result).block,
+        *chains(result, {}).blocks,
+        *reference(result, {}).blocks,
+        *diagnostics(result, {}).blocks,
     ]
     return readable(
         [
-            Verdict(tuple(clean.notes)),
-            *first_screen(clean),
-            *notes(clean, {}).blocks,
+            Verdict(tuple(result.notes)),
+            *first_screen(result),
+            *notes(result, {}).blocks,
             *(replace(block, detail=Detail.ALL) for block in details),
         ],
-        clean.asked,
+        result.asked,
     )
 
 

@@ -12,14 +12,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import Any
 
+from doe.clearance import DrawnMotion
 from doe.report.sections import answer, bearing, chain, design, duty, fit, front, robust
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
-from doe.report.sections.record import Record, drop_undefined, part, readable, record_table
-from doe.report.summary import Summary, restored
+from doe.report.sections.record import readable, record_table
+from doe.report.summary import Summary
 from doe.workflow.asked import Asked, Factor, Response
 from doe.workflow.surface_front import EstimatedPoint, Point, RobustPoint
 from rbdyn.base import html
@@ -27,6 +29,8 @@ from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, 
 from rbdyn.base.page import identity_section, page
 from rbdyn.base.words import label, quantity, rounded_down, shown
 
+# Motions by the name of their point.
+Motions = Mapping[str, DrawnMotion]
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {
     "page": ("page.js", "tables.js"),
@@ -44,38 +48,31 @@ LETTERS = string.ascii_uppercase + string.ascii_lowercase + string.digits + "+/"
 STEPS = len(LETTERS) ** 2 - 2
 
 
-def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str:
-    """A study as one HTML page.
-
-    summary : record of ``doe study --json``; parts that are missing or null are left out.
-    motion : record of ``doe.clearance.motion_record``; without it nothing moves.
-    """
-    record = restored(summary)
-    moving = drop_undefined(dict(motion or {}))
-    chapters = sections(record, moving)
+def html_report(summary: Summary, motion: Motions = MappingProxyType({})) -> str:
+    """A study as one HTML page; without ``motion`` nothing moves."""
+    chapters = sections(summary, motion)
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
-    data = f'<script type="application/json" id="data">{_json(page_data(record, moving))}</script>'
+    data = f'<script type="application/json" id="data">{_json(page_data(summary, motion))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
-    opening = "".join(map(html.render, readable([Verdict(tuple(record.notes))], record.asked)))
-    return page(window_title(record), title(record), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
+    opening = "".join(map(html.render, readable([Verdict(tuple(summary.notes))], summary.asked)))
+    return page(window_title(summary), title(summary), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
 
 
-def title(summary: Record) -> str:
+def title(summary: Summary) -> str:
     """The name of the file of the study in words."""
     stem = PurePath(summary.asked.study_file).stem.replace("_", " ")
     return stem[:1].upper() + stem[1:]
 
 
-def window_title(summary: Record) -> str:
+def window_title(summary: Summary) -> str:
     """The title of the study with its bearing and the command."""
     return f"{title(summary)}: {summary.identity.title}"
 
 
-def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
-    """Sections with something to say, of a record without undefined values (``drop_undefined``)."""
-    record = restored(summary)
-    chapters = [chapter(record, motion or {}) for chapter in CHAPTERS]
-    whole = [replace(section, blocks=readable(section.blocks, record.asked)) for section in chapters if section]
+def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[Section]:
+    """Sections with something to say."""
+    chapters = [chapter(summary, motion) for chapter in CHAPTERS]
+    whole = [replace(section, blocks=readable(section.blocks, summary.asked)) for section in chapters if section]
     return [section for section in whole if section.blocks]
 
 
@@ -105,7 +102,7 @@ def _json(record: Mapping[str, Any]) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
+def page_data(summary: Summary, motion: Motions) -> dict[str, Any]:
     """Factors, surfaces, runs, fronts and motion, ready for JSON."""
     inputs = summary.asked.factors
     names = summary.asked.names
@@ -128,7 +125,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
             for points in fronts(summary)
         ],
         "compared": {name: _point(point, summary.asked) for name, point in marks.items()},
-        "motion": {name: _moving(run["moving"]) for name, run in motion.items() if part(run, "moving")},
+        "motion": {name: _moving(run.moving) for name, run in motion.items()},
     }
     if summary.adaptive is not None:
         region = [summary.adaptive.region[name] for name in summary.asked.columns]
@@ -136,7 +133,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     return record
 
 
-def _factor(summary: Record, factor: Factor) -> dict[str, Any]:
+def _factor(summary: Summary, factor: Factor) -> dict[str, Any]:
     keys = ("name", "words", "unit", "letter", "centre", "step", "low", "high", "decimals")
     tolerance = tolerance_of(summary, factor)
     return {key: getattr(factor, key) for key in keys} | {"tolerance": rounded_down(tolerance) if tolerance else None}
@@ -164,11 +161,12 @@ def _rounded(value: float | None, digits: int = 6) -> float | None:
     return None if value is None else float(f"{value:.{digits}g}")
 
 
-def _moving(motion: Record) -> dict[str, Any]:
+def _moving(motion: Mapping[str, Any]) -> dict[str, Any]:
     """The motion of a point, its series of every roller packed."""
     return {
         key: packed(value) if isinstance(value, list) and len(value) > motion["frames"] else value
         for key, value in motion.items()
+        if value is not None
     }
 
 
@@ -201,7 +199,7 @@ def _surfaces(summary: Summary) -> list[dict[str, Any]]:
     ]
 
 
-def reference(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def reference(summary: Summary, motion: Motions) -> Section:
     """Levels, effects and ranks compared with a published table, with the reasons for what differs."""
     levels, effects, words = [], [], []
     for name, row in summary.published_comparisons.items():
@@ -221,19 +219,23 @@ def reference(summary: Summary, motion: Mapping[str, Any]) -> Section:
     return Section("reference", "Compared with the published table", blocks)
 
 
-def identity(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def identity(summary: Summary, motion: Motions) -> Section | None:
     """Bearing, operating point, date and hashes of the input files."""
     return identity_section(summary.identity)
 
 
-def settings(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def settings(summary: Summary, motion: Motions) -> Section:
     """Seeds, versions and cost: what it takes to get the same numbers again."""
-    tables = {"Seeds": summary.seeds, "Versions": summary.versions, "Cost, times in seconds": summary.cost}
+    tables: dict[str, Mapping[str, Any]] = {
+        "Seeds": summary.seeds,
+        "Versions": summary.versions,
+        "Cost, times in seconds": summary.cost,
+    }
     blocks = [record_table(caption, figures) for caption, figures in tables.items()]
     return Section("settings", "Settings, versions, cost", blocks)
 
 
-def notes(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def notes(summary: Summary, motion: Motions) -> Section:
     """Runs that failed, and limits of the model that the runs met."""
     return Section("notes", "Notes and failures", [failure_table(summary.failures), Remarks(tuple(summary.notes))])
 

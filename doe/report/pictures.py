@@ -14,7 +14,6 @@ from matplotlib.ticker import MaxNLocator
 from doe.report import still
 from doe.report.sections.duty import gain_stills
 from doe.report.sections.front_pictures import drawn_pairs, near
-from doe.report.sections.record import Record
 from doe.report.sections.search import search_stills
 from doe.report.summary import Summary
 from doe.response_surface import Surface
@@ -79,7 +78,7 @@ def adaptive_search(summary: Summary, search: SearchResult, path: Path) -> None:
     still.save([progress, *places], COLUMNS, path)
 
 
-def duty_gains(record: Record, path: Path) -> None:
+def duty_gains(record: Summary, path: Path) -> None:
     """Gains at each point of a duty, of the record of a study."""
     still.save(gain_stills(record), COLUMNS, path)
 

@@ -1,11 +1,8 @@
 """The record of a whole study, shaped like summary.json: what every page, screen and table of it reads."""
 
-from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 from doe.dimension_chain import ChainResult
-from doe.report.sections.record import drop_undefined
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
 from doe.workflow.asked import Settings
@@ -68,11 +65,3 @@ class Summary(Record, kw_only=True):
     tolerances_gains: dict[str, KeptGain] | None = None
     tolerances_sentence: str | None = None
     tolerances_warning: str | None = None
-
-
-def restored(record: "Summary | Mapping[str, Any]") -> Summary:
-    """The record of a study, also from its JSON; parts that have no Record of their own lose what is undefined."""
-    if isinstance(record, Summary):
-        return record
-    untyped = {item.name for item in fields(Summary) if item.type is Any}
-    return Summary.from_dict({key: drop_undefined(part) if key in untyped else part for key, part in record.items()})

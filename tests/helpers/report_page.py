@@ -11,6 +11,7 @@ from headless import offline_browser
 from synthetic_study import motion, summary
 
 from doe.report.page import html_report
+from doe.report.summary import Summary
 
 PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 
@@ -18,7 +19,7 @@ PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 @contextmanager
 def report_in_browser(folder: Path) -> Iterator[tuple[Any, Path]]:
     """A browser, and the folder with the page in a file."""
-    (folder / "report.html").write_text(html_report(summary(), motion()), encoding="utf-8")
+    (folder / "report.html").write_text(html_report(Summary.from_dict(summary()), motion()), encoding="utf-8")
     with offline_browser() as driver:
         yield driver, folder
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from doe.clearance import DrawnMotion
 from doe.dimension_chain import Chain, ChainResult, solve
 
 FACTORS = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
@@ -260,8 +261,8 @@ def searched(emulators: dict[str, Any] | None = None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
-    """Record of ``doe.clearance.motion_record``: rollers going round at even speed."""
+def motion(rollers: int = 6, frames: int = 40) -> dict[str, DrawnMotion]:
+    """Motions of baseline and pick: rollers going round at even speed."""
     turn = 2.0 * math.pi
     still, each = [0.0] * frames, [0.0] * (frames * rollers)
     angles = [round(0.4 * turn * frame / frames, 4) for frame in range(frames)]
@@ -277,6 +278,5 @@ def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
         "ahead_um": each, "out_um": each, "spin": each, "outer_load_N": [500.0] * len(each), "inner_load_N": each,
         "pocket_load_N": [20.0] * len(each), "land_load_N": still,
     }  # fmt: skip
-    orbit = {axis: [20.0 * trig(0.1 * k) for k in range(60)] for axis, trig in (("x", math.cos), ("y", math.sin))}
-    one = {"t_s": [1e-5 * k for k in range(60)], "cage_orbit_um": orbit, "guide_radius_um": 75.0, "moving": moving}
-    return {"baseline": one, "pick": one}
+    orbit = tuple([20.0 * trig(0.1 * k) for k in range(60)] for trig in (math.cos, math.sin))
+    return dict.fromkeys(("baseline", "pick"), DrawnMotion(orbit, 75.0, moving))

@@ -11,7 +11,7 @@ from doe.report.files import answer_text, blocks
 from doe.report.page import page_data, sections
 from doe.report.sections.duty import at_points, duty_figures, gain_stills
 from doe.report.sections.record import readable
-from doe.report.summary import restored
+from doe.report.summary import Summary
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
 
@@ -74,19 +74,21 @@ def over_duty() -> dict:
 
 def sentences(record: dict) -> dict[str, str]:
     """Roles of the sentences on the duty by their text, names in words."""
-    clean = restored(record)
+    clean = Summary.from_dict(record)
     return {block.text: block.role for block in readable(at_points(clean), clean.asked) if isinstance(block, Paragraph)}
 
 
 def test_without_a_duty_nothing_is_said_of_one():
     """Unit: the answer and the report of a study at one point have no word on a duty."""
     assert sentences(summary()) == {}
-    assert "duty" not in answer_text(summary()) and "duty" not in {part.key for part in sections(restored(summary()))}
+    assert "duty" not in answer_text(Summary.from_dict(summary())) and "duty" not in {
+        part.key for part in sections(Summary.from_dict(summary()))
+    }
 
 
 def test_each_point_has_its_verdicts():
     """Unit: a row a point, a column a response with a goal, the worst verdict on its limits."""
-    table = at_points(restored(over_duty()))[0]
+    table = at_points(Summary.from_dict(over_duty()))[0]
     assert isinstance(table, Table) and list(table.header) == ["point", "share", "impact force", "power loss", "limits"]
     assert [row[0] for row in table.rows] == ["idle", "cruise", "take-off"]
     assert [row[1] for row in table.rows] == ["25 %", "70 %", "5 %"]
@@ -119,7 +121,7 @@ def test_the_dearest_compromise_is_named_where_it_exceeds_its_errors():
     for entry in record["duty"]["points"]:
         entry |= {"own": None, "own_note": f"{entry['name']} alone has no pick"}
     assert not any(text.startswith("The compromise") for text in sentences(record))
-    (chapter,) = (part for part in sections(restored(record)) if part.key == "duty")
+    (chapter,) = (part for part in sections(Summary.from_dict(record)) if part.key == "duty")
     assert any("idle alone has no pick" in getattr(block, "text", "") for block in chapter.blocks)
 
 
@@ -167,21 +169,21 @@ def test_gains_are_drawn_at_each_point_and_over_the_duty():
     """Unit: a picture a response with a goal, a row a point and one over the duty; long names are cut."""
     record = over_duty()
     record["duty"]["points"][0]["name"] = "idle " * 20
-    first, second = gain_stills(restored(record))
+    first, second = gain_stills(Summary.from_dict(record))
     assert first.words == "Gain in impact force at 3 points of the duty" and first.height == second.height
     svg = first.svg()
     assert all(f">{name}<" in svg for name in ("cruise", "take-off", "over the duty"))
     assert svg.count('class="mark"') == 4 and "idle " * 20 not in svg
-    assert gain_stills(restored(summary())) == []
+    assert gain_stills(Summary.from_dict(summary())) == []
 
 
 def test_clearances_in_operation_stand_at_each_point():
     """Unit: where temperatures change them each point has its own, at baseline and pick; else no such table."""
     record = over_duty()
-    assert "Clearances in operation" not in str(sections(restored(record)))
+    assert "Clearances in operation" not in str(sections(Summary.from_dict(record)))
     for entry, play in zip(record["duty"]["points"], (0.01, 0.02, 0.03), strict=True):
         entry["operating_clearances_mm"] = {FACTORS[0]: {"baseline": play, "pick": play + 0.001}}
-    (chapter,) = (part for part in sections(restored(record)) if part.key == "duty")
+    (chapter,) = (part for part in sections(Summary.from_dict(record)) if part.key == "duty")
     (table,) = (
         block for block in chapter.blocks if getattr(block, "caption", "").startswith("Clearances in operation")
     )
@@ -196,17 +198,17 @@ def test_a_ratio_has_no_unit_anywhere():
     every = [{"response": f"idle: {IMPACT}", **limit}]
     for name in ("baseline", "pick"):
         record["confirmation"][name] |= {"limits": record["limits"], "every_limit": every}
-    whole = terminal.text(blocks(record), Detail.ALL, 200)
+    whole = terminal.text(blocks(Summary.from_dict(record)), Detail.ALL, 200)
     assert "impact force, worst ratio" in whole and "idle: impact force [N] ≤ 30" in whole
     assert "impact force [N]" not in whole.replace("idle: impact force [N]", "")
-    named = {entry["name"]: entry for entry in page_data(restored(record), {})["responses"]}
+    named = {entry["name"]: entry for entry in page_data(Summary.from_dict(record), {})["responses"]}
     assert named[IMPACT]["unit"] == "" and named[POWER]["unit"] == "W"
-    assert "impact force [N]" in terminal.text(blocks(summary()), Detail.ALL, 200)
+    assert "impact force [N]" in terminal.text(blocks(Summary.from_dict(summary())), Detail.ALL, 200)
 
 
 def test_the_table_has_a_row_a_response_at_a_point():
     """Unit: duty_points.csv has baseline, pick, gain, cost of the compromise and verdict on limits of each."""
-    rows = duty_figures(restored(over_duty())).records
+    rows = duty_figures(Summary.from_dict(over_duty())).records
     assert [(row["point"], row["response"]) for row in rows[:3]] == [
         ("idle", IMPACT),
         ("idle", POWER),
@@ -222,7 +224,7 @@ def test_the_table_has_a_row_a_response_at_a_point():
 @pytest.mark.parametrize("width", [80, 60, 40])
 def test_no_word_of_a_header_is_broken(width):
     """Report: at any width each word of a header of the duty's tables stands whole in a line, and no line is longer."""
-    clean = restored(over_duty())
+    clean = Summary.from_dict(over_duty())
     (chapter,) = (part for part in sections(clean) if part.key == "duty")
     tables = [
         block for block in [*readable(at_points(clean), clean.asked), *chapter.blocks] if isinstance(block, Table)

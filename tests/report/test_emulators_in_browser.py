@@ -15,6 +15,7 @@ from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, searche
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.goals import Goals
 from doe.report.page import html_report
+from doe.report.summary import Summary
 from doe.workflow.problem import Problem
 from doe.workflow.search_record import Emulated
 
@@ -53,7 +54,7 @@ def test_oracle_scripts_evaluate_emulators_as_python_does(browser):
     """Oracle: means and deviations of `doe.adaptive.emulators` at points in and beyond the runs, in all responses."""
     driver, folder = browser
     record, emulators = with_emulators(summary())
-    (folder / "emulated.html").write_text(html_report(record), encoding="utf-8")
+    (folder / "emulated.html").write_text(html_report(Summary.from_dict(record)), encoding="utf-8")
     page = opened(browser, name="emulated.html")
     points = np.random.default_rng(4).uniform(-1.3, 1.3, (40, 3))
     points[:10] = emulators.runs.points[:10]
@@ -79,7 +80,7 @@ def test_the_widget_switches_between_polynomial_and_emulator(browser):
 
     driver, folder = browser
     record, emulators = with_emulators(summary())
-    (folder / "switched.html").write_text(html_report(record), encoding="utf-8")
+    (folder / "switched.html").write_text(html_report(Summary.from_dict(record)), encoding="utf-8")
     page = opened(browser, name="switched.html")
     page.find_element("id", "surface_pick").click()
     chosen = np.array(list(record["front"]["pick"]["factors"].values()))

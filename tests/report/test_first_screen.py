@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from doe.report.files import answer_text, blocks
 from doe.report.page import html_report
 from doe.report.sections.answer import first_screen
-from doe.report.summary import restored
+from doe.report.summary import Summary
 from doe.workflow.confirmation import LOSS, NOISE, REAL, Choice, Confirmed
 from doe.workflow.front import find_front
 from doe.workflow.pick import choices
@@ -60,7 +60,7 @@ def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
 
 def roles(record: dict) -> dict[str, str]:
     """Roles of the sentences of the first screen by their text."""
-    return {block.text: block.role for block in first_screen(restored(record)) if isinstance(block, Paragraph)}
+    return {block.text: block.role for block in first_screen(Summary.from_dict(record)) if isinstance(block, Paragraph)}
 
 
 @pytest.mark.parametrize("width", [60, 80, 100])
@@ -70,7 +70,7 @@ def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
         Note("unit" if number % 2 else "remark", f"{number}: {number * 'word '}{'word ' * 30}") for number in range(9)
     ]
     record = limited() | {"notes": plain([*every, Note("left-out", "general")])}
-    text = terminal.text(blocks(record), width=width)
+    text = terminal.text(blocks(Summary.from_dict(record)), width=width)
     places = [text.index(words) for words in ORDER]
     lines = text.splitlines()
     assert lines[0] == "No danger found; 4 warnings" and lines[1].startswith("made-up bearing; 24000 rpm; 2026-01-31")
@@ -78,18 +78,21 @@ def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
     assert "5 more notes in the report" in text and "published table" not in text
     # Four made-up warnings take up to three lines each.
     assert width < 80 or len(text.splitlines()) <= 50 + 4 * 2
-    assert "Levels" in terminal.text(blocks(record), Detail.ALL) and "Compared with the published" in html_report(
-        record
-    )
-    file = answer_text(record)
+    assert "Levels" in terminal.text(
+        blocks(Summary.from_dict(record)), Detail.ALL
+    ) and "Compared with the published" in html_report(Summary.from_dict(record))
+    file = answer_text(Summary.from_dict(record))
     assert [file.index(words) for words in ORDER] == sorted(file.index(words) for words in ORDER)
 
 
 def test_a_limit_has_its_odds_or_the_command_for_them():
     """With odds a column of the table has them; without, the command is named; the gains likewise."""
-    unknown, known = answer_text(limited()), answer_text(limited(odds=[0.57, 0.51, 0.63]))
+    unknown, known = (
+        answer_text(Summary.from_dict(limited())),
+        answer_text(Summary.from_dict(limited(odds=[0.57, 0.51, 0.63]))),
+    )
     assert unknown.count("doe study study.toml --robust states the odds over the unknown inputs.") == 1
-    assert answer_text(summary()).count("--robust states the odds") == 1
+    assert answer_text(Summary.from_dict(summary())).count("--robust states the odds") == 1
     assert "57 (51 to 63)" in known and "kept in 100 cases" in known
 
 
@@ -108,7 +111,7 @@ def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(
 
 @pytest.mark.parametrize("verdict", ["broken", "undecided"])
 def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
-    text = answer_text(limited(verdict))
+    text = answer_text(Summary.from_dict(limited(verdict)))
     assert "at the pick. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
     assert "doe study study.toml --robust states the odds over the unknown inputs." in text
 

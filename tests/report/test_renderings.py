@@ -10,6 +10,7 @@ from synthetic_study import RESPONSES, motion, searched, summary
 
 from doe.report.files import answer_text, blocks
 from doe.report.page import html_report, sections
+from doe.report.summary import Summary
 from rbdyn.base import html as page
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Bullets, Detail, Heading, Paragraph, Remarks, Section, Table, with_notes
@@ -53,7 +54,7 @@ def record() -> dict:
     return whole
 
 
-@pytest.mark.parametrize("section", sections(record(), motion()), ids=lambda section: section.key)
+@pytest.mark.parametrize("section", sections(Summary.from_dict(record()), motion()), ids=lambda section: section.key)
 def test_every_section_has_the_same_figures_in_both_renderings(section):
     """Terminal and HTML of one section: the same numbers to the digit, in the same order.
 
@@ -68,21 +69,23 @@ def test_every_section_has_the_same_figures_in_both_renderings(section):
 
 def test_a_whole_study_has_the_same_figures_as_its_sections():
     """The files of a study: report.html holds the numbers of the tree, answer.txt those of its answer."""
-    tree = sections(record())
-    body = html_report(record()).partition('<section id="answer"')[2].partition("</main>")[0]
+    tree = sections(Summary.from_dict(record()))
+    body = html_report(Summary.from_dict(record())).partition('<section id="answer"')[2].partition("</main>")[0]
     parts = re.split(r'<section id="', body)
     assert len(parts) == len(tree)
-    answer = numbers(answer_text(record()))
+    answer = numbers(answer_text(Summary.from_dict(record())))
     assert set(of_terminal(tree[0])) <= set(answer)
     assert set(answer) <= {*of_terminal(tree[0]), *of_terminal(tree[-1])}
-    assert set(answer) <= set(numbers(terminal.text(blocks(record()))))
-    assert "231.4720 ± 0.0057" in answer_text(record()) and "231.4720 ± 0.0057" in body.replace("&nbsp;", " ")
+    assert set(answer) <= set(numbers(terminal.text(blocks(Summary.from_dict(record())))))
+    assert "231.4720 ± 0.0057" in answer_text(Summary.from_dict(record())) and "231.4720 ± 0.0057" in body.replace(
+        "&nbsp;", " "
+    )
 
 
 def test_no_key_stands_in_what_people_read():
     """Words, never keys: neither factors nor responses by their names in the record."""
     whole = record()
-    text = answer_text(whole) + terminal.text(blocks(whole), Detail.ALL)
+    text = answer_text(Summary.from_dict(whole)) + terminal.text(blocks(Summary.from_dict(whole)), Detail.ALL)
     for name in [*RESPONSES, *whole["pick"]]:
         assert name not in text, name
 

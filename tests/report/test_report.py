@@ -24,8 +24,10 @@ from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.sections.record import change, scalars
 from doe.report.still import Still
+from doe.report.summary import Summary
 from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
+from doe.workflow.confirmation import Gain
 from doe.workflow.judgement import Robust, RobustFront, RobustPoint
 from doe.workflow.pick import BeyondBound, Outward
 from doe.workflow.problem import Problem
@@ -85,7 +87,7 @@ def stills():
 
 @pytest.fixture(scope="module")
 def page():
-    return html_report(summary(), motion())
+    return html_report(Summary.from_dict(summary()), motion())
 
 
 def data_of(page: str) -> dict:
@@ -146,7 +148,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
     }
     record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
     record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {"factors": plain["factors"]}
-    text = html_report(record)
+    text = html_report(Summary.from_dict(record))
     compared = data_of(text)["compared"]
     assert compared["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
     assert compared["pick without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
@@ -164,7 +166,7 @@ def test_tolerances_are_never_rounded_up():
 
 
 def test_without_motion_nothing_moves():
-    outline = Outline(html_report(summary()))
+    outline = Outline(html_report(Summary.from_dict(summary())))
     assert "bearing" not in outline.ids and "motion" not in outline.links
 
 
@@ -175,7 +177,7 @@ def spoilt(record, name):
 
 @pytest.mark.parametrize("name", ["</script><b>bold</b>", "a<!--b", "{{DATA}} & 'c'", 'd" onload="e', "|pipe|*star*"])
 def test_no_name_breaks_the_page(name, page):
-    spoiled = html_report(spoilt(summary(), name), motion())
+    spoiled = html_report(Summary.from_dict(spoilt(summary(), name)), motion())
     outline = Outline(spoiled)
     assert outline.open == []
     assert data_of(spoiled)["factors"][0]["name"] == name
@@ -189,7 +191,7 @@ def test_nan_never_appears():
     fit = record["fit"]["responses"][RESPONSES[0]]
     fit["r2"] = fit["diagnostics"]["runs"][0]["cook"] = None
     record["design"]["points"][0]["responses"] = {}
-    text = html_report(record, motion())
+    text = html_report(Summary.from_dict(record), motion())
     told = " ".join(Outline(text).words) + json.dumps(data_of(text))
     assert not re.search(r"\b(nan|NaN|inf|Infinity|None|null ±)\b", re.sub(r"null", "", told))
     assert "failed" in told
@@ -198,7 +200,7 @@ def test_nan_never_appears():
 def test_record_is_left_as_it_was():
     record = summary()
     before = copy.deepcopy(record)
-    html_report(record, motion())
+    html_report(Summary.from_dict(record), motion())
     assert record == before
 
 
@@ -287,15 +289,14 @@ def test_names_and_numbers_are_written_for_people():
     assert shown(-3.1e-17) == "0"
     assert dict(scalars({"known": {"p": 5.6e-102, "df": 3}})) == {"known, p": "< 0.0001", "known, df": "3"}
     assert _coefficient(-6.986e-05, 0.0086) == "-0.0001 ± 0.0086" and _coefficient(None, None) == "–"
-    assert change({"percent": 9.963, "error_percent": 4.462}) == "10.0 ± 4.5 % less"
-    assert change({"percent": -3.0, "error_percent": None}) == "3.00 % more"
-    assert change({"percent": -3.0, "error_percent": 0.5, "goal": "max"}) == "3.00 ± 0.50 % less"
-    assert change({"percent": 3.0, "error_percent": 0.5, "goal": "target"}) == "3.00 ± 0.50 % off target less"
+    assert change(Gain(9.963, 4.462)) == "10.0 ± 4.5 % less"
+    assert change(Gain(-3.0, 0.5, "max")) == "3.00 ± 0.50 % less"
+    assert change(Gain(3.0, 0.5, "target")) == "3.00 ± 0.50 % off target less"
 
 
 def test_cards_carry_units_and_say_what_a_clearance_is():
     whole = summary()
-    words = " ".join(Outline(html_report(whole)).words)
+    words = " ".join(Outline(html_report(Summary.from_dict(whole))).words)
     assert len(re.findall(r"baseline [\d.]+ mm", words)) == len(whole["asked"]["factors"])
     keys = [each["key"] for each in whole["asked"]["factors"]]
     assert ("Clearances: " in words) == any(key in MEANINGS for key in keys)
@@ -363,10 +364,10 @@ def test_the_odds_of_the_gains_follow_these():
         screened={}, pairs=128, runs=256, doubtful=0, sentences=[sentence],
     )  # fmt: skip
     record = summary() | {"robust": robust.as_dict()}
-    page = html_report(record, motion())
+    page = html_report(Summary.from_dict(record), motion())
     words = " ".join(Outline(page).words)
     assert f'class="warning"><strong>Warning:</strong> {sentence}' in page and "--robust states" not in page
     assert words.index("Changes confirmed") < words.index(sentence) < words.index("Over the unknown inputs")
     sure = record | {"robust": record["robust"] | {"all": [0.97, 0.94, 0.99]}}
-    assert f'class="statement">{sentence}' in html_report(sure)
+    assert f'class="statement">{sentence}' in html_report(Summary.from_dict(sure))
     assert "3.1 %, 80 (70 to 90)" in words and "57 (51 to 63)" in words

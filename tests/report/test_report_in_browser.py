@@ -14,6 +14,7 @@ from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, summary
 
 from doe.report.page import html_report
+from doe.report.summary import Summary
 from rbdyn.base.words import with_error
 
 
@@ -49,7 +50,7 @@ def test_two_factors_of_awkward_names_draw_as_they_are(browser):
             "vif": {"A": 1.0, "B": 1.0},
         }
         fitted |= {"actual_coefficients": terms, "stationary_point": None}
-    (folder / "awkward.html").write_text(html_report(record), encoding="utf-8")
+    (folder / "awkward.html").write_text(html_report(Summary.from_dict(record)), encoding="utf-8")
     page = opened(browser, name="awkward.html")
     assert "</script><b>x</b>" in page.find_element("id", "surface_x").text
     assert page.find_elements("css selector", "main b") == []

@@ -21,7 +21,7 @@ from doe.report.sections.bearing import power_bars
 from doe.report.sections.chain import FILLS, contributions
 from doe.report.sections.fit import diagnostic_plots
 from doe.report.still import COLOURS, Still, name_marks, save
-from doe.report.summary import restored
+from doe.report.summary import Summary
 from rbdyn.base.blocks import Figures
 
 POINTS = [(0.0, 10.0), (1.0, 30.0), (4.0, 20.0)]
@@ -29,9 +29,10 @@ POINTS = [(0.0, 10.0), (1.0, 30.0), (4.0, 20.0)]
 LAZY = """
 import sys
 from doe.report.page import sections
+from doe.report.summary import Summary
 from rbdyn.base.blocks import Figures
 from synthetic_study import motion, summary
-stills = [each for part in sections(summary(), motion()) for block in part.blocks
+stills = [each for part in sections(Summary.from_dict(summary()), motion()) for block in part.blocks
           if isinstance(block, Figures) for each in block.pictures if not isinstance(each, str)]
 print(len(stills), "matplotlib" in sys.modules)
 stills[0]()
@@ -46,7 +47,12 @@ def marked(titles, axis):
 
 def stills() -> list[Still]:
     """All still pictures of the made-up study."""
-    blocks = [block for part in sections(summary(), motion()) for block in part.blocks if isinstance(block, Figures)]
+    blocks = [
+        block
+        for part in sections(Summary.from_dict(summary()), motion())
+        for block in part.blocks
+        if isinstance(block, Figures)
+    ]
     return [each.__self__ for block in blocks for each in block.pictures if not isinstance(each, str)]
 
 
@@ -100,7 +106,7 @@ def test_every_picture_is_coloured_by_its_page_and_refers_to_nothing_outside(sti
 
 
 def test_dollars_and_quotes_of_a_name_stay_as_they_are():
-    runs = restored(summary()).fit.responses[RESPONSES[0]].diagnostics.runs
+    runs = Summary.from_dict(summary()).fit.responses[RESPONSES[0]].diagnostics.runs
     name = 'a$b$ <i> "c" & d_mm'
     text = diagnostic_plots(name, runs)[0].svg()
     words = [each.text for each in ElementTree.fromstring(text).iter("text")]

@@ -18,6 +18,7 @@ from doe.dimension_chain.closing import total
 from doe.dimension_chain.links import Cost
 from doe.report.page import sections
 from doe.report.sections.chain import chain_blocks
+from doe.report.summary import Summary
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError
@@ -251,4 +252,4 @@ def test_tolerances_in_proportion_to_the_unit_say_that_they_are_no_grades():
 
 def reported(record):
     """The report of a record in words."""
-    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(summary() | record))
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(Summary.from_dict(summary() | record)))

@@ -12,6 +12,7 @@ from doe.dimension_chain import solve
 from doe.dimension_chain.links import size_text
 from doe.report.page import sections
 from doe.report.sections.chain import chain_blocks
+from doe.report.summary import Summary
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.terminal import text
@@ -199,4 +200,4 @@ def test_unit_fixed_links_that_fill_the_limits_leave_nothing():
 
 def reported(record):
     """The report of a record in words."""
-    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(summary() | record))
+    return "".join(terminal.text(part.blocks, Detail.ALL) for part in sections(Summary.from_dict(summary() | record)))

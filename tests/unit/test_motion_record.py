@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from doe.clearance import FRAMES, ORBIT_POINTS, motion_record
+from doe.clearance import FRAMES, ORBIT_POINTS, drawn_motion
 from rbdyn.dynamics.motion import history
 
 
@@ -15,25 +15,24 @@ from rbdyn.dynamics.motion import history
 def recorded(outer):
     """A motion of four turns and its record."""
     motion = history(outer, 4.0, samples_per_turn=1024)
-    return motion, motion_record({"pick": motion})["pick"]
+    return motion, drawn_motion(motion)
 
 
 def test_orbit_is_that_of_the_cage_in_its_guide(recorded):
     motion, record = recorded
     x, y = motion.guide_eccentricity
-    orbit = {axis: np.array(record["cage_orbit_um"][axis]) for axis in "xy"}
-    assert ORBIT_POINTS / 2 < len(orbit["x"]) == len(orbit["y"]) == len(record["t_s"]) <= ORBIT_POINTS
+    orbit = dict(zip("xy", map(np.array, record.orbit_um), strict=True))
+    assert ORBIT_POINTS / 2 < len(orbit["x"]) == len(orbit["y"]) <= ORBIT_POINTS
     every = -(-len(x) // ORBIT_POINTS)
     assert np.abs(orbit["x"] - 1e6 * x[::every]).max() <= 0.005 + 1e-9
     assert np.abs(orbit["y"] - 1e6 * y[::every]).max() <= 0.005 + 1e-9
-    assert record["t_s"] == pytest.approx(motion.time[::every], abs=1e-8)
     # Diametral clearance 0.15 mm.
-    assert record["guide_radius_um"] == 75.0
+    assert record.guide_radius_um == 75.0
 
 
 def test_frames_are_few_and_about_the_largest_pocket_force(recorded):
     motion, record = recorded
-    moving = record["moving"]
+    moving = record.moving
     assert 0.8 * FRAMES <= moving["frames"] <= FRAMES
     start, end = moving["time_us"][0], moving["time_us"][-1]
     assert end - start == pytest.approx(2.0 * moving["turn_s"] * 1e6, rel=0.02)

@@ -19,7 +19,7 @@ from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
 from doe.report.files import write
 from doe.report.sections.search import SUFFICIENT_MISS, in_few_runs, limiting_sentence
-from doe.report.summary import restored
+from doe.report.summary import Summary
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit
 from doe.workflow.problem import Problem
@@ -89,7 +89,7 @@ def test_the_picture_has_every_run_by_its_reason(studied):
     _, _, record, _ = studied
     progress, places = (
         [picture() for picture in block.pictures]
-        for block in in_few_runs(restored(record))
+        for block in in_few_runs(Summary.from_dict(record))
         if isinstance(block, Figures)
     )
     adaptive = record["adaptive"]

@@ -14,7 +14,7 @@ from synthetic_study import summary
 from doe.dimension_chain import solve
 from doe.report.sections.answer import first_screen
 from doe.report.sections.chain import part_sheet
-from doe.report.summary import restored
+from doe.report.summary import Summary
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty
@@ -237,7 +237,7 @@ def test_unit_a_tolerance_has_the_grades_of_the_parts_to_make():
     ]
     life = LifeOverDuty(None, None, None, {}, {})
     duty = DutyAnswer(points, {}, {"baseline": {}, "pick": {}}, {"baseline": life, "pick": life})
-    screen = text(first_screen(replace(restored(record), duty=duty)))
+    screen = text(first_screen(replace(Summary.from_dict(record), duty=duty)))
     card = next(line for line in screen.splitlines() if line.strip().startswith("radial clearance"))
     assert "± 0.0070 " in card and card.rstrip().endswith("IT3 and IT4") and " 8.750 " in card
     assert "They are the least over the duty: at take-off." in screen
@@ -271,5 +271,5 @@ def test_unit_an_estimate_is_marked_on_drawing_table_and_report():
     assert first.text.startswith("≈ 61.333 ") and not second.text.startswith("≈")
     rows = part_sheet({"guide": solved}).records
     assert [row["estimated"] for row in rows] == [True, False]
-    shown = text(first_screen(restored(summary() | {"chains": {"guide": solved.as_dict()}})))
+    shown = text(first_screen(Summary.from_dict(summary() | {"chains": {"guide": solved.as_dict()}})))
     assert f"≈ estimated: {first.name} 61.333 mm; state it before the part is drawn." in shown

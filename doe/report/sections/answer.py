@@ -10,19 +10,9 @@ from typing import Any
 
 from doe.report.sections.chain import DRAWN, NAMES, estimates_note, part_sheet, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points, in_operation, least_words
-from doe.report.sections.record import (
-    LIMITS,
-    SENSES,
-    SIGNS_NOTE,
-    change,
-    nearest,
-    of_hundred,
-    part,
-    share_with_interval,
-    sign_of,
-    signed,
-)
+from doe.report.sections.record import LIMITS, SENSES, SIGNS_NOTE, change, nearest, share_with_interval, sign_of, signed
 from doe.report.summary import Summary
+from doe.unknown.propagation import Share
 from doe.workflow.asked import Factor, Response
 from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
 from doe.workflow.parts import Made
@@ -112,12 +102,12 @@ def _role_of_gains(gains: Mapping[str, Gain], text: str) -> Role:
 
 def _reasons(summary: Summary) -> list[Block]:
     """Why this point and no other one, what limits it, and where it lies."""
-    search = part(summary, "adaptive", "sentences") or [""]
+    search = summary.adaptive
     return [
         Paragraph(f"Why this point: {summary.confirmation['pick'].reason}."),
-        Paragraph(search[0]),
+        Paragraph(search.sentences[0] if search else ""),
         *map(Paragraph, summary.rivals_sentences),
-        Paragraph(part(summary, "adaptive", "held") or ""),
+        Paragraph(search.held if search else ""),
         Paragraph(_edge(summary.edge)),
     ]
 
@@ -209,9 +199,9 @@ def _robust_points(summary: Summary) -> Table:
     return Table("Over the unknown inputs", header, rows, note)
 
 
-def _gain_and_share(gain: float | None, share: Sequence[float] | None) -> str:
+def _gain_and_share(gain: float | None, share: Share | None) -> str:
     gain_text = "" if gain is None else f"{100.0 * gain:.1f} %, "
-    return "" if share is None else f"{gain_text}{of_hundred(share)}"
+    return "" if share is None else f"{gain_text}{share.of_hundred}"
 
 
 def _chosen(summary: Summary, inputs: Sequence[Factor]) -> Table:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from doe.report.sections.record import Record, part
+from doe.clearance import DrawnMotion
 from doe.report.still import COLOURS, FONT, GUIDE, SMALL, Still, name_marks
 from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint
@@ -50,26 +50,21 @@ def _watts(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}" if abs(value) < 100.0 else f"{value:.1f}"
 
 
-def motion(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def motion(summary: Summary, motion: Mapping[str, DrawnMotion]) -> Section | None:
     """Orbits of the cage centre, and the moving bearing."""
-    blocks: list[Block] = []
-    orbits = {name: run for name, run in motion.items() if part(run, "cage_orbit_um", "x")}
-    if orbits:
-        path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
-        caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
-        pictures = [orbit(name, run, whole).svg for whole in (True, False) for name, run in orbits.items()]
-        blocks.append(Figures(pictures, caption))
-    if any(part(run, "moving") for run in motion.values()):
-        blocks.append(Widget("bearing"))
-    return Section("motion", "Motion of the bearing", blocks)
+    if not motion:
+        return None
+    path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
+    caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
+    pictures = [orbit(name, run, whole).svg for whole in (True, False) for name, run in motion.items()]
+    return Section("motion", "Motion of the bearing", [Figures(pictures, caption), Widget("bearing")])
 
 
-def orbit(name: str, motion: Record, whole: bool) -> Still:
+def orbit(name: str, motion: DrawnMotion, whole: bool) -> Still:
     """Cage centre along and across the load: in the whole guide clearance, or enlarged."""
-    x, y = (part(motion, "cage_orbit_um", axis) for axis in "xy")
     title = f"{name}{'' if whole else ', enlarged'}"
-    radius = motion.get("guide_radius_um") if whole else None
-    return Still(f"Cage orbit at the {title}", partial(_orbit, title, x, y, radius), height=326.0)
+    radius = motion.guide_radius_um if whole else None
+    return Still(f"Cage orbit at the {title}", partial(_orbit, title, *motion.orbit_um, radius), height=326.0)
 
 
 def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | None, axis: "Axes") -> None:
@@ -88,7 +83,7 @@ def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | N
     axis.set(xlabel=f"{title}: along the load [µm]", ylabel="across [µm]")
 
 
-def power_bars(terms: Sequence[str], points: Mapping[str, Record]) -> Still:
+def power_bars(terms: Sequence[str], points: Mapping[str, Mapping[str, float]]) -> Still:
     """A row of bars a term, one for each point."""
     words = f"Power loss by term, {' and '.join(points)}"
     return Still(
@@ -96,7 +91,7 @@ def power_bars(terms: Sequence[str], points: Mapping[str, Record]) -> Still:
     )  # fmt: skip
 
 
-def _power_bars(terms: Sequence[str], points: Mapping[str, Record], axis: "Axes") -> None:
+def _power_bars(terms: Sequence[str], points: Mapping[str, Mapping[str, float]], axis: "Axes") -> None:
     thick = 0.8 / len(points)
     looks = (("steel", "edge"), ("blue", "blue"))
     for place, ((name, watts), (fill, edge)) in enumerate(zip(points.items(), looks, strict=False)):

@@ -1,6 +1,6 @@
-"""Reading the record of a study, any part of which may be missing or null, and writing its numbers for people.
+"""Writing results of a study for people: gains, tolerances, shares and probabilities.
 
-Names and plain numbers are written by ``rbdyn.base.words``; here are gains, tolerances, shares and probabilities.
+Names and plain numbers are written by ``rbdyn.base.words``.
 """
 
 import math
@@ -11,12 +11,12 @@ from typing import Any
 
 from doe.pareto.manufacture import Interval, percent
 from doe.workflow.asked import Asked
+from doe.workflow.confirmation import Gain
+from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.notes import Note
 from rbdyn.base.words import improvement, label, quantity, shown
 
-# A record of a study, or a part of it.
-Record = Any
 # Limits by their sense in a record.
 SENSES = {"<=": "≤", ">=": "≥"}
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
@@ -28,15 +28,7 @@ LONG = 40
 EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
 
-def part(record: Record, *keys: str) -> Any:
-    """The value under nested keys; None where any is missing or null."""
-    value: Any = record
-    for key in keys:
-        value = value.get(key) if isinstance(value, Mapping) else getattr(value, key, None)
-    return value
-
-
-def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
+def scalars(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     """Names and values of everything in nested tables; lists as one value."""
     for key, value in record.items():
         name = prefix + label(key)
@@ -48,7 +40,7 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
                 yield EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name), text
 
 
-def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
+def record_table(caption: str, record: Mapping[str, Any] | None, folded: bool = False) -> Table:
     """Everything in nested tables, a row for each value."""
     rows = list(scalars(record or {}))
     prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
@@ -66,15 +58,6 @@ def nearest(asked: Asked, place: Mapping[str, float], candidates: Mapping[str, M
         return math.hypot(*steps)
 
     return min(candidates, key=distance)
-
-
-def drop_undefined(value: Any) -> Any:
-    """The same record without null and NaN; in lists, where places count, they become None."""
-    if isinstance(value, Mapping):
-        return {key: clean for key, item in value.items() if (clean := drop_undefined(item)) is not None}
-    if isinstance(value, list | tuple):
-        return [drop_undefined(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]:
@@ -138,28 +121,22 @@ def probability(value: float | None) -> str:
     return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
 
 
-def of_hundred(share: Sequence[float]) -> str:
-    """'87 (80 to 92)' of a share with the ends of its interval: in how many of 100 cases."""
-    value, low, high = (100.0 * number for number in share)
-    return f"{value:.0f} ({low:.0f} to {high:.0f})"
-
-
 def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
     """'95.0 % (71.3 to 99.8 %)' of a share with the ends of its interval."""
     ends = "" if interval is None else f" ({Interval(*interval).words})"
     return f"{percent(share)} %{ends}"
 
 
-def sign_of(gain: Record) -> str:
+def sign_of(gain: Gain | PredictedGain) -> str:
     """The verdict of a gain with a sign that needs no colour."""
-    return VERDICTS[part(gain, "verdict")]
+    return VERDICTS[gain.verdict]
 
 
-def signed(gain: Record) -> str:
+def signed(gain: Gain | PredictedGain) -> str:
     """A gain with the sign of its verdict."""
     return f"{sign_of(gain)[:1]} {change(gain)}"
 
 
-def change(gain: Record) -> str:
+def change(gain: Gain | PredictedGain) -> str:
     """'11.16 ± 0.65 % less' of a gain."""
-    return improvement(part(gain, "percent"), part(gain, "error_percent"), part(gain, "goal") or "min")
+    return improvement(gain.percent, gain.error_percent, gain.goal)
