@@ -141,12 +141,12 @@ class CalibrationAnswer(Answer):
         return blocks(self.calibration)
 
     def rows(self) -> Mapping[str, Rows]:
-        from doe.report.sections.calibration import cell_sheet, input_sheet, output_sheet
+        from doe.report.sections.calibration import input_sheet, measured_sheet, output_sheet
 
         sheets: dict[str, Sheet[Any]] = {
             "inputs": input_sheet(self.calibration),
             "outputs": output_sheet(self.calibration),
-            "cells": cell_sheet(self.calibration),
+            "cells": measured_sheet(self.calibration),
         }
         return {name: sheet.records for name, sheet in sheets.items()}
 

@@ -9,6 +9,7 @@ from doe.cli import app
 from doe.commands.keys import kinds
 from doe.manual.drawings import drawings
 from doe.report.files import confirmation_sheet, reference_sheet
+from doe.report.sections.calibration import cell_sheet
 from doe.report.sections.chain import part_sheet
 from doe.report.sections.chain import share_sheet as chain_shares
 from doe.report.sections.design import run_sheet
@@ -49,5 +50,12 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     deciders = Sheet(
         "", DECIDERS, file="decides.csv", content="The inputs that decide between the pick and the original."
     )
-    unknown = [set_sheet(["{key}"], responses), range_sheet(()), share_sheet(()), input_sheet(()), deciders]
+    unknown = [
+        set_sheet(["{key}"], responses),
+        range_sheet(()),
+        share_sheet(()),
+        input_sheet(()),
+        deciders,
+        cell_sheet(()),
+    ]
     return {"Tables of a study": study, "Tables of unknown inputs": unknown}

@@ -33,7 +33,7 @@ Inference for Levy-driven stochastic volatility models via adaptive SMC (2011) f
 evolution Markov chain (2006).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -44,6 +44,7 @@ from doe.emulator import Emulator, fit_emulator, pooled_variances
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.faults import RunError
+from rbdyn.base.records import Record, outside_json
 
 # Signal that may be left out, as a share of the variance that a cell is compared with; components at most.
 LEFT_OUT, MOST = 0.05, 12
@@ -350,35 +351,38 @@ SMALL = 0.25
 PRIOR_SD = 12.0**-0.5  # of a quantile
 
 
-class Combination(NamedTuple):
-    """A product of powers of inputs by their places, and the standard deviation of its logarithm after and before learning."""
+class Combination(Record):
+    """A product of powers of inputs by their keys, and the standard deviation of its logarithm after and before learning [%]."""
 
-    powers: dict[int, float]
-    after: float
-    before: float
+    powers: dict[str, float]
+    sd_percent: float
+    sd_percent_before: float
 
 
-@dataclass(frozen=True)
-class Learnt:
-    """Contraction (d,) of each input, identified combinations, and places of inputs whose posterior is at an end of the range."""
+class Learnt(Record):
+    """Contraction of each input, identified combinations, and inputs whose posterior is at an end of the range, by their keys."""
 
-    contraction: Array
+    learned: dict[str, float]
     combinations: list[Combination]
-    narrow: list[int]
+    narrow: list[str] = outside_json(default_factory=list)
 
     @property
     def anything(self) -> bool:
         """Whether an input or a combination was learned."""
-        return bool((self.contraction >= LEARNED).any() or self.combinations)
+        return any(share >= LEARNED for share in self.learned.values()) or bool(self.combinations)
 
 
-def learnt(quantiles: Array, logarithms: Array, before: Array) -> Learnt:
+def learnt(keys: Sequence[str], quantiles: Array, logarithms: Array, before: Array) -> Learnt:
     """Learned inputs, from quantiles (n, d) of inputs after, and their logarithms (n, d) after and before.
 
     The logarithm of an input that has none is NaN.
     """
     crowded = np.maximum((quantiles < END).mean(axis=0), (quantiles > 1.0 - END).mean(axis=0))
-    return Learnt(contraction(quantiles), _combinations(logarithms, before), np.flatnonzero(crowded > CROWD).tolist())
+    return Learnt(
+        dict(zip(keys, contraction(quantiles).tolist(), strict=True)),
+        _combinations(keys, logarithms, before),
+        [keys[place] for place in np.flatnonzero(crowded > CROWD).tolist()],
+    )
 
 
 def contraction(quantiles: Array) -> Array:
@@ -410,7 +414,7 @@ def contraction_words(share: float) -> str:
     return "learned" if share >= LEARNED else "partly" if share >= PARTLY else "not seen"
 
 
-def _combinations(after: Array, before: Array) -> list[Combination]:
+def _combinations(keys: Sequence[str], after: Array, before: Array) -> list[Combination]:
     """Identified combinations of two or more inputs, the best first: eigenvectors of one covariance relative to the other."""
     numbers = np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0)
     places = np.flatnonzero(numbers & (before.std(axis=0) > 0.0))
@@ -428,6 +432,8 @@ def _combinations(after: Array, before: Array) -> list[Combination]:
         powers = powers / powers[np.argmax(np.abs(powers))]
         sds = [float((logs[:, places] @ powers).std()) for logs in (after, before)]
         if sds[0] ** 2 < KNOWN * sds[1] ** 2:
-            listed = {int(place): float(power) for place, power in zip(places, powers, strict=True) if power != 0.0}
-            combinations.append(Combination(listed, *sds))
+            by_key = {
+                keys[place]: float(power) for place, power in zip(places.tolist(), powers, strict=True) if power != 0.0
+            }
+            combinations.append(Combination(by_key, *(100.0 * sd for sd in sds)))
     return combinations

@@ -38,21 +38,6 @@ class Design(NamedTuple):
     doubt: str
 
 
-class Combination(Record):
-    """A product of powers of inputs by their keys, and the standard deviation of its logarithm after and before learning [%]."""
-
-    powers: dict[str, float]
-    sd_percent: float
-    sd_percent_before: float
-
-
-class Learned(Record):
-    """Contraction of each input by its key, and identified combinations."""
-
-    learned: dict[str, float]
-    combinations: list[Combination]
-
-
 class OutputAnswer(Record):
     """Whether the simulation explains an output: discrepancy of its level (median, 5 and 95 %), allowed scales, and evidence.
 
@@ -120,7 +105,7 @@ class Calibration(Record, kw_only=True):
     data: str
     verdict: str
     reasons: list[str]
-    learnt: Learned = spread()
+    learnt: Learnt = spread()
     discrepancy: dict[str, Quantiles]
     outputs: dict[str, OutputAnswer]
     held_out: Trial | None
@@ -212,7 +197,7 @@ def identified(evidence: Evidence) -> Calibration:
         gained = _learnt(evidence)
         contradictions += objections(judgement, anything=gained.anything, emulated=match.misfit < MISSED)
         after = match.cells.mean(evidence.quantiles)
-        notes = (*notes, *(_narrow(evidence.keys[place]) for place in gained.narrow))
+        notes = (*notes, *map(_narrow, gained.narrow))
         taus = np.quantile(match.errors(evidence.points).level, TAUS, axis=0).T.tolist()
         discrepancy = dict(zip(rig.outputs, taus, strict=False))
     cells = [_cell(evidence, place, judgement, after) for place in range(len(evidence.cells))]
@@ -224,7 +209,7 @@ def identified(evidence: Evidence) -> Calibration:
         data=str(rig.path),
         verdict=NOT_CALIBRATED if contradictions else UNDECIDABLE if doubts else CALIBRATED,
         reasons=[*contradictions, *doubts],
-        learnt=_learned(evidence.keys, gained),
+        learnt=Learnt({}, []) if gained is None else gained,
         discrepancy=discrepancy,
         outputs=_outputs(evidence, judgement),
         held_out=None if judgement is None else judgement.trial,
@@ -260,7 +245,7 @@ def _learnt(evidence: Evidence) -> Learnt:
     match, inputs = evidence.match, evidence.inputs
     quantiles = match.quantiles(evidence.points)
     prior = match.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(inputs))))
-    return learnt(quantiles, _logarithms(inputs, quantiles), _logarithms(inputs, prior))
+    return learnt(evidence.keys, quantiles, _logarithms(inputs, quantiles), _logarithms(inputs, prior))
 
 
 def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
@@ -272,18 +257,6 @@ def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
             if (values > 0.0).all():
                 logarithms[:, place] = np.log(values)
     return logarithms
-
-
-def _learned(keys: Sequence[str], gained: Learnt | None) -> Learned:
-    if gained is None:
-        return Learned({}, [])
-    combinations = [
-        Combination(
-            {keys[place]: power for place, power in ridge.powers.items()}, 100.0 * ridge.after, 100.0 * ridge.before
-        )
-        for ridge in gained.combinations
-    ]
-    return Learned(dict(zip(keys, gained.contraction.tolist(), strict=True)), combinations)
 
 
 def _outputs(evidence: Evidence, judgement: Judgement | None) -> dict[str, OutputAnswer]:
@@ -325,7 +298,7 @@ def _inputs(evidence: Evidence, gained: Learnt) -> dict[str, InputAnswer]:
     answers, ends = dict[str, InputAnswer](), densest_intervals(evidence.match.quantiles(evidence.points))
     for place, entry in enumerate(evidence.inputs):
         column = [row[entry.key] for row in evidence.sample]
-        seen = contraction_words(float(gained.contraction[place]))
+        seen = contraction_words(gained.learned[entry.key])
         if entry.law.law == "choices":
             shares = {str(value): count / len(column) for value, count in Counter(column).items()}
             answers[entry.key] = InputAnswer(shares=shares, seen=seen)

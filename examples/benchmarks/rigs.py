@@ -213,7 +213,7 @@ def surrogate(kind: str, number: int) -> Answer:
     assert found.sampled is not None
     quantiles = found.quantiles(found.sampled.points)
     nothing = np.full((2, INPUTS), np.nan)
-    taught = learnt(quantiles, np.full(quantiles.shape, np.nan), nothing)
+    taught = learnt("abcd", quantiles, np.full(quantiles.shape, np.nan), nothing)
     judgement = judge(found, OUTPUTS, number)
     reasons = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
     reasons += ["refuted"] if found.refuted else []

@@ -416,8 +416,8 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     found = _found(values, np.nan, 6, held=(1, 4, 6))
     assert found.sampled is not None and found.misfit < 2.0 and not found.refuted
     points = found.sampled.points
-    taught = learnt(found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
-    assert [contraction_words(each) for each in taught.contraction] == ["learned", "learned", "not seen"]
+    taught = learnt("abc", found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
+    assert [contraction_words(each) for each in taught.learned.values()] == ["learned", "learned", "not seen"]
     particles = Particles.of(found.sampled, found.joint, found.measured)
     against, judgement = _against(found)
     assert not against and taught.anything
@@ -439,7 +439,7 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     shares = [
         contraction(found.quantiles(reweighed(particles, known, 1))) for known in (learnt_cells, second, second[:0])
     ]
-    assert shares[0] == pytest.approx(taught.contraction, abs=0.1)
+    assert shares[0] == pytest.approx(list(taught.learned.values()), abs=0.1)
     assert shares[1][0] < shares[0][0] - 0.01
     assert shares[2] == pytest.approx(np.zeros(3), abs=0.25)
 
@@ -452,7 +452,7 @@ def test_missing_physics_is_not_taken_for_inputs() -> None:
     found = _found(values, 0.1, 7)
     assert found.sampled is not None
     points = found.sampled.points
-    taught = learnt(found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
+    taught = learnt("abc", found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
     assert not taught.narrow
     against, judgement = _against(found)
     assert [each.explained for each in judgement.outputs] == [False, True]
@@ -505,7 +505,7 @@ def test_only_a_product_is_seen() -> None:
     quantiles = found.quantiles(found.sampled.points)
     assert {contraction_words(each) for each in contraction(quantiles)} == {"not seen"}
     before = np.random.default_rng(1).random((2000, INPUTS))
-    (ridge,) = learnt(quantiles, 3.0 * quantiles, 3.0 * before).combinations
-    assert set(ridge.powers) == {0, 1}
-    assert ridge.powers[0] == pytest.approx(ridge.powers[1], rel=0.1)
-    assert ridge.after < 0.3 * ridge.before
+    (ridge,) = learnt("abc", quantiles, 3.0 * quantiles, 3.0 * before).combinations
+    assert set(ridge.powers) == {"a", "b"}
+    assert ridge.powers["a"] == pytest.approx(ridge.powers["b"], rel=0.1)
+    assert ridge.sd_percent < 0.3 * ridge.sd_percent_before

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from doe.unknown.calibration import Trial, allowance_words
+from doe.unknown.posterior import Combination
 from doe.workflow.identification import (
     CALIBRATED,
     SAMPLE_FILE,
     Calibration,
     Cell,
-    Combination,
     Cost,
     Evidence,
     InputAnswer,
@@ -136,12 +136,16 @@ def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
     return Sheet("", OUTPUTS, [OutputRow(name, answer) for name, answer in calibration.outputs.items()])
 
 
-def cell_sheet(calibration: Calibration) -> Sheet[Cell]:
+def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after")) -> Sheet[Cell]:
     """A row a measured value, with its predictions before and after the calibration."""
-    moments = ("before", "after") if calibration.posterior else ("before",)
     columns = [*CELLS, *(column for when in moments for column in prediction_columns(when))]
     content = "A row a measured value: measured, simulated and predicted."
-    return Sheet("", columns, calibration.cells, file=MEASURED, content=content)
+    return Sheet("", columns, cells, file=MEASURED, content=content)
+
+
+def measured_sheet(calibration: Calibration) -> Sheet[Cell]:
+    """The measured values of a calibration; without a posterior nothing is predicted after it."""
+    return cell_sheet(calibration.cells, ("before", "after") if calibration.posterior else ("before",))
 
 
 def blocks(calibration: Calibration) -> list[Block]:
@@ -263,7 +267,7 @@ def signed(calibration: Calibration) -> Calibration:
 
 def _write_parts(calibration: Calibration, folder: Path) -> list[str]:
     """measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
-    cell_sheet(calibration).save(folder)
+    measured_sheet(calibration).save(folder)
     draw_compared(calibration.cells, folder / COMPARED)
     if calibration.evidence is not None and calibration.posterior:
         write_sample(calibration.evidence.sample, folder / SAMPLE)
