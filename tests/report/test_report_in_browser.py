@@ -38,8 +38,8 @@ def test_opens_offline_with_the_answer_and_no_complaint(browser):
 
 def test_two_factors_of_awkward_names_draw_as_they_are(browser):
     driver, folder = browser
-    record = summary()
-    record["asked"]["factors"][0] |= {"name": "</script><b>x</b>"}
+    texts = json.dumps(summary()).replace(FACTORS[0], "</script><b>x</b>")
+    record = json.loads(texts, object_hook=lambda table: {key: table[key] for key in table if key != FACTORS[2]})
     del record["asked"]["factors"][2]
     for fitted in record["fit"]["responses"].values():
         terms = {"1": 1.0, "A": 2.0, "B": 0.5}
