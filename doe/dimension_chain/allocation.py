@@ -334,8 +334,7 @@ class Allocation:
 def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode: Mode) -> list[float]:
     """Tolerances, mm, of least cost whose worst case or root sum square is ``width``; slopes must not be zero.
 
-    The widest tolerances are the result where they fill less than the width. Raises MethodError, with the required width,
-    where the narrowest fill more.
+    Raises MethodError, with the required width, where the narrowest fill more.
     """
 
     from scipy.optimize import brentq
@@ -355,8 +354,6 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
         raise MethodError(f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm")
-    if excess(-SPAN / 4) < 0:
-        return tolerances(-SPAN / 4)
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))
 
 

@@ -250,8 +250,8 @@ def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]
     return lambda sizes: evaluate(text, sizes)
 
 
-def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
-    factor, change = press_fit_factor(fit, bore_nominal), fit.interference_change_mm
+def _press_fit(fit: PressFit, fit_mm: float) -> Callable[[Sizes], Any]:
+    factor, change = press_fit_factor(fit, fit_mm), fit.interference_change_mm
     return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)
 
 
