@@ -72,6 +72,30 @@ def test_invariant_no_circle_of_imports():
         pytest.fail(f"circle: {' -> '.join(error.args[1])}")
 
 
+@pytest.mark.parametrize("page", ["README.md", "rbdyn/cli/manual/prose/90_house.md"])
+def test_invariant_the_map_of_the_house_is_true(page):
+    """Invariant: the map names every room once, and each room imports from rooms further on in it alone."""
+    rooms: list[str] = []
+    for row in re.findall(r"^\| (`\w+/.*?) \|", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE):
+        package, _, row_rooms = row.strip("`").partition("/")
+        rooms += [f"{package}.{room.removesuffix('.py')}" for room in row_rooms.split("`, `")]
+    graph = grimp.build_graph("rbdyn", "doe", cache_dir=None)
+    inside = [module for module in graph.modules if module.count(".") and not module.endswith(("__main__", "doe.cli"))]
+    assert sorted(rooms) == sorted({room_of(module) for module in inside})
+    upwards = [
+        f"{module} -> {imported}"
+        for module in inside
+        for imported in map(str, graph.find_modules_directly_imported_by(module))
+        if room_of(imported) in rooms and rooms.index(room_of(imported)) < rooms.index(room_of(module))
+    ]
+    assert not upwards
+
+
+def room_of(module: str) -> str:
+    """The package, or module, right within ``rbdyn`` or ``doe`` that a module is in."""
+    return ".".join(module.split(".")[:2])
+
+
 def test_invariant_files_and_functions_stay_short():
     """Invariant: no file above 600 lines, no function above 70, six files at the root of rbdyn."""
     long = []
