@@ -2,6 +2,7 @@
 
 - ``design``: the record of a design and the classical designs; ``optimal``: D- and I-optimal designs by search
 - ``model``: terms of a polynomial, and how well a design estimates them before any run
+- ``remaining``: what remains of a region where runs failed
 """
 
 from doe.designs.design import (

@@ -20,9 +20,9 @@ from rbdyn.base.words import counted, quantity, with_error
 if TYPE_CHECKING:
     from doe.dimension_chain import ChainResult
     from doe.response_surface.statistics import Fit
-    from doe.workflow.asked import Asked
     from doe.workflow.design import DesignResult
     from doe.workflow.problem import Problem
+    from doe.workflow.settings import Asked
     from doe.workflow.surface_front import SurfaceFront
 
 
@@ -296,10 +296,10 @@ def front(
 
     from doe.report.identity import study_identity
     from doe.report.sections.front import front_sheet
-    from doe.workflow.asked import Asked
     from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
     from doe.workflow.problem import Problem
+    from doe.workflow.settings import Asked
     from doe.workflow.surface_front import StatedPoint, SurfaceFront
 
     path = path_given(path, "path")

@@ -1,4 +1,4 @@
-"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand next to it, its command, its keys, its drawing."""
+"""What ``doe`` adds to the manual that ``rbdyn manual`` writes: its chapters, which stand next to it, its command, its keys, its drawing (``drawings``)."""
 
 from pathlib import Path
 from typing import Any

@@ -22,12 +22,12 @@ from doe.report.sections.search import in_few_runs, limiting_sentence, search_se
 from doe.report.summary import Summary
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
-from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, StudyDesign
 from doe.workflow.search_record import SearchResult, predicted_rows
+from doe.workflow.settings import Settings
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal

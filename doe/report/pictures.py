@@ -17,10 +17,10 @@ from doe.report.sections.front_pictures import drawn_pairs, near
 from doe.report.sections.search import search_stills
 from doe.report.summary import Summary
 from doe.response_surface import Surface
-from doe.workflow.asked import Asked
 from doe.workflow.judgement import RobustFront
 from doe.workflow.problem import Problem
 from doe.workflow.search_record import SearchResult
+from doe.workflow.settings import Asked
 from doe.workflow.whole import StudyResult
 from rbdyn.base.words import label, quantity
 

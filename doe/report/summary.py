@@ -5,7 +5,6 @@ from typing import Any
 from doe.dimension_chain import ChainResult
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
-from doe.workflow.asked import Settings
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.judgement import Robust
@@ -14,6 +13,7 @@ from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
 from doe.workflow.runs import StudyDesign
 from doe.workflow.search_record import SearchResult
+from doe.workflow.settings import Settings
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain

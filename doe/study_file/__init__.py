@@ -1,6 +1,6 @@
 """STUDY.toml and tables of runs, checked before anything runs.
 
-- ``study``: the whole file, and the study of a table alone; ``sections``: its tables
+- ``study``: the whole file, and the study of a table alone; ``sections``: its tables; ``duty``: its points of operation
 - ``table``: runs made elsewhere, in tables
 """
 

@@ -1,13 +1,14 @@
 """The steps of a study, and the whole study that joins them.
 
-- ``problem``: a study resolved once, with its goals, region, tolerances, scenes and surfaces, which every step is handed
-- ``design``: the points of the runs; ``region``: where bearings run; ``effort``: how runs are made; ``runs``: their results
-- ``surfaces``: fits, predictions, random draws, a published table
-- ``confirmation``: simulated points, intervals, limits; ``front``: tolerances, the front on surfaces, back-off from limits
-- ``adaptive``: the front by emulators; ``pick``: the point of the front, the edge of the region
-- ``parts``: parts of a clearance and their grades; ``tolerances``: the widest tolerances of the pick
-- ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges
-  of outputs; ``robust``: judgement of the pick; ``duty``: the answer at every point of a duty
-- ``rig``: measurements; ``calibration``: inputs from measurements
-- ``status``: stages and status of a command; ``whole``: the study
+- ``problem``: a study resolved once, with its goals, region and scenes, for every step; ``settings``: what it asks, as its record says
+- ``region``: where its bearings run; ``design``: its points; ``runs``: its runs; ``first_look``: the limits before them
+- ``surfaces``: fits, predictions, random draws, a published table; ``front``: tolerances, the front on surfaces, back-off from
+  limits, with ``surface_front`` as its record; ``adaptive``: the front by emulators, with ``search_record``
+- ``pick``: the point of the front, the edge of the region; ``rivals``: better simulated points; ``tolerances``: its widest ones
+- ``parts``: parts of a clearance and their grades; ``confirmation``: simulated points, intervals, limits
+- ``dangers``, ``obstacles``: what is bad about a choice, and what keeps a study from its demands
+- ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: whether the pick is better over
+  them, with ``judgement`` as its record; ``duty``: the answer at every point of a duty
+- ``rig``, ``rig_columns``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
+- ``status``: stages and status of a command; ``effort``: threads or a cluster; ``whole``: the study
 """

@@ -1,4 +1,4 @@
-"""How runs are made: in threads or on a cluster, with whom they tell of it, and the folder that keeps them."""
+"""How runs are made: in threads or on a cluster, who watches them, and the folder that keeps them."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping

@@ -4,6 +4,7 @@
 - ``records``: results as JSON, tables and CSV; ``files``: whole JSON files; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
 - ``tables``: tables of a user, text and workbooks
 - ``estimate``: values with their errors, sums, differences and intervals of them
-- ``words``: how values, errors and counts are written; ``blocks``: what is said; ``terminal``, ``html``: its renderings
+- ``words``: how values, errors and counts are written; ``blocks``, ``table``: what is said; ``terminal``, ``html``: its renderings
+- ``page``, ``vector``: a report as one page with its pictures; ``workbook``: its tables; ``identity``, ``notes``: its first lines
 - ``loading``, ``streams``, ``command``: what commands share; ``folder``, ``lock``: where they write; ``pace``: how long runs take
 """

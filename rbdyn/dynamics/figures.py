@@ -36,7 +36,7 @@ class Figure:
       the gap of the power balance does
     - ``judged``: by "notes" on large errors and in ranges of doe uncertainty, by a "target" too, or not
     - ``words``: its row in the table of a run, where the key does not say it; ``window`` is that of impacts. ``repeats``: figure that
-      it is left out beside where both are equal
+      it is left out next to where both are equal
     - ``panel``: place on a map from 1, and its heading in tables of points, "[%]" where these show it in percent
     - ``worst``: which value is the worst one over a duty
     - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse

@@ -3,6 +3,7 @@
 - ``roller``: pictures of a history and of a slip map, power by loss, the moving bearing as GIF or MP4
 - ``ball``: one equilibrium of a ball bearing, and many over one or two keys of the scene
 - ``drawing``: the bearing at one moment with magnified clearances, and the page of HTML that plays it
+- ``sketches``: what names of sizes and signs mean, as SVG of a scene's own geometry
 - ``style``: how every picture looks, and axes of error against run time
 """
 

@@ -91,6 +91,17 @@ def test_invariant_the_map_of_the_house_is_true(page):
     assert not upwards
 
 
+@pytest.mark.parametrize("page", [path for path in SOURCES if path.name == "__init__.py" and path.parents[1] != ROOT])
+def test_invariant_a_package_tells_of_its_modules(page):
+    """Invariant: the docstring of a package names each of its modules, and begins no entry with a module that is not there."""
+    text = ast.get_docstring(parsed(page)) or ""
+    modules = {path.stem for path in page.parent.glob("*.py")} - {"__init__"}
+    modules |= {path.name for path in page.parent.iterdir() if path.is_dir() and path.name != "__pycache__"}
+    entries = re.findall(r"(?:^- |; )((?:``\w+``(?:, )?)+):", text, re.MULTILINE)
+    assert modules <= set(re.findall(r"``(\w+)``", text))
+    assert {name for entry in entries for name in re.findall(r"\w+", entry)} <= modules
+
+
 def room_of(module: str) -> str:
     """The package, or module, right within ``rbdyn`` or ``doe`` that a module is in."""
     return ".".join(module.split(".")[:2])

@@ -13,10 +13,10 @@ from doe.report.sections.duty import at_points, in_operation, least_words
 from doe.report.sections.record import LIMITS, SENSES, SIGNS_NOTE, change, nearest, share_with_interval, sign_of, signed
 from doe.report.summary import Summary
 from doe.unknown.propagation import Share
-from doe.workflow.asked import Factor, Response
 from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
+from doe.workflow.settings import Factor, Response
 from doe.workflow.tolerances import FactorTolerance
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table
 from rbdyn.base.identity import identity_line

@@ -8,8 +8,8 @@ from doe.report.sections.front_pictures import Front, drawn_pairs, hypervolume, 
 from doe.report.sections.record import SENSES, change, nearest, share_with_interval
 from doe.report.sections.search import in_few_runs
 from doe.report.summary import Summary
-from doe.workflow.asked import Asked
 from doe.workflow.confirmation import ConfirmedPoint
+from doe.workflow.settings import Asked
 from doe.workflow.surface_front import (
     WITHOUT,
     EstimatedPoint,

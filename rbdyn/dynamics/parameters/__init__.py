@@ -2,5 +2,6 @@
 
 - ``model``: the parameters of every law
 - ``state``: layout of the state, scales of its errors, and the start of a run
+- ``heat``: conductances of its parts, and where its losses go
 - ``validity``: effects left out, the maker's friction, pressure and film of each race
 """
