@@ -28,7 +28,7 @@ _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
 
 
 # Options of a column at its field.
-COLUMN_OPTIONS = {"unit", "meaning", "error", "cell", "missing", "scale", "text", "screen", "files"}
+COLUMN_OPTIONS = {"unit", "meaning", "error", "cell", "missing", "text", "screen", "files"}
 
 
 def keyed(*path: str, **options: Any) -> Any:

@@ -36,7 +36,6 @@ class Column(Generic[R]):
     at : place of the value; the key unless given
     cell : text of a row on the screen in place of value and form
     missing : text of None on the screen
-    scale : factor of value and error on the screen
     text : whether the screen aligns it as text; the first column is text anyway
     screen, files : whether the screen, and files and JSON, have it
     """
@@ -50,7 +49,6 @@ class Column(Generic[R]):
     at: Place[R] | None = None
     cell: Callable[[R], str] | None = None
     missing: str = ""
-    scale: float = 1.0
     text: bool = False
     screen: bool = True
     files: bool = True
@@ -84,13 +82,9 @@ class Column(Generic[R]):
         value = self.value(row)
         if value is None:
             return self.missing
-        if self.scale != 1.0:
-            value = self.scale * value
         if self.error is None:
             return formatted(value, self.form)
-        error = value_at(row, self.error)
-        form = self.form if callable(self.form) else with_error
-        return form(value, None if error is None else self.scale * error)
+        return (self.form if callable(self.form) else with_error)(value, value_at(row, self.error))
 
 
 def value_at(row: Any, place: Place[Any]) -> Any:
@@ -98,14 +92,10 @@ def value_at(row: Any, place: Place[Any]) -> Any:
     if callable(place):
         return None if row is None else place(row)
     for name in place if isinstance(place, tuple) else (place,):
-        if row is not None:
-            row = (
-                row[name]
-                if isinstance(name, int)
-                else row.get(name)
-                if isinstance(row, Mapping)
-                else getattr(row, name)
-            )
+        if isinstance(row, Mapping):
+            row = row.get(name)
+        elif row is not None:
+            row = row[name] if isinstance(name, int) else getattr(row, name)
     return row
 
 

@@ -43,11 +43,9 @@ def test_files_have_every_value_in_the_order_of_the_columns(tmp_path: Path) -> N
 
 
 def test_error_without_a_column_follows_its_value() -> None:
-    sheet = Sheet(
-        "", (Column("x", value_alone, error="x_error", scale=10.0), Column("y")), [{"x": 1.234, "x_error": 0.1}]
-    )
+    sheet = Sheet("", (Column("x", value_alone, error="x_error"), Column("y")), [{"x": 1.234, "x_error": 0.1}])
     assert sheet.records == [{"x": 1.234, "x_error": 0.1, "y": None}]
-    assert sheet.block.rows == [["12.3", ""]]
+    assert sheet.block.rows == [["1.23", ""]]
 
 
 def test_manual_joins_columns_that_share_a_meaning() -> None:
