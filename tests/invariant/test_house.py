@@ -44,7 +44,8 @@ EDGES = {
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
     "doe/workflow": "asks for chains",
-    "doe/study_file/sections.py": "checks chains",
+    "doe/study_file/": "checks chains",
+    "doe/report/": "speaks to people",
 }
 
 
