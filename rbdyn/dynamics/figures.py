@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
@@ -111,10 +112,6 @@ def _work(place: int, run: Replicate) -> Array:
     return run.work[:, place]
 
 
-def _share_of_play(scene: "Scene") -> float | None:
-    return None if scene.cage_play_m is None else 1.0 / scene.cage_play_m
-
-
 BEARING = (
     Figure(
         "impact_force_N",
@@ -177,7 +174,7 @@ BEARING = (
         "cage_orbit_radius_share",
         "root mean square distance of the cage's centre from its mean place over the cage's radial play",
         ORBIT_RADIUS,
-        _share_of_play,
+        lambda scene: scene.cage_play_m and 1.0 / scene.cage_play_m,
         slow=False,
         words="radius of the cage's orbit over its radial play",
         response=False,
@@ -189,17 +186,12 @@ HEAT = tuple(
     Figure(key, f"temperature of the {_PLACES[node]}", kind="temperature", source=(node,), accuracy=1.5)
     for key, node in TEMPERATURES.items()
 )
-_CONTACTS: dict[str, tuple[str, Literal["largest", "least"]]] = {
-    "max_pressure_MPa": ("largest pressure", "largest"),
-    "central_film_um": ("film in the middle", "least"),
-    "minimum_film_um": ("thinnest film", "least"),
-    "lambda_ratio": ("film over roughness", "least"),
-}
+_CONTACTS = ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
 PARTS = (
     *(
         Figure(
             f"{loss}_power_W",
-            f"mean power lost by {loss.replace('_', ' ')}",
+            f"power of {loss.replace('_', ' ')}",
             timed(partial(_work, place)),
             kind="power",
             source=(loss,),
@@ -209,7 +201,7 @@ PARTS = (
     *(
         Figure(
             f"{name}_operating_clearance_um",
-            f"{name} clearance in operation",
+            f"operating {name} clearance",
             kind="clearance",
             source=(name,),
             worst="least",
@@ -221,13 +213,13 @@ PARTS = (
     *(
         Figure(
             f"{race}_{key}",
-            f"{words}, {race} race at its largest load",
+            f"{quantity(key)[0]} of the {race} race at its largest load",
             kind="contact",
             source=(race, key),
-            worst=worst,
+            worst="largest" if "pressure" in key else "least",
         )
         for race in ("inner", "outer")
-        for key, (words, worst) in _CONTACTS.items()
+        for key in _CONTACTS
     ),
 )
 FIGURES = (*BEARING, *HEAT, *PARTS)
