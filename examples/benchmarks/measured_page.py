@@ -110,7 +110,8 @@ def _run(line: str, progress: Reporter) -> str:
     ended = subprocess.run([sys.executable, *called], capture_output=True, text=True, check=False)
     if ended.returncode:
         raise RunError(f"{line}: ended with {ended.returncode}, {(ended.stderr.splitlines() or [''])[-1]}")
-    return f"```text\n{ended.stdout.rstrip()}\n```"
+    printed = [row for row in ended.stdout.rstrip().splitlines() if not row.startswith("written to ")]
+    return "\n".join(["```text", *printed, "```"])
 
 
 def _markdown(report: Report) -> str:
