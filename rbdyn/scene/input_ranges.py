@@ -8,12 +8,13 @@ uncertainty``, which also varies all other inputs, by simulation.
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record, keyed
 from rbdyn.thermal.heat import TERMS
 from rbdyn.thermal.losses import HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
@@ -38,12 +39,12 @@ SETS, SEED, QUANTILES = 256, 1, (0.05, 0.5, 0.95)
 DIFFERENCE = "inner_minus_outer_K"
 
 
-class Ranges(NamedTuple):
+class Ranges(Record):
     """5 %, 50 % and 95 % of each figure by its name, the inputs that vary, and the share of input sets without a steady state."""
 
-    figures: dict[str, tuple[float, float, float]]
+    figures: dict[str, tuple[float, ...]] = keyed("ranges")
     inputs: tuple[str, ...]
-    unsteady: float
+    unsteady: float = keyed("share_without_steady_state")
 
     @property
     def notes(self) -> Notes:
@@ -52,14 +53,6 @@ class Ranges(NamedTuple):
             return ()
         share = f"{100.0 * self.unsteady:.0f} % of the input sets ({', '.join(self.inputs)})"
         return (Note("undecided", f"temperatures: {share} have no steady state"),)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Keys of the JSON of a balance."""
-        return {
-            "ranges": {name: list(quantiles) for name, quantiles in self.figures.items()},
-            "inputs": list(self.inputs),
-            "share_without_steady_state": self.unsteady,
-        }
 
 
 # By key of a scene, the losses (terms,) at a value of it over those at its own.
