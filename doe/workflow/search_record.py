@@ -5,6 +5,7 @@ from typing import Self
 
 import numpy as np
 
+from doe.adaptive import Batch
 from doe.adaptive.emulators import LEAST_DEVIATION
 from doe.pareto.front import NOISE_DRAWS, noisy_hypervolume
 from doe.workflow.adaptive import Adaptive, FrontComparison
@@ -32,6 +33,19 @@ class BatchState(Record):
     left: float
     left_error: float
     why: str
+
+    @classmethod
+    def of(cls, batch: Batch) -> Self:
+        """The state at a batch."""
+        return cls(
+            runs=batch.runs,
+            hypervolume=batch.reached,
+            deviation=batch.deviation,
+            gained=finite(batch.gained),
+            left=batch.remaining,
+            left_error=batch.remaining_error,
+            why=batch.why,
+        )
 
 
 class Extension(Record):
@@ -136,6 +150,17 @@ class Compared(Record):
     surfaces: float
     fresh: FreshVolume
 
+    @classmethod
+    def of(cls, names: Sequence[str], volumes: FrontComparison) -> Self:
+        """Hypervolumes of fronts of responses of these ``names``."""
+        return cls(
+            ideal=dict(zip(names, volumes.ideal.tolist(), strict=True)),
+            nadir=dict(zip(names, volumes.nadir.tolist(), strict=True)),
+            search=volumes.search.tolist(),
+            surfaces=volumes.surfaces,
+            fresh=FreshVolume(volumes.fresh[0], 1.96 * volumes.fresh[1]),
+        )
+
 
 class OtherRow(Record):
     """The row that is the pick in most of the other draws."""
@@ -235,18 +260,7 @@ class SearchResult(Record, kw_only=True):
             hypervolume=search.history[-1].reached,
             hypervolume_fresh=fresh,
             hypervolume_fresh_error=1.96 * fresh_error,
-            history=[
-                BatchState(
-                    runs=state.runs,
-                    hypervolume=state.reached,
-                    deviation=state.deviation,
-                    gained=finite(state.gained),
-                    left=state.remaining,
-                    left_error=state.remaining_error,
-                    why=state.why,
-                )
-                for state in search.history
-            ],
+            history=[BatchState.of(batch) for batch in search.history],
             stopped=search.stopped,
             extended=[
                 Extension(
@@ -275,13 +289,7 @@ class SearchResult(Record, kw_only=True):
             seed=front.seed,
             seconds=adaptive.seconds,
             emulator_seconds=search.seconds,
-            compared=Compared(
-                ideal=dict(zip(names, volumes.ideal.tolist(), strict=True)),
-                nadir=dict(zip(names, volumes.nadir.tolist(), strict=True)),
-                search=volumes.search.tolist(),
-                surfaces=volumes.surfaces,
-                fresh=FreshVolume(volumes.fresh[0], 1.96 * volumes.fresh[1]),
-            ),
+            compared=Compared.of(names, volumes),
             held=held,
             sentences=list(sentences),
             chosen=None if pick is None else Chosen.of(pick),
