@@ -113,7 +113,10 @@ def test_map_marks_a_point_that_adds_heat_at_its_temperatures(scene):
     from pathlib import Path
 
     from rbdyn.cli.duty import map_duty
+    from rbdyn.dynamics.duty import static_life
+    from rbdyn.dynamics.simulate import steady_scene
     from rbdyn.scene import Scene
+    from rbdyn.scene.duty import duty_scenes, read_duty
 
     hot = scene.read_text(encoding="utf-8")
     plain = hot.replace(
@@ -126,8 +129,11 @@ def test_map_marks_a_point_that_adds_heat_at_its_temperatures(scene):
         for name, keys in (("off", "[]"), ("on", '["thermal.ambient_C=20.0"]'))
     ]
     duty.write_text("\n".join(points), encoding="utf-8")
-    off, on = map_duty(Scene.load(scene), duty, (24000.0,), (1300.0,)).scenes
+    loaded = Scene.load(scene)
+    off, on = map(steady_scene, duty_scenes(loaded, read_duty(duty), str(duty)))
     assert off.mounting.inner_ring_temperature_C is None and on.mounting.inner_ring_temperature_C > 60.0
+    lives = [static_life(point).hours(*point.operation.speeds) for point in (off, on)]
+    assert [point.L10_h for point in map_duty(loaded, duty, (24000.0,), (1300.0,)).points] == pytest.approx(lives)
 
 
 def test_map_has_points_at_their_own_temperatures(command, scene):
