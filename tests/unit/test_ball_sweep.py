@@ -316,7 +316,7 @@ def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     [
         (EXAMPLE, ("operation.tilt=free",), {LOAD: [-300.0, 100.0, 20e3, 40e3], SPEED: [0.0, 60e3]}),
         (EXAMPLE, ("model.raceway_control=hybrid",), {SPEED: [10e3, 60e3, 120e3], LOAD: [-50.0, 20.0]}),
-        (EXAMPLE, ("model.solver=newton", "operation.inner_speed_rpm=0.0"), {LOAD: [-100.0, 20e3, 1e7]}),
+        (EXAMPLE, ("model.solver=finite_search", "operation.inner_speed_rpm=0.0"), {LOAD: [-100.0, 20e3, 1e7]}),
         (DOUBLE, ("operation.tilt=free",), {LOAD: [-200.0, 50.0, 20e3]}),
     ],
 )
