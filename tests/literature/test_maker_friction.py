@@ -5,9 +5,11 @@ import math
 
 import pytest
 from conftest import ROOT
+from synthetic_study import summary
 from typer.testing import CliRunner
 
 from doe.report.sections.bearing import power
+from doe.report.summary import Summary
 from rbdyn import Scene
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
@@ -180,7 +182,13 @@ def test_unit_a_study_states_the_makers_friction():
     check = dict.fromkeys(KEYS, 1.0) | {"skf_power_W": 80.0}
     points = {"baseline": {**terms, "friction_check": check | {"ratio": 1.5}},
               "pick": {**terms, "friction_check": check | {"ratio": 1.4}}}  # fmt: skip
-    named, plain = power({"confirmation": points}, {}), power({"confirmation": {"baseline": terms, "pick": terms}}, {})
-    assert named is not None and plain is not None
-    assert "over the 80 W of SKF's friction model: baseline 1.50, pick 1.40." in str(named.blocks)
-    assert "SKF" not in str(plain.blocks)
+
+    def stated(changes: dict[str, dict]) -> str:
+        record = summary()
+        for name, change in changes.items():
+            record["confirmation"][name] |= change
+        return str(power(Summary.from_dict(record), {}).blocks)
+
+    named, plain = stated(points), stated({"baseline": terms, "pick": terms})
+    assert "over the 80 W of SKF's friction model: baseline 1.50, pick 1.40." in named
+    assert "SKF" not in plain

@@ -19,7 +19,10 @@ def scene_with(*assignments, file="angular_contact_ball.toml"):
     ("scene", "keys"),
     [
         (scene_with(), {SPEED: np.linspace(5e3, 30e3, 40).tolist()}),
-        (scene_with("model.solver=finite_search"), {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]}),
+        (
+            scene_with("model.solver=finite_search"),
+            {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]},
+        ),
         (scene_with(file="double_decker.toml"), {LOAD: np.linspace(200.0, 900.0, 6).tolist()}),
     ],
     ids=["a single row", "another solver", "double-decker"],
