@@ -25,7 +25,7 @@ from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.properties.oils import BASE_OILS, grade_oil
 from rbdyn.scene.thermal import Thermal
 from rbdyn.thermal.conductances import CageSize, race_contact, seats, sump, surface_coefficient, surfaces
-from rbdyn.thermal.heat import Effusivities, power_vector, shares
+from rbdyn.thermal.heat import TERMS, Effusivities, shares
 from rbdyn.thermal.network import INNER, OUTER, Boundaries, Conductances, temperatures
 
 SIZES = ("204", "206", "208", "210", "215", "220", "308", "314", "320", "1020", "2210", "2312")
@@ -114,10 +114,9 @@ def point(name: str, speed: float, thermal: Thermal = DEFAULTS) -> Point:
     )
     moments = skf_moments(named.series, bore, outside, speed, oil.viscosity / oil.density, load, supply="bath")
     rolling, sliding = moments.rolling * speed, moments.sliding * speed
-    powers = power_vector(
-        {"outer_race_traction": 0.5 * sliding, "inner_race_traction": 0.5 * sliding},
-        {"outer": 0.5 * rolling, "inner": 0.5 * rolling},
-    )
+    halves = {f"{race}_race_traction": 0.5 * sliding for race in ("outer", "inner")}
+    halves |= {f"{race}_rolling_resistance": 0.5 * rolling for race in ("outer", "inner")}
+    powers = np.array([halves.get(term, 0.0) for term in TERMS])
     heat = (
         shares(Effusivities(steel.effusivity, steel.effusivity, brass.effusivity), "outer", thermal.film_share_to_oil).T
         @ powers

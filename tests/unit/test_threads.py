@@ -11,7 +11,7 @@ from doe.emulator import fit_emulator
 from doe.response_surface.statistics import fits_of
 from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
-from doe.unknown.propagation import Runs, emulated, sobol, spread_of
+from doe.unknown.propagation import Runs, emulated, range_of, sobol
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces, with_rivals
@@ -62,7 +62,7 @@ def test_invariant_spread_and_samples_have_the_same_bits_on_any_number_of_thread
 
     def figures():
         fitted = emulated(runs)
-        return repr((spread_of(runs, fitted, points, 5), sobol(fitted, 4, 6), sampled(density, 4, 7, 400)))
+        return repr((range_of(fitted, points, 5), sobol(fitted, 4, 6), sampled(density, 4, 7, 400)))
 
     one, *others = with_threads(figures)
     assert all(other == one for other in others)
