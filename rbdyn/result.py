@@ -139,7 +139,7 @@ TEMPERATURES = {
 
 
 class FigureOf:
-    """A figure of a result as an attribute of its key."""
+    """A figure that every result has, as an attribute of its key."""
 
     def __set_name__(self, owner: type, key: str) -> None:
         self.key = key
@@ -201,6 +201,15 @@ class SimulationResult(Brief, SavedRecord):
     impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
     power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815
     whirl_deviation_ratio = FigureOf()
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else, also without a figure of every bearing."""
+        result = super().from_dict(data)
+        for name, figure in vars(SimulationResult).items():
+            if isinstance(figure, FigureOf) and name not in result.figures:
+                raise KeyError(name)
+        return result
 
     @property
     def cage_orbit_radius_share(self) -> Quantity | None:
