@@ -271,7 +271,8 @@ def exact_shares(
     """
     bounds = (limits.lower_mm - SLACK, limits.upper_mm + SLACK)
     kinds = {part.name: law or part.distribution for part in parts}
-    terms = [part for part in parts if part.tolerance_mm * function.coefficients[part.name] != 0]
+    # A tolerance whose square underflows has no deviation.
+    terms = [part for part in parts if (part.tolerance_mm * function.coefficients[part.name]) ** 2 != 0]
     sizes = {part.name: part.nominal_mm + (0.0 if part in terms else part.lower_mm) for part in parts}
     nominal = sum(function.coefficients[name] * size for name, size in sizes.items())
     if not terms:

@@ -23,7 +23,6 @@ from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.front import SimulatedFront
 from doe.pareto.search import spread
-from doe.report.sections.answer import point_record
 from doe.running.runner import Progress
 from doe.running.store import STORE, Failure, Store, grouped
 from doe.workflow.adaptive import Evaluator
@@ -36,6 +35,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError
 from rbdyn.base.files import read_json, write_json
+from rbdyn.base.records import finite
 from rbdyn.base.words import counted, with_error
 from rbdyn.scene import Scene
 
@@ -160,6 +160,15 @@ def find_direct(study: Problem, settings: Settings, on_surfaces: ParetoFront, si
         raise InputError([f"direct front: {error}"]) from None
     seconds = {"search": searched - started, "comparison": time.perf_counter() - searched}
     return Direct(front, *surrogate, loss, tuple(evaluate.failures), seconds)
+
+
+def point_record(study: Problem, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+    """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
+    return {
+        "factors": study.by_factor(point),
+        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
+        "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
+    }
 
 
 def record_of(study: Problem, settings: Settings, direct: Direct) -> dict[str, Any]:

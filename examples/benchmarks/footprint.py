@@ -96,9 +96,10 @@ def print_added_modules() -> None:
 def _build(scene: "Scene") -> None:
     """Load what the simulation of a scene does, from its bearing to the report of its races."""
     from rbdyn.dynamics import simulate
+    from rbdyn.dynamics.parameters.validity import race_report
 
     simulate.roller_bearing(scene)
-    simulate.race_report(scene, 100.0, 100.0)
+    race_report(scene, 100.0, 100.0)
 
 
 def study(
