@@ -155,7 +155,7 @@ def find_direct(study: Problem, settings: Settings, on_surfaces: ParetoFront, si
         loss = compare_with_surrogate(front, surrogate.values, surrogate.errors, seed=settings.seed)
     except MethodError as error:
         if evaluate.failures:
-            causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
+            causes = "; ".join(group.cause for group in grouped(evaluate.failures))
             raise RunError(f"direct front: {error} ({causes})") from None
         raise InputError([f"direct front: {error}"]) from None
     seconds = {"search": searched - started, "comparison": time.perf_counter() - searched}

@@ -43,8 +43,6 @@ def distribution(law: Law) -> Any:
     low, high = law.low, law.high
     if law.law == "log_uniform":
         return stats.loguniform(low, high)
-    if law.law == "triangular":
-        return stats.triang((law.mode - low) / (high - low), low, high - low)
     if law.law == "normal":
         ends = (-np.inf if low is None else low, np.inf if high is None else high)
         return stats.truncnorm(*((end - law.mean) / law.sd for end in ends), law.mean, law.sd)
@@ -126,12 +124,12 @@ def answers(study: Problem, pick: Sequence[float], seed: int, out: Path, workers
 
 def chances(study: Problem, base: np.ndarray, pick: np.ndarray, tool: Mapping[int, Robust]) -> Iterator[str]:
     """A line a response: in which share of the sets the pick is better, and what the tool states."""
-    names = next(iter(tool.values())).responses
+    names = list(next(iter(tool.values())).chances.gains)
     goals = {each.name: each.goal for each in study.file.response}
     side = [1.0 if goals[name] == "max" else -1.0 for name in names]
     columns = [OUTPUTS.index(name) for name in names]
     wins = (pick - base)[:, columns] * side > 0.0
-    stated = {seed: [*each.chances.gains, each.chances.all] for seed, each in tool.items()}
+    stated = {seed: [*each.chances.gains.values(), each.chances.all] for seed, each in tool.items()}
     for place, name in enumerate([*names, "all"]):
         won = wins.all(axis=1) if place == len(names) else wins[:, place]
         parts = [f"{name:24}", _chance(float(won.mean()), *wilson(float(won.mean()), len(won)))]
@@ -145,9 +143,9 @@ def ranges(base: np.ndarray, tool: Mapping[int, Uncertainty]) -> Iterator[str]:
         low, high = np.quantile(values, [0.05, 0.95])
         parts = [f"{name:24}", f"{low:.4g} to {high:.4g}"]
         for each in tool.values():
-            spread = each.outputs[name].spread
-            within = float(((values >= spread.low) & (values <= spread.high)).mean())
-            parts.append(f"{spread.low:.4g} to {spread.high:.4g} holds {within:.3f}")
+            stated = each.responses[name].input
+            within = float(((values >= stated.low) & (values <= stated.high)).mean())
+            parts.append(f"{stated.low:.4g} to {stated.high:.4g} holds {within:.3f}")
         yield "  ".join(parts)
 
 

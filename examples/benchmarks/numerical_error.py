@@ -158,7 +158,7 @@ def true_plan(scene: Scene) -> Companions:
 def figures_of(runs: Sequence[Replicate], companions: Sequence[Replicate], share: float) -> dict[str, Quantity]:
     """Figures without what slow change may add, for runs and truths are of one length."""
     return {
-        figure.key: quantity(figure.statistic, runs, companions, share, 0.0, figure.scale, figure.balanced)
+        figure.key: quantity(figure.statistic, runs, companions, share, 0.0, figure.scale)
         for figure in BEARING
         if figure.key in JUDGED
     }
