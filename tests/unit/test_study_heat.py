@@ -251,8 +251,8 @@ def test_ranges_of_temperatures_over_unknown_inputs(tmp_path):
         simulations = Simulations(store, 1, None, False, lambda title: silent)
         found = find_uncertainty(scene, [], simulations, 16, 10.0)
     for name in TEMPERATURES:
-        low, high = found.outputs[name].spread.low, found.outputs[name].spread.high
-        assert low - 5.0 < found.outputs[name].nominal.value < high + 5.0 and high - low > 5.0
+        low, high = found.responses[name].input.low, found.responses[name].input.high
+        assert low - 5.0 < found.responses[name].nominal.value < high + 5.0 and high - low > 5.0
 
 
 @pytest.mark.slow
@@ -276,6 +276,6 @@ def test_a_measured_ring_identifies_the_surface_factor(tmp_path):
     question = read_question(tmp_path / "scene.toml", tmp_path / "rig.csv", (), ())
     with Store(tmp_path / "runs.sqlite", "rig") as store:
         found = find_calibration(question, Simulations(store, 1, None, False, lambda title: silent))
-    values = [row["thermal.surface_factor"] for row in found.sample]
+    values = [row["thermal.surface_factor"] for row in found.evidence.sample]
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
     assert low < 0.5 < high and middle == pytest.approx(0.5, rel=0.2) and high / low < 2.0
