@@ -106,6 +106,8 @@ def rig_rows(draw: random.Random) -> list[list[str]]:
     for _ in range(draw.randrange(3, 9)):
         measured = [f"{draw.lognormvariate(3.0, 2.0):.{draw.randrange(1, 17)}g}" for _ in outputs]
         sds = [draw.choice(["", repr(0.05 * float(value)), "1e-3"]) for value in measured]
+        # Only a thermometer has to state its deviation.
+        sds = [sd or "1e-3" if name.endswith("_C") else sd for name, sd in zip(outputs, sds, strict=True)]
         turns = draw.choice(["40", "1e3"]) if "" in sds else ""
         rows.append(
             [
