@@ -30,12 +30,12 @@ from doe.workflow.effort import Effort
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
 from doe.workflow.runs import run_design
+from doe.workflow.surface_front import EstimatedPoint
 from doe.workflow.surfaces import fit_surfaces, standard_errors
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError
 from rbdyn.base.files import read_json, write_json
-from rbdyn.base.records import finite
 from rbdyn.base.words import counted, with_error
 from rbdyn.scene import Scene
 
@@ -162,25 +162,16 @@ def find_direct(study: Problem, settings: Settings, on_surfaces: ParetoFront, si
     return Direct(front, *surrogate, loss, tuple(evaluate.failures), seconds)
 
 
-def point_record(study: Problem, point: Array, values: Array, errors: Array) -> dict[str, Any]:
-    """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
-    return {
-        "factors": study.by_factor(point),
-        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
-        "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
-    }
-
-
 def record_of(study: Problem, settings: Settings, direct: Direct) -> dict[str, Any]:
     """The direct front, that of the surfaces run on the simulator, and what these lose, as plain numbers."""
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, front.half_widths, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
-    points = [point_record(study, *row) for row in rows]
+    points = [EstimatedPoint.of(study, *row).as_dict() for row in rows]
     return {
         "front": points,
         "pick": {**points[front.pick], "reason": front.pick_reason},
-        "surrogate_front": [point_record(study, *row) for row in surrogate if np.isfinite(row[1]).all()],
+        "surrogate_front": [EstimatedPoint.of(study, *row).as_dict() for row in surrogate if np.isfinite(row[1]).all()],
         **asdict(loss),
         "sentence": loss.sentence,
         "run": run_in_words(study, settings),
