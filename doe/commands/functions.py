@@ -24,6 +24,8 @@ from rbdyn.base.command import Force, Json, Set, Workers, flag, folder_option, v
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")]
 STORE = "Folder of results and of the store of finished runs."
 Texts = list[str] | None
+# How runs are made, of every command that simulates.
+RUNS = {"workers": Workers, "scheduler": Scheduler, "retry": Retry}
 
 study = command(
     "study",
@@ -32,9 +34,7 @@ study = command(
     path=StudyPath,
     out=StudyOut,
     force=Force,
-    workers=Workers,
-    scheduler=Scheduler,
-    retry=Retry,
+    **RUNS,
     adaptive=Adaptive,
     robust=Robust,
     as_json=Json,
@@ -81,9 +81,7 @@ fit = command(
     ],
     out=Out,
     force=Force,
-    workers=Workers,
-    scheduler=Scheduler,
-    retry=Retry,
+    **RUNS,
     as_json=Json,
     quiet=Quiet,
     verbose=Annotated[bool, verbose_flag("Also residual, leverage and Cook's distance of each run.")],
@@ -95,9 +93,7 @@ front = command(
     data=Data,
     out=Out,
     force=Force,
-    workers=Workers,
-    scheduler=Scheduler,
-    retry=Retry,
+    **RUNS,
     point=Annotated[
         str | None,
         valued(
@@ -143,9 +139,7 @@ uncertainty = command(
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "SCENE_uncertainty")],
     force=Force,
-    workers=Workers,
-    scheduler=Scheduler,
-    retry=Retry,
+    **RUNS,
     as_json=Json,
     quiet=Quiet,
 )
@@ -162,9 +156,7 @@ calibrate = command(
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "SCENE_calibration")],
     force=Force,
-    workers=Workers,
-    scheduler=Scheduler,
-    retry=Retry,
+    **RUNS,
     as_json=Json,
     quiet=Quiet,
 )

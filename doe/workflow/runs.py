@@ -28,7 +28,6 @@ from rbdyn.base.records import Record, finite
 from rbdyn.base.words import are, counted
 from rbdyn.result import SimulationResult
 
-RUNS_TABLE = "design_runs.csv"  # of a study, in its folder
 # Times that failed runs are replaced: the last ones may fail too.
 REPLACED = 3
 
