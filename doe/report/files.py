@@ -15,10 +15,11 @@ from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
-from doe.report.sections.front import front_sheet
+from doe.report.sections.front import front_sheet, front_stills, robust_stills
 from doe.report.sections.record import readable
 from doe.report.sections.robust import decider_sheet, robust_input_sheet
-from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences
+from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences, search_stills
+from doe.report.still import save
 from doe.report.summary import Summary
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
@@ -54,7 +55,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
 
     summary.json is written last: where it is, all else is whole.
     """
-    from doe.report import pictures as plots
+    from doe.report.pictures import response_surface
 
     study = outcome.study
     result = summary(outcome)
@@ -83,19 +84,19 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     pictures = []
     for surface in outcome.study.surfaces:
         pictures.append(f"surface_{NO_WORD.sub('_', surface.name)}.png")
-        plots.response_surface(study, surface, folder / pictures[-1])
-    plots.pareto_front(outcome, folder / "pareto_front.png")
-    if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
-        pictures.append("robust_front.png")
-        plots.robust_front(outcome.robust.front, folder / pictures[-1])
-    if result.adaptive is not None:
-        pictures.append("adaptive_search.png")
-        plots.adaptive_search(result, result.adaptive, folder / pictures[-1])
-    if gain_stills(result):
-        pictures.append("duty_gains.png")
-        plots.duty_gains(result, folder / pictures[-1])
+        response_surface(study, surface, folder / pictures[-1])
+    stills = {
+        "robust_front.png": robust_stills(outcome.robust.front if outcome.robust else None),
+        "adaptive_search.png": [] if result.adaptive is None else search_stills(result, result.adaptive),
+        "duty_gains.png": gain_stills(result),
+        "pareto_front.png": front_stills(result),
+    }
+    for name, drawn_stills in stills.items():
+        if drawn_stills:
+            save(drawn_stills, folder / name)
+            pictures.append(name)
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
-    pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
+    pictures += clearance.draw_motion(motions, folder)
     drawn = {name: clearance.drawn_motion(motion) for name, motion in motions.items()}
     texts = {"report.html": html_report(result, drawn), "answer.txt": answer_text(result)}
     for name, text in texts.items():

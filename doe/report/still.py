@@ -81,12 +81,12 @@ class Still:
         return _page_svg(ElementTree.fromstring(buffer.getvalue()), self)
 
 
-def save(stills: Sequence[Still], columns: int, path: Path) -> None:
-    """The pictures next to each other as one PNG, so many in a row; all as large as the first."""
+def save(stills: Sequence[Still], path: Path) -> None:
+    """The pictures in rows of three as one PNG, of four in two rows; all as large as the first."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
-        _figure(stills, columns).savefig(path, dpi=130)
+        _figure(stills, 2 if len(stills) == 4 else 3).savefig(path, dpi=130)
 
 
 def name_marks(artist: "Artist", role: str, titles: Sequence[str] = ()) -> None:

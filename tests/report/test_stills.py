@@ -136,11 +136,16 @@ def test_shares_of_a_chain_fill_their_bar():
 
 
 def test_a_file_holds_the_pictures_in_rows(tmp_path):
-    """As PNG on white paper: two in a row, the third beneath the first, and where there is none nothing."""
+    """As PNG on white paper: four of them two in a row, five with three in a row, and where there is none nothing."""
     still = Still("three points", partial(marked, []))
-    save([still] * 3, 2, tmp_path / "three.png")
-    image = imread(tmp_path / "three.png")[..., :3]
+    save([still] * 4, tmp_path / "four.png")
+    image = imread(tmp_path / "four.png")[..., :3]
     high, wide = image.shape[0] // 2, image.shape[1] // 2
     assert image.shape[:2] == pytest.approx((2 * 270 * 130 / 72, 2 * 340 * 130 / 72), abs=2)
     inked = [(part < 0.99).any() for half in (image[:high], image[high:]) for part in (half[:, :wide], half[:, wide:])]
-    assert inked == [True, True, True, False]
+    assert inked == [True] * 4
+    save([still] * 5, tmp_path / "five.png")
+    image = imread(tmp_path / "five.png")[..., :3]
+    assert image.shape[:2] == pytest.approx((2 * 270 * 130 / 72, 3 * 340 * 130 / 72), abs=2)
+    assert (image[: image.shape[0] // 2, -image.shape[1] // 3 :] < 0.99).any()
+    assert not (image[image.shape[0] // 2 :, -image.shape[1] // 3 :] < 0.99).any()

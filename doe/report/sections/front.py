@@ -4,11 +4,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from doe.report.sections.answer import tolerances
-from doe.report.sections.front_pictures import Front, drawn_pairs, hypervolume, legend_still, pair_still, parallel_still
+from doe.report.sections.front_pictures import Front, drawn_pairs, hypervolume, pair_stills, parallel_still
 from doe.report.sections.record import SENSES, change, nearest, share_with_interval
 from doe.report.sections.search import in_few_runs
+from doe.report.still import Still
 from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint
+from doe.workflow.judgement import FrontPoint as GainPoint
+from doe.workflow.judgement import RobustFront
+from doe.workflow.judgement import RobustPoint as ConfirmedGain
 from doe.workflow.settings import Asked
 from doe.workflow.surface_front import (
     WITHOUT,
@@ -118,22 +122,43 @@ def _pictures(
     asked: Asked, sets: Sequence[Front], marks: Mapping[str, Point], confirmed: Mapping[str, ConfirmedPoint]
 ) -> list[Block]:
     """The controls, pairs of responses with one legend, and parallel coordinates; none without a front of two responses."""
-    names = asked.names
-    if not sets or len(names) < 2:
+    if not sets or len(asked.names) < 2:
         return []
-    limits = {response.name: response.bounds for response in asked.responses if response.bounds}
-    pairs = [
-        pair_still((one, names[one]), (two, names[two]), sets, marks, confirmed, limits)
-        for one, two in drawn_pairs([response.goal for response in asked.responses])
-    ]
     caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
-    across = parallel_still(asked.factors, names, sets, marks)
-    stills = [*pairs, legend_still(sets, marks, bool(confirmed), bool(limits))]
+    across = parallel_still(asked.factors, asked.names, sets, marks)
     return [
         Widget("front"),
-        Figures([still.svg for still in stills], "", "pairs"),
+        Figures([still.svg for still in _pairs(asked, sets, marks, confirmed)], "", "pairs"),
         Figures([across.svg], caption, "parallel"),
     ]
+
+
+def _pairs(
+    asked: Asked, sets: Sequence[Front], marks: Mapping[str, Point], confirmed: Mapping[str, ConfirmedPoint]
+) -> list[Still]:
+    """A picture for each pair of responses, and their legend."""
+    limits = {response.name: response.bounds for response in asked.responses if response.bounds}
+    pairs = drawn_pairs([response.goal for response in asked.responses])
+    return pair_stills(asked.names, pairs, sets, marks, confirmed, limits)
+
+
+def front_stills(summary: Summary) -> list[Still]:
+    """Pairs of responses with the fronts, and baseline and picks both on the surfaces and simulated."""
+    return _pairs(summary.asked, fronts(summary), picks(summary), summary.confirmation)
+
+
+def robust_stills(front: RobustFront | None) -> list[Still]:
+    """Pairs of gains that hold over the unknown inputs: predicted along the front, and simulated; none without a front."""
+    if front is None or not front.confirmed:
+        return []
+    names = {name: f"gain in {quantity(name)[0]}_percent" for name in front.q2}
+
+    def placed(point: GainPoint | ConfirmedGain) -> Point:
+        return Point(point.factors, {names[name]: 100.0 * gain for name, gain in point.gains.items()})
+
+    predicted = Front("front", "by emulators", [placed(point) for point in front.points])
+    marks = {point.name.removeprefix("robust "): placed(point) for point in front.confirmed}
+    return pair_stills([*names.values()], drawn_pairs(["min"] * len(names)), [predicted], marks)
 
 
 def _picks(caption: str, asked: Asked, marks: Mapping[str, Point], detail: Detail = Detail.LEAST) -> Table:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
@@ -110,6 +111,19 @@ def near(bounds: Iterable[float], values: Iterable[float]) -> list[float]:
     return [bound for bound in bounds if 2.0 * low - high <= bound <= 2.0 * high - low]
 
 
+def pair_stills(
+    names: Sequence[str],
+    pairs: Sequence[tuple[int, int]],
+    sets: Sequence[Front],
+    marks: Mapping[str, FrontPoint],
+    confirmed: Mapping[str, ConfirmedPoint] = MappingProxyType({}),
+    limits: Mapping[str, Sequence[float]] = MappingProxyType({}),
+) -> list[Still]:
+    """The fronts over pairs of responses, which are places among their ``names``, and what the marks mean."""
+    stills = [pair_still((one, names[one]), (two, names[two]), sets, marks, confirmed, limits) for one, two in pairs]
+    return [*stills, legend_still(sets, marks, bool(confirmed), bool(limits))]
+
+
 def pair_still(
     one: tuple[int, str],
     two: tuple[int, str],
@@ -184,13 +198,17 @@ def _dots(axis: "Axes", role: str, x: Sequence[float], y: Sequence[float]) -> No
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    corners = [place for place in zip(x, y, strict=True) for _ in range(2)]
+    # A line without any length would be no dot of a PNG.
+    least = 1e-9 * (axis.get_xlim()[1] - axis.get_xlim()[0])
+    corners = [corner for a, b in zip(x, y, strict=True) for corner in ((a, b), (a + least, b))]
     path = Path(corners, [Path.MOVETO, Path.LINETO] * len(x))
     path.should_simplify = False
     colour, ring = FRONTS[role]
     layers = [(colour, DOT)] if not ring else [(colour, DOT + 0.5 * RING), ("paper", DOT - 0.5 * RING)]
     for layer, (shade, width) in enumerate(layers):
-        patch = PathPatch(path, edgecolor=COLOURS[shade], facecolor="none", linewidth=width, capstyle="round")
+        patch = PathPatch(
+            path, edgecolor=COLOURS[shade], facecolor="none", linewidth=width, capstyle="round", snap=False
+        )
         name_marks(patch, f"dots {role}" if layer == 0 else "inside")
         axis.add_patch(patch)
 

@@ -48,7 +48,7 @@ def in_few_runs(summary: Summary) -> list[Block]:
     adaptive = summary.adaptive
     if adaptive is None:
         return []
-    progress, places = search_stills(summary, adaptive)
+    progress, *places = search_stills(summary, adaptive)
     rows = [
         (shown(state.runs), f"{volume:.3f}", with_error(state.left, state.left_error), state.why)
         for state, volume in zip(adaptive.history, adaptive.compared.search, strict=True)
@@ -97,7 +97,7 @@ def curves(adaptive: SearchResult) -> list[Curve]:
     ]
 
 
-def search_stills(summary: Summary, adaptive: SearchResult) -> tuple[Still, list[Still]]:
+def search_stills(summary: Summary, adaptive: SearchResult) -> list[Still]:
     """Hypervolume against runs, and the runs over the first factor and each other one."""
     lines, spent = curves(adaptive), spent_runs(summary, adaptive)
     ends = f"{lines[0].reached[0]:.3f} to {lines[0].reached[-1]:.3f} in {lines[0].runs[-1]:.0f} runs"
@@ -112,7 +112,7 @@ def search_stills(summary: Summary, adaptive: SearchResult) -> tuple[Still, list
         )
         for other in others
     ]
-    return Still(words, partial(_progress, lines), height=HIGH, bottom_margin=BOTTOM), places
+    return [Still(words, partial(_progress, lines), height=HIGH, bottom_margin=BOTTOM), *places]
 
 
 def _progress(lines: Sequence[Curve], axis: "Axes") -> None:
