@@ -169,6 +169,7 @@ class SimulationResult(Brief, SavedRecord):
     - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
+    - ``damage``: figures of wear and impacts by key, None in results of older versions
     - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
       (``rbdyn.dynamics.part_figures``)
     """
@@ -197,6 +198,7 @@ class SimulationResult(Brief, SavedRecord):
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
     part_figures: dict[str, Quantity] | None = None
+    damage: dict[str, Quantity] | None = None
 
     impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
     power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815
@@ -228,10 +230,10 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """Figures with errors, by their key, which names the unit; temperatures of a heat balance by ``TEMPERATURES``."""
+        """Figures and damage with errors, by their key, which names the unit; temperatures of a heat balance by ``TEMPERATURES``."""
         nodes = self.temperatures_C
         temperatures = {} if nodes is None else {name: nodes[node] for name, node in TEMPERATURES.items()}
-        return self.figures | temperatures
+        return self.figures | (self.damage or {}) | temperatures
 
     def brief(self) -> tuple[str, list[Figure]]:
         """Status, replicates, seed and notes; the figures."""

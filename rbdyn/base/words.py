@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeGuard
 # Unit by the end of a name; the longest match counts.
 UNITS = {
     "mm": "mm", "um": "µm", "mm_um": "mm, µm", "m": "m", "deg": "deg", "mrad": "mrad", "rpm": "rpm", "m_s": "m/s", "m_s2": "m/s²",
-    "s": "s", "ms": "ms", "h": "h", "hz": "Hz", "l_min": "L/min", "N": "N", "Nm": "N m", "N_m": "N/m", "N_s": "N s", "N_s_m": "N s/m", "N_per_um": "N/µm", "Nm_per_mrad": "N m/mrad", "Mrev": "million turns", "s_m": "s/m", "W": "W",
+    "s": "s", "ms": "ms", "h": "h", "hz": "Hz", "l_min": "L/min", "N": "N", "Nm": "N m", "N_m": "N/m", "N_m_s": "N m/s", "N_s": "N s", "N_s_m": "N s/m", "N_per_um": "N/µm", "Nm_per_mrad": "N m/mrad", "Mrev": "million turns", "s_m": "s/m", "W": "W",
     "MPa": "MPa", "GPa": "GPa", "1_GPa": "1/GPa", "mPas": "mPa s", "C_mm2_s": "°C, mm²/s", "g": "g", "kg": "kg", "g_mm": "g mm",
     "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "C": "°C", "K": "K", "per_K": "1/K", "1e_6_K": "1e-6/K", "percent": "%",
     "W_mK": "W/(m K)", "J_kgK": "J/(kg K)",

@@ -7,7 +7,7 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, range_ends, shown, value_alone, with_error
 from rbdyn.clearances import REPORTED, other_ranges
-from rbdyn.dynamics.figures import BEARING, of_kind, repeated
+from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
 from rbdyn.result import SimulationResult, figure_sheet
 from rbdyn.scene import Scene
 
@@ -67,10 +67,11 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":
     """Figures of a run by their words."""
     window, repeats = counted(result.impact_window_turns, "shaft turn"), repeated(result.figures)
+    found = result.quantities
     return {
-        figure.words.format(window=window) or label(figure.key): result.figures[figure.key]
-        for figure in BEARING
-        if figure.key in result.figures and figure.key not in repeats
+        figure.words.format(window=window) or label(figure.key): found[figure.key]
+        for figure in (*BEARING, *DAMAGE)
+        if figure.key in found and figure.key not in repeats
     }
 
 

@@ -16,7 +16,7 @@ from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
-from rbdyn.losses import POWER_TERMS, SHAFT
+from rbdyn.losses import LAND_FRICTION, POCKET_DAMPING, POCKET_FRICTION, POWER_TERMS, SHAFT
 from rbdyn.result import TEMPERATURES
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Figure:
 
     - ``statistic``: how it follows from batches; None for what follows from the scene, the largest loads or the heat balance.
       ``scale``: factor of its unit, or that of a scene, None where the scene has no such figure
-    - ``kind``: of the whole "bearing", of a node ("temperature"), or of one of its parts. ``source``: of a part, the loss, clearance,
+    - ``kind``: of the whole "bearing", of its "damage", of a node ("temperature"), or of one of its parts. ``source``: of a part, the loss, clearance,
       or race and key of its report, that it is; of a temperature, its node
     - ``tested``: whether it must settle before a run ends. ``slow``: whether slow change counts in its error; ``balanced``: whether
       the gap of the power balance does
@@ -48,7 +48,7 @@ class Figure:
     meaning: str
     statistic: Statistic | None = None
     scale: "float | Callable[[Scene], float | None]" = 1.0
-    kind: Literal["bearing", "temperature", "power", "clearance", "life", "contact"] = "bearing"
+    kind: Literal["bearing", "damage", "temperature", "power", "clearance", "life", "contact"] = "bearing"
     source: tuple[str, ...] = ()
     tested: bool = False
     slow: bool = True
@@ -180,6 +180,47 @@ BEARING = (
         response=False,
     ),
 )
+
+
+def _pocket_sliding(scene: "Scene") -> float | None:
+    """Sliding in each pocket over the friction power of all; none of pockets that are off or have no friction."""
+    friction = scene.model.pocket_friction if scene.model.pocket != "off" else 0.0
+    return 1.0 / (friction * scene.bearing.rollers) if friction > 0.0 else None
+
+
+def _land_sliding(scene: "Scene") -> float | None:
+    """Sliding on the guide land over its friction power; none without a land or its friction."""
+    guided = scene.cage.guidance != "roller" and scene.model.guide_land != "off"
+    return 1.0 / scene.model.land_friction if guided and scene.model.land_friction > 0.0 else None
+
+
+# Wear by Archard's law is in proportion to sliding: force times the speed of the surface on which it acts.
+DAMAGE = (
+    Figure(
+        "pocket_sliding_N_m_s",
+        "contact force of a pocket times the speed at which its roller slides on it, mean over time and pockets",
+        timed(partial(_work, POCKET_FRICTION)),
+        _pocket_sliding,
+        kind="damage",
+        words="force times sliding speed in a pocket [N m/s]",
+    ),
+    Figure(
+        "land_sliding_N_m_s",
+        "contact force of the guide land times the speed at which the cage slides on it, mean over time",
+        timed(partial(_work, LAND_FRICTION)),
+        _land_sliding,
+        kind="damage",
+        words="force times sliding speed on the land [N m/s]",
+    ),
+    Figure(
+        "pocket_impact_power_W",
+        "power that impacts lose in all dry pockets",
+        timed(partial(_work, POCKET_DAMPING)),
+        lambda scene: None if scene.model.pocket == "off" or scene.model.pocket_film else 1.0,
+        kind="damage",
+        words="power that impacts lose in all pockets [W]",
+    ),
+)
 _PLACES = {"oil": "oil that leaves the bearing", "outer": "outer ring", "inner": "inner ring", "rollers": "rollers"}
 HEAT = tuple(
     # The accuracy is that of a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
@@ -222,7 +263,7 @@ PARTS = (
         for key in _CONTACTS
     ),
 )
-FIGURES = (*BEARING, *HEAT, *PARTS)
+FIGURES = (*BEARING, *DAMAGE, *HEAT, *PARTS)
 # In the order of their places on a map.
 PANELS = sorted((figure for figure in FIGURES if figure.panel), key=lambda figure: figure.panel or ())
 

@@ -13,7 +13,7 @@ from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.pace import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
-from rbdyn.dynamics.figures import BEARING
+from rbdyn.dynamics.figures import BEARING, DAMAGE
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -183,6 +183,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         versions=versions(),
         scene=scene.model_dump(mode="json"),
         part_figures=part_figures(scene, runs, figures),
+        damage={figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures},
     )
 
 

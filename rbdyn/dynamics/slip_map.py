@@ -23,7 +23,7 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
-from rbdyn.dynamics.figures import PANELS
+from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
@@ -171,7 +171,8 @@ class Series:
             *(note for race, peak in peaks.items() for note in pressure_notes(1e6 * peak, ROLLERS, race)),
             *heat_notes(self.scene, figures["power_loss_W"].value),
         )
-        shown = {panel.key: figures[panel.key] for panel in PANELS} | parts
+        damage = {figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures}
+        shown = {panel.key: figures[panel.key] for panel in PANELS} | damage | parts
         return Point(speed, load, status_of(notes), shown, power_gap, notes or None)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:

@@ -57,7 +57,9 @@ def test_invariant_equal_bearings_rarely_differ(short, first, second, numerical)
         random = np.random.default_rng(seed)
         sides = [
             replace(
-                short, figures={"impact_contact_force_N": short.impact_contact_force_N} | drawn(random, size, numerical)
+                short,
+                figures={"impact_contact_force_N": short.impact_contact_force_N} | drawn(random, size, numerical),
+                damage=None,
             )
             for size in (first, second)
         ]
@@ -135,7 +137,10 @@ def test_unit_a_scene_is_no_other_than_itself():
     assert not found.inputs and {one.verdict for one in found.figures.values()} == {"equal"}
     other = rbdyn.compare(ROLLERS, overrides=["numerics.seed=7"], both=short)
     assert [one.key for one in other.inputs] == ["numerics.seed"]
-    assert {one.verdict for one in other.figures.values()} <= {"within error", "error unknown"}
+    # A land that never touches slides nowhere in either.
+    equal = [name for name, one in other.figures.items() if one.verdict == "equal"]
+    assert equal == ["land_sliding_N_m_s"]
+    assert {one.verdict for one in other.figures.values()} <= {"within error", "error unknown", "equal"}
 
 
 def test_unit_ball_bearings_are_exact(tmp_path):
