@@ -25,6 +25,7 @@ from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
+    from doe.emulator import NoisyValues
     from rbdyn.base.estimate import Estimate
 
 
@@ -118,15 +119,15 @@ class Duty:
         """Names of all figures at all points, point by point."""
         return [at_point(point, figure) for point in self.shares for figure in self.rules]
 
-    def responses(self, outputs: Array, variances: Array, freedom: Whole, smooth: Array) -> tuple[Array, Array, Whole]:
-        """Responses of a study (p, n, m), their variances and degrees of freedom, of p designs at n input sets.
+    def responses(self, outputs: "NoisyValues", smooth: Array) -> "NoisyValues":
+        """Responses of a study (p, n, m), of p designs at n input sets.
 
         They follow from the figures at all points (p, n, c), in the order of `columns`, which have the same inputs in each row:
         the worst point is that of the row. Its simulation takes the ``smooth`` variances, for those of a row's few replicates
         scatter widely. Ratios are those to the first design.
         """
-        shape = (*outputs.shape[:2], len(self.shares), len(self.rules))
-        whole = [array.reshape(shape) for array in (outputs, variances, freedom, smooth)]
+        shape = (*smooth.shape[:2], len(self.shares), len(self.rules))
+        whole = [array.reshape(shape) for array in (*outputs, smooth)]
         names = list(self.shares)
         places = [names.index(group[0]) for group in self.groups]
         columns = [
@@ -139,7 +140,7 @@ class Duty:
             for point, figure in self.limits
         ]
         values, errors, degrees = (np.stack(arrays, axis=-1) for arrays in zip(*columns, strict=True))
-        return values, errors, degrees.astype(np.int64)
+        return outputs._replace(values=values, variances=errors, freedom=degrees.astype(np.int64))
 
     def _response(
         self, rule: Rule, values: Array, variances: Array, freedom: Whole, smooth: Array

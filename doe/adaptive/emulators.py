@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
-from doe.emulator import Emulator, fit_emulator, pooled_variances
+from doe.emulator import Emulator, NoisyValues, fit_emulator
 from doe.pareto.goals import Goals
 from rbdyn.base.arrays import Array, Mask, Whole
 
@@ -186,7 +186,4 @@ def _stretch(emulator: Emulator) -> float:
 def _pooled(runs: Runs, points: Array) -> Array:
     """Variances (n, m) of single replicates at points (n, k), by the replicates of runs."""
     single = runs.errors**2 * runs.replicates[:, None]
-    columns = zip(single.T, runs.freedom.T, strict=True)
-    return np.column_stack(
-        [pooled_variances(runs.points, variances, freedom, points) for variances, freedom in columns]
-    )
+    return NoisyValues(runs.values, single, runs.freedom).smooth(runs.points, new=points)

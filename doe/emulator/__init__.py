@@ -4,4 +4,12 @@
 - ``regression``: kernels, prior and search of the hyperparameters; the only module that loads scikit-learn
 """
 
-from doe.emulator.emulator import Draws, Emulator, Hyperparameters, fit_emulator, leave_one_out, pooled_variances
+from doe.emulator.emulator import (
+    Draws,
+    Emulator,
+    Hyperparameters,
+    NoisyValues,
+    fit_emulator,
+    leave_one_out,
+    pooled_variances,
+)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,8 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import MethodError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sklearn.gaussian_process import GaussianProcessRegressor
 
 Trend = Literal["none", "constant", "linear", "quadratic"]
@@ -245,6 +247,35 @@ def leave_one_out(factor: Array, weights: Array) -> tuple[Array, Array]:
     """
     variances = 1.0 / np.diag(lapack.dpotri(factor, lower=True)[0])
     return weights * variances, variances
+
+
+class NoisyValues(NamedTuple):
+    """Values of runs, their variances by the scatter of replicates, and the degrees of freedom of these; arrays of one shape."""
+
+    values: Array
+    variances: Array
+    freedom: Whole
+
+    @classmethod
+    def stacked(cls, parts: Sequence[NoisyValues]) -> NoisyValues:
+        """Values of equal runs, one along the first axis for each part."""
+        return cls(*map(np.array, zip(*parts, strict=True)))
+
+    def at(self, place: Any) -> NoisyValues:
+        """The values at places of the arrays."""
+        return NoisyValues(*(array[place] for array in self))
+
+    def averaged(self, other: NoisyValues) -> NoisyValues:
+        """Means over the replicates of both, equally many of each."""
+        values, variances = 0.5 * (self.values + other.values), 0.25 * (self.variances + other.variances)
+        return NoisyValues(values, variances, self.freedom + other.freedom + 1)
+
+    def smooth(self, points: Array, effort: Array | Whole | float = 1.0, new: Array | None = None) -> Array:
+        """Variances (n, m), smoothed over points (n, k), at ``new`` points where given; ``effort`` (n,): replicates over those of
+        the other runs."""
+        columns = zip(effort * self.variances.T, self.freedom.T, strict=True)
+        smooth = np.column_stack([pooled_variances(points, *column, new) for column in columns])
+        return np.asarray(smooth / np.reshape(effort, (-1, 1)))
 
 
 def pooled_variances(points: Array, variances: Array, freedom: Whole, new: Array | None = None) -> Array:

@@ -40,7 +40,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, special
 
-from doe.emulator import Emulator, fit_emulator, pooled_variances
+from doe.emulator import Emulator, NoisyValues, fit_emulator
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.faults import RunError
@@ -79,8 +79,7 @@ def fit_cells(
     ``allowance`` (c,): variance that a deviation of each cell is compared with; ``before``: emulators of most of these runs.
     """
     unit = np.sqrt(allowance)
-    noise = np.column_stack([pooled_variances(quantiles, v, f) for v, f in zip(variances.T, freedom.T, strict=True)])
-    noise = noise / allowance
+    noise = NoisyValues(values, variances, freedom).smooth(quantiles) / allowance
     middle = values.mean(axis=0)
     coded = (values - middle) / unit
     _, sizes, axes = np.linalg.svd(coded, full_matrices=False)

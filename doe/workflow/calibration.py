@@ -15,6 +15,7 @@ from scipy import special
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.emulator import NoisyValues
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.threads import one_thread
@@ -39,7 +40,7 @@ from doe.workflow.input_sets import (
     work_of_set,
 )
 from doe.workflow.rig import MOST_CONDITIONS, SPEED, Rig, read_rig
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.storage import code_version, digest_of
@@ -243,27 +244,26 @@ class _Rows:
         failures = [outcome for outcome in results if isinstance(outcome, Failure)]
         impossible = [outcome for outcome in results if isinstance(outcome, str)]
         check_holes(len(table) - len(complete), len(table), failures, impossible, " at some condition")
-        cells, variances, freedom = self.figures([result for n in complete for result in table[n]])
-        return Batch(quantiles[complete], cells, variances, freedom)
+        return Batch(quantiles[complete], *self.figures([result for n in complete for result in table[n]]))
 
     def run(self, scenes: Sequence[Scene | str], labels: Sequence[str], title: str) -> list[Any]:
         """Results, failures, or why there is no scene."""
         self.runs += sum(isinstance(scene, Scene) for scene in scenes)
         return outcomes(scenes, labels, self.simulations, title)
 
-    def figures(self, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-        """Cells (n, c) in logarithms, their variances and the degrees of freedom of these, of results by condition."""
+    def figures(self, results: Sequence[SimulationResult]) -> NoisyValues:
+        """Cells (n, c) in logarithms of results by condition."""
         conditions, names = np.array(self.cells).T
-        shape = (-1, len(self.cases), len(self.outputs))
-        tables = outputs_with_scatter(self.outputs, results)
-        outputs, variances = (table.reshape(shape)[:, conditions, names] for table in tables[:2])
-        freedom = tables[2].reshape(shape)[:, conditions, names]
+        sets = np.arange(0, len(results), len(self.cases))[:, None]
+        # The order of cells in memory decides the last bits of sums over the sets.
+        cells = outputs_with_scatter(self.outputs, results).at((np.asfortranarray(sets + conditions), names))
+        outputs = cells.values
         if not (outputs > 0.0).all():
             name = self.outputs[names[int(np.argmin(outputs.min(axis=0)))]]
             raise RunError(
                 f"{name}: is 0 or less in a simulation, so its logarithm cannot be compared; leave its column out"
             )
-        return np.log(outputs), variances / outputs**2, freedom
+        return NoisyValues(np.log(outputs), cells.variances / outputs**2, cells.freedom)
 
 
 @one_thread

@@ -14,6 +14,7 @@ from scipy.stats import t as student
 from doe import clearance
 from doe.clearance import Simulations, work_of
 from doe.duty import Duty, Run, Simulated, over_points
+from doe.emulator import NoisyValues
 from doe.running.store import Failure, sentence
 from doe.unknown import inputs as unknown
 from doe.unknown.inputs import Joint
@@ -52,24 +53,23 @@ ROUND_SEEDS = 10_000  # of further replicates of the same input sets
 class Sets:
     """Input sets with results, and the failures of the others.
 
-    ``places`` (n,) in the plan, quantiles (n, d) and values of the inputs. Outputs, their variances and the degrees of
-    freedom of these are (n, m). ``impossible``: why a scene could not be built.
+    ``places`` (n,) in the plan, quantiles (n, d) and values of the inputs, outputs (n, m). ``impossible``: why a scene could not
+    be built.
     """
 
     places: Whole
     quantiles: Array
     inputs: list[dict[str, Any]]
-    outputs: Array
-    variances: Array
-    freedom: Whole
+    outputs: NoisyValues
     failures: tuple[Failure, ...]
     impossible: tuple[str, ...]
 
     @property
     def signals(self) -> Array:
         """Outputs (n, m) on the scale of the main effects: logarithms of those that are positive throughout."""
-        positive = (self.outputs > 0.0).all(axis=0)
-        return np.where(positive, np.log(np.where(positive, self.outputs, 1.0)), self.outputs)
+        values = self.outputs.values
+        positive = (values > 0.0).all(axis=0)
+        return np.where(positive, np.log(np.where(positive, values, 1.0)), values)
 
     def joined(self, other: "Sets") -> "Sets":
         """The common sets with the replicates of both, equally many of each."""
@@ -79,9 +79,7 @@ class Sets:
             places,
             self.quantiles[ours],
             [self.inputs[row] for row in ours],
-            0.5 * (self.outputs[ours] + other.outputs[theirs]),
-            0.25 * (self.variances[ours] + other.variances[theirs]),
-            self.freedom[ours] + other.freedom[theirs] + 1,
+            self.outputs.at(ours).averaged(other.outputs.at(theirs)),
             (*self.failures, *other.failures),
             self.impossible,
         )
@@ -435,10 +433,10 @@ def run(
     successes = [(place, result) for place, result in enumerate(results) if not isinstance(result, Failure | str)]
     failures = tuple(result for result in results if isinstance(result, Failure))
     check_holes(len(results) - len(successes), len(results), failures, impossible)
-    outputs, variances, freedom = outputs_with_scatter(case.outputs, [result for _, result in successes])
+    outputs = outputs_with_scatter(case.outputs, [result for _, result in successes])
     places = np.array([place for place, _ in successes], dtype=np.int64)
     inputs_there = [values[place] for place in places]
-    return Sets(places, quantiles[places], inputs_there, outputs, variances, freedom, failures, impossible)
+    return Sets(places, quantiles[places], inputs_there, outputs, failures, impossible)
 
 
 def replicated_sets(case: Case, quantiles: Array, simulations: Simulations, effort: int) -> Sets:
@@ -500,11 +498,11 @@ def check_holes(
         )
 
 
-def outputs_with_scatter(names: Sequence[str], results: Sequence[Simulated]) -> tuple[Array, Array, Whole]:
-    """Outputs (n, m) of results, their variances by the scatter of replicates, and the degrees of freedom of these."""
+def outputs_with_scatter(names: Sequence[str], results: Sequence[Simulated]) -> NoisyValues:
+    """Outputs (n, m) of results."""
     outputs, errors, samples = clearance.figures(names, results)
     freedom = np.maximum(samples - 1, 1)
-    return outputs, (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2, freedom
+    return NoisyValues(outputs, (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2, freedom)
 
 
 def work_of_set(case: Case) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from doe.clearance import Simulations
 from doe.duty import Duty, points_in
-from doe.emulator import pooled_variances
+from doe.emulator import NoisyValues
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.runner import Stage
 from doe.running.store import Failure
@@ -46,79 +46,63 @@ from rbdyn.scene.unknown import Input, UnknownInput, is_number
 class Pairs:
     """p designs at the same n input sets.
 
-    ``places`` (n,) of the sets in the plan, their quantiles (n, d), outputs, variances and degrees of freedom (p, n, m).
+    ``places`` (n,) of the sets in the plan, their quantiles (n, d), and the outputs (p, n, m).
     ``effort`` (n,): replicates over those of the first runs. Over a ``duty`` outputs are figures at its points.
     """
 
     places: Whole
     quantiles: Array
-    outputs: Array
-    variances: Array
-    freedom: Whole
+    outputs: NoisyValues
     effort: Whole
     duty: Duty | None = None
 
     @cached_property
-    def responses(self) -> tuple[Array, Array, Whole]:
-        """Responses of the study, their variances and degrees of freedom (p, n, m)."""
+    def responses(self) -> NoisyValues:
+        """Responses (p, n, m) of the study."""
         if self.duty is None:
-            return self.outputs, self.variances, self.freedom
-        smooth = np.array([self._smooth(design) for design in range(len(self.outputs))])
-        return self.duty.responses(self.outputs, self.variances, self.freedom, smooth)
-
-    def _smooth(self, design: int) -> Array:
-        """Variances (n, c) of all outputs of a design, smoothed over the inputs."""
-        columns = zip(self.effort * self.variances[design].T, self.freedom[design].T, strict=True)
-        smooth = [pooled_variances(self.quantiles, *column) for column in columns]
-        return np.column_stack(smooth) / self.effort[:, None]
+            return self.outputs
+        designs = map(self.outputs.at, range(len(self.outputs.values)))
+        return self.duty.responses(
+            self.outputs, np.array([design.smooth(self.quantiles, self.effort) for design in designs])
+        )
 
     def rows(self, rows: Whole) -> "Pairs":
         """The same at these rows; a row may come more than once."""
-        outputs, variances, freedom = self.outputs[:, rows], self.variances[:, rows], self.freedom[:, rows]
-        places, quantiles, effort = self.places[rows], self.quantiles[rows], self.effort[rows]
-        return Pairs(places, quantiles, outputs, variances, freedom, effort, self.duty)
+        outputs = self.outputs.at((slice(None), rows))
+        return Pairs(self.places[rows], self.quantiles[rows], outputs, self.effort[rows], self.duty)
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same with as many replicates more at these rows."""
-        outputs, variances, freedom = self.outputs.copy(), self.variances.copy(), self.freedom.copy()
-        outputs[:, rows] = 0.5 * (outputs[:, rows] + other.outputs)
-        variances[:, rows] = 0.25 * (variances[:, rows] + other.variances)
-        freedom[:, rows] += other.freedom + 1
-        effort = self.effort.copy()
+        outputs, effort = deepcopy(self.outputs), self.effort.copy()
+        for array, means in zip(outputs, outputs.at((slice(None), rows)).averaged(other.outputs), strict=True):
+            array[:, rows] = means
         effort[rows] *= 2
-        return replace(self, outputs=outputs, variances=variances, freedom=freedom, effort=effort)
+        return replace(self, outputs=outputs, effort=effort)
 
     def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array]:
         """Relative gains (n, q) of a design over the first, and their variances.
 
         The variances are smoothed over the inputs, because those of a row's few replicates scatter widely.
         """
-        outputs, variances, freedom = self.responses
-        designs = [0, design]
-        gains, variances = relative_gains(goals, outputs[designs], variances[designs])
-        freedom = freedom[designs][:, :, goals.objectives].sum(axis=0)
-        single_variances = self.effort[:, None] * variances
-        smooth = [
-            pooled_variances(self.quantiles, *column) for column in zip(single_variances.T, freedom.T, strict=True)
-        ]
-        return gains, np.column_stack(smooth) / self.effort[:, None]
+        gains = relative_gains(goals, self.responses.at([0, design]))
+        return gains.values, gains.smooth(self.quantiles, self.effort)
 
     def values(self, response: int, design: int = 1) -> tuple[Array, Array]:
         """Values (n,) of a response of a design, and their variances, smoothed over the inputs like those of gains."""
-        outputs, variances, freedom = (array[design][:, response] for array in self.responses)
-        smooth = pooled_variances(self.quantiles, self.effort * variances, freedom)
-        return outputs, smooth / self.effort
+        figure = self.responses.at(design).at((slice(None), slice(response, response + 1)))
+        return figure.values[:, 0], figure.smooth(self.quantiles, self.effort)[:, 0]
 
 
-def relative_gains(goals: Goals, outputs: Array, variances: Array) -> tuple[Array, Array]:
-    """Relative gains (n, q) of the second design over the first of outputs (2, n, m), and their variances."""
+def relative_gains(goals: Goals, designs: NoisyValues) -> NoisyValues:
+    """Relative gains (n, q) of the second design over the first, of responses (2, n, m)."""
     index = goals.objectives
-    scale = np.abs(outputs[0][:, index])
-    base_costs, costs = (goals.costs(design) for design in outputs)
+    scale = np.abs(designs.values[0][:, index])
+    base_costs, costs = (goals.costs(design) for design in designs.values)
     gains = (base_costs - costs) / scale
-    base_variances, design_variances = (design[:, index] for design in variances)
+    base_variances, design_variances = (design[:, index] for design in designs.variances)
     # The first design is in the denominator too.
-    return gains, (design_variances + (1.0 - gains) ** 2 * base_variances) / scale**2
+    variances = (design_variances + (1.0 - gains) ** 2 * base_variances) / scale**2
+    return NoisyValues(gains, variances, designs.freedom[:, :, index].sum(axis=0))
 
 
 def simulate_designs(
@@ -134,14 +118,10 @@ def simulate_designs(
     shared, title = (case, inputs, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
     sets_of_design = [run(*shared, [*design, *overrides], title.format(name)) for name, design in designs.items()]
     places = reduce(np.intersect1d, (sets.places for sets in sets_of_design))
-    rows_of_design = [np.flatnonzero(np.isin(sets.places, places)) for sets in sets_of_design]
-    outputs, variances, freedom = (
-        np.array([array[rows] for array, rows in zip(arrays, rows_of_design, strict=True)])
-        for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in sets_of_design), strict=True)
-    )
+    outputs = NoisyValues.stacked([sets.outputs.at(np.isin(sets.places, places)) for sets in sets_of_design])
     failures = tuple(failure for sets in sets_of_design for failure in sets.failures)
     effort = np.ones(len(places), dtype=np.int64)
-    return Pairs(places, quantiles[places], outputs, variances, freedom, effort, case.duty), failures
+    return Pairs(places, quantiles[places], outputs, effort, case.duty), failures
 
 
 JOINT_SEEDS = 200_000
@@ -233,16 +213,12 @@ def _emulators(
     required = [*range(factors), *(factors + place for place in declared(case))]
     cover = factors + case.uncertain.inputs, required
     positions = np.hstack([places, sets.quantiles])
-    pairs = ((base.outputs, sets.outputs), (base.variances, sets.variances), (base.freedom, sets.freedom))
-    outputs, variances, freedom = (np.stack([ours[0], theirs]) for ours, theirs in pairs)
-    designs = Pairs(sets.places, positions, outputs, variances, freedom, np.ones_like(sets.places), base.duty)
-    gains, gain_variances = relative_gains(goals, *designs.responses[:2])
-    gain_freedom = designs.responses[2][:, :, goals.objectives].sum(axis=0)
-    columns = zip(gains.T, gain_variances.T, gain_freedom.T, strict=True)
+    outputs = NoisyValues.stacked([base.outputs.at(0), sets.outputs])
+    designs = Pairs(sets.places, positions, outputs, np.ones_like(sets.places), base.duty).responses
+    columns = zip(*(array.T for array in relative_gains(goals, designs)), strict=True)
     gain = [emulated(Runs(positions, *column), *cover, logarithms=False) for column in columns]
     limit_emulators = [
-        emulated(Runs(positions, *(array[1][:, index] for array in designs.responses)), *cover)
-        for index, _, _ in goals.limited
+        emulated(Runs(positions, *designs.at((1, slice(None), index))), *cover) for index, _, _ in goals.limited
     ]
     seed = case.uncertain.seed + 3
     random = np.random.default_rng(seed)

@@ -100,7 +100,7 @@ class Uncertainty(Record, kw_only=True):
     responses: dict[str, OutputRange]
     inputs: list[UnknownInput]
     screened: dict[str, float]
-    runs: int = derived(lambda self: len(self.sets.outputs))
+    runs: int = derived(lambda self: len(self.sets.places))
     failed: int = derived(lambda self: len(self.sets.failures) + len(self.sets.impossible))
     seed: int
     notes: Notes
@@ -188,14 +188,11 @@ def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) 
 
 def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets]:
     """The case and its sets with the outputs that vary; those that are one number in all sets are put into ``idle``."""
-    spread = np.ptp(sets.outputs, axis=0)
-    varies = spread > STILL * np.abs(sets.outputs).max(axis=0)
-    idle |= {name: float(sets.outputs[0, place]) for place, name in enumerate(case.outputs) if not varies[place]}
+    values = sets.outputs.values
+    varies = np.ptp(values, axis=0) > STILL * np.abs(values).max(axis=0)
+    idle |= {name: float(values[0, place]) for place, name in enumerate(case.outputs) if not varies[place]}
     names = tuple(name for name, varying in zip(case.outputs, varies, strict=True) if varying)
-    kept = replace(
-        sets, outputs=sets.outputs[:, varies], variances=sets.variances[:, varies], freedom=sets.freedom[:, varies]
-    )
-    return replace(case, outputs=names), kept
+    return replace(case, outputs=names), replace(sets, outputs=sets.outputs.at((slice(None), varies)))
 
 
 def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
@@ -207,8 +204,7 @@ def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
 
 def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
     numerical = nominal.responses[case.outputs[place]].numerical_error or 0.0
-    samples = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
-    runs = Runs(sets.quantiles, *samples, (numerical / NORMAL) ** 2)
+    runs = Runs(sets.quantiles, *sets.outputs.at((slice(None), place)), (numerical / NORMAL) ** 2)
     return runs, emulated(runs, case.uncertain.inputs, declared(case))
 
 

@@ -445,9 +445,10 @@ def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:
     more = ([], ["numerics.replicates=2"], ["numerics.replicates=4"])
     parts = [run(case, case.every, quantiles, _Outputs(0.5), *each) for each in zip(seeds, more, strict=True)]  # type: ignore[arg-type]
     weights = np.array([0.25, 0.25, 0.5])
-    assert whole.outputs == pytest.approx(np.einsum("p,pnm->nm", weights, [each.outputs for each in parts]))
-    assert whole.variances == pytest.approx(np.einsum("p,pnm->nm", weights**2, [each.variances for each in parts]))
-    assert (whole.freedom == sum(each.freedom for each in parts) + 2).all()
+    values, variances, freedom = map(list, zip(*(each.outputs for each in parts), strict=True))
+    assert whole.outputs.values == pytest.approx(np.einsum("p,pnm->nm", weights, values))
+    assert whole.outputs.variances == pytest.approx(np.einsum("p,pnm->nm", weights**2, variances))
+    assert (whole.outputs.freedom == sum(freedom) + 2).all()
 
 
 def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from doe.emulator import pooled_variances
+from doe.emulator import NoisyValues
 from doe.unknown.decision import DecisiveInputs, decisive_inputs
 from doe.unknown.inputs import nested
 from rbdyn.base.arrays import Array
@@ -16,17 +16,11 @@ from rbdyn.base.arrays import Array
 FRESH = 8192
 
 
-def noisy(truth: Array, sd: float, seed: int) -> tuple[Array, Array, Array]:
+def noisy(truth: Array, sd: float, seed: int) -> NoisyValues:
     """Gains (n, m) with noise of a known size, their variances from seven degrees of freedom."""
     random = np.random.default_rng(seed)
     variances = sd**2 * random.chisquare(7, truth.shape) / 7.0
-    return truth + sd * random.standard_normal(truth.shape), variances, np.full(truth.shape, 7)
-
-
-def smooth(quantiles: Array, variances: Array, freedom: Array) -> Array:
-    """Variances (n, m) smoothed over the inputs."""
-    columns = zip(variances.T, freedom.T, strict=True)
-    return np.column_stack([pooled_variances(quantiles, *each) for each in columns])
+    return NoisyValues(truth + sd * random.standard_normal(truth.shape), variances, np.full(truth.shape, 7))
 
 
 def _rough(quantiles: Array, seed: int) -> Array:
@@ -83,9 +77,9 @@ class Known:
     def decide(self, pairs: int, seed: int) -> DecisiveInputs:
         """What so many pairs make of it."""
         quantiles = nested(self.inputs + 1, pairs, 1000 + seed)
-        gains, variances, freedom = noisy(self.gains(quantiles[:, :-1]), self.noise, seed)
+        gains = noisy(self.gains(quantiles[:, :-1]), self.noise, seed)
         fresh = nested(self.inputs + 1, FRESH, 5000 + seed)
-        return decisive_inputs(quantiles, gains, smooth(quantiles, variances, freedom), fresh, seed)
+        return decisive_inputs(quantiles, gains.values, gains.smooth(quantiles), fresh, seed)
 
     def truth(self, slices: int = 128) -> tuple[Array, Array]:
         """Worths (d,) and flips (d,) of all inputs by half a million sets, without noise or emulator; not a number where the

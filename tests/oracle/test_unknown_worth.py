@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from decisions import KNOWN, noisy, smooth
+from decisions import KNOWN, noisy
 from scipy import stats
 
 from doe.unknown.decision import _about, _Figures, _smooth, decisive_inputs, gain_chances
@@ -24,8 +24,8 @@ def test_the_input_that_decides_and_where_it_flips() -> None:
     """The pick wins below 0.4 of the second input: probability 0.4, worth 0.4, flip there; a third input does nothing."""
     quantiles, fresh = nested(4, 256, 5), nested(4, 8192, 6)
     truth = np.column_stack([0.4 - quantiles[:, 1], np.full(256, 1.0) + 0.2 * quantiles[:, 0]])
-    gains, variances, freedom = noisy(truth, 0.05, 5)
-    variances = smooth(quantiles, variances, freedom)
+    noisy_gains = noisy(truth, 0.05, 5)
+    gains, variances = noisy_gains.values, noisy_gains.smooth(quantiles)
     assert gain_chances("ab", gains, variances, 1).all.value == pytest.approx(0.4, abs=0.05)
     found = decisive_inputs(quantiles, gains, variances, fresh, 1)
     first = found.inputs[0]
@@ -41,8 +41,8 @@ def test_two_inputs_that_decide_only_together() -> None:
     """The sign of a product: neither input alone tells anything, both tell all, 0.5."""
     quantiles, fresh = nested(4, 512, 7), nested(4, 8192, 8)
     truth = ((quantiles[:, 0] - 0.5) * (quantiles[:, 2] - 0.5))[:, None]
-    gains, variances, freedom = noisy(truth, 0.005, 7)
-    found = decisive_inputs(quantiles, gains, smooth(quantiles, variances, freedom), fresh, 1)
+    gains = noisy(truth, 0.005, 7)
+    found = decisive_inputs(quantiles, gains.values, gains.smooth(quantiles), fresh, 1)
     assert max(each.worth for each in found.inputs) < 0.05
     assert found.pair is not None and found.pair.places == (0, 2)
     assert found.pair.worth > 0.4 and found.pair.interval[0] > 0.35
@@ -53,10 +53,8 @@ def test_two_inputs_that_decide_only_together() -> None:
 def test_what_cannot_be_foretold_is_worth_nothing() -> None:
     """Gains of pure scatter beyond the noise: every share is a half, no input decides."""
     random = np.random.default_rng(9)
-    gains, variances, freedom = noisy(random.standard_normal((256, 1)), 0.1, 9)
-    found = decisive_inputs(
-        nested(3, 256, 9), gains, smooth(nested(3, 256, 9), variances, freedom), nested(3, 4096, 10), 1
-    )
+    gains = noisy(random.standard_normal((256, 1)), 0.1, 9)
+    found = decisive_inputs(nested(3, 256, 9), gains.values, gains.smooth(nested(3, 256, 9)), nested(3, 4096, 10), 1)
     assert found.explained[0] < 0.2
     assert max(each.worth for each in found.inputs) < 0.06
 
@@ -65,8 +63,8 @@ def test_what_cannot_be_foretold_is_worth_nothing() -> None:
 def test_worth_of_knowing_a_normal_input() -> None:
     """D = a + 3 b of normals plus 1: p = Phi(1/sqrt 10), given b Phi(1 + 3 b), whose E max(p, 1 - p) is known by quadrature."""
     quantiles, fresh = nested(3, 512, 11), nested(3, 8192, 12)
-    gains, variances, freedom = noisy(1.0 + stats.norm.ppf(quantiles[:, :2]) @ [[1.0], [3.0]], 0.1, 11)
-    found = decisive_inputs(quantiles, gains, smooth(quantiles, variances, freedom), fresh, 1)
+    gains = noisy(1.0 + stats.norm.ppf(quantiles[:, :2]) @ [[1.0], [3.0]], 0.1, 11)
+    found = decisive_inputs(quantiles, gains.values, gains.smooth(quantiles), fresh, 1)
     b = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)
     given = stats.norm.cdf(1.0 + 3.0 * b)
     truth = float(np.maximum(given, 1.0 - given).mean() - stats.norm.cdf(1.0 / np.sqrt(10.0)))

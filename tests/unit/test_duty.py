@@ -14,6 +14,7 @@ from short_studies import EXAMPLES, rows, run_design, run_study, short_study, si
 
 from doe.clearance import Simulations
 from doe.duty import Duty, DutyResult, Rule, quotient
+from doe.emulator import NoisyValues
 from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.workflow.confirmation import Choice, confirm, every_limit, simulate_original
@@ -429,7 +430,7 @@ def test_the_worst_point_is_that_of_each_input_set(tmp_path):
         ]
     )
     variances, freedom = 1e-12 * outputs**2, np.full(outputs.shape, 1)
-    values, errors, degrees = duty.responses(outputs, variances, freedom, variances)
+    values, errors, degrees = duty.responses(NoisyValues(outputs, variances, freedom), variances)
     assert study.responses == ["impact_force_N", "whirl_deviation_ratio", "power_loss_W", "idle: impact_force_N"]
     assert values[0] == pytest.approx(np.array([[100.0, 0.4, 1.0, 50.0], [90.0, 0.4, 1.0, 90.0]]))
     assert values[1] == pytest.approx(np.array([[90.0, 0.35, 1.25, 70.0], [95.0, 0.35, 0.9, 95.0]]))

@@ -105,7 +105,7 @@ def set_rows(uncertainty: Uncertainty) -> list[dict[str, Any]]:
             **{entry.key: values[entry.key] for entry in uncertainty.inputs},
             **dict(zip(uncertainty.responses, figures, strict=True)),
         }
-        for values, figures in zip(sets.inputs, sets.outputs.tolist(), strict=True)
+        for values, figures in zip(sets.inputs, sets.outputs.values.tolist(), strict=True)
     ]
 
 
@@ -187,7 +187,7 @@ def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
     for column, (name, output) in enumerate(uncertainty.responses.items()):
         above, below = axes[:, column]
         words, unit = quantity(name)
-        above.hist(uncertainty.sets.outputs[:, column], bins=24, color=BLUE, alpha=0.45)
+        above.hist(uncertainty.sets.outputs.values[:, column], bins=24, color=BLUE, alpha=0.45)
         above.axvspan(output.input.low, output.input.high, color=BLUE, alpha=0.12, label="5 to 95 % of the cases")
         above.axvline(output.nominal.value, color=ORANGE, label="as the scene says")
         above.set(xlabel=f"{words} [{unit}]" if unit else words, ylabel="input sets" if column == 0 else "")
