@@ -16,6 +16,7 @@ from doe.study_file import Study
 from doe.workflow.design import design_of
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError, key_path, refuse
+from rbdyn.dynamics.figures import why_missing
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
@@ -142,6 +143,8 @@ class Problem(Study):
             + (
                 f"{self.scene.file} has no [thermal], which computes temperatures; add that table there, or choose one of {names}"
                 if name in TEMPERATURES
+                else "wear needs K/H of a rig, which no simulation gives; choose pocket_sliding_N_m_s, to which wear is in proportion"
+                if "wear" in name
                 else f"the simulation does not give it; choose one of {names}"
             )
             for name in self.figures
@@ -228,6 +231,11 @@ class Problem(Study):
             refuse(
                 f"{self.path}: factor.key = {fault}"
                 for fault in first_guess_faults(scene.thermal, scene.lubricant, keys)
+            )
+            refuse(
+                f"{self.path}: response.name = {name!r}: {fault}"
+                for name in self.figures
+                if (fault := why_missing(scene, name))
             )
             self.built[kind, *texts] = scene
         return self.built[kind, *texts]

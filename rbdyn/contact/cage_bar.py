@@ -89,6 +89,15 @@ def bar_beam(section: CageSection, material: Elastic) -> Beam:
     return Beam(section.bar_length, material.modulus * inertia, shear)
 
 
+def clamped_stress(section: CageSection, contact_length: float) -> float:
+    """Largest bending stress per load [Pa/N] of a bar with clamped ends under an even load over ``contact_length`` [m] in its middle.
+
+    The moment at the ends is F L/8 for a load in the middle, F L/12 for one along the whole bar.
+    """
+    moment = section.bar_length / 8.0 - contact_length**2 / (24.0 * section.bar_length)
+    return 6.0 * moment / (section.thickness * section.bar_width**2)
+
+
 def bar_compliance(bar: Beam, contact_length: float, end: Array) -> float:
     """Mean displacement of the loaded length in the middle of a bar under an even load [m/N].
 

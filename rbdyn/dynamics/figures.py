@@ -4,7 +4,7 @@ They stand apart from compiled code so that a command can check a name without i
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -15,6 +15,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.losses import LAND_FRICTION, POCKET_DAMPING, POCKET_FRICTION, POWER_TERMS, SHAFT
 from rbdyn.result import TEMPERATURES
@@ -40,6 +41,8 @@ class Figure:
       it is left out next to where both are equal
     - ``panel``: place on a map from 1, and its heading in tables of points, "[%]" where these show it in percent
     - ``worst``: which value is the worst one over a duty
+    - ``needs``: what a scene without it lacks, in words
+    - ``is_defined``: whether runs bear it, where it needs more than its scene
     - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse
     - ``accuracy``: of a rig's sensor [%] where its table states none, 0 where no rig measures the figure
     """
@@ -58,6 +61,8 @@ class Figure:
     repeats: str = ""
     panel: tuple[int, str] | None = None
     worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
+    is_defined: Callable[[Sequence[Replicate]], bool] = lambda runs: True
+    needs: str = ""
     response: bool = True
     harmonic: bool = False
     accuracy: float = 0.0
@@ -203,6 +208,7 @@ DAMAGE = (
         _pocket_sliding,
         kind="damage",
         words="force times sliding speed in a pocket [N m/s]",
+        needs="pockets or model.pocket_friction",
     ),
     Figure(
         "land_sliding_N_m_s",
@@ -211,6 +217,7 @@ DAMAGE = (
         _land_sliding,
         kind="damage",
         words="force times sliding speed on the land [N m/s]",
+        needs="the guide land or model.land_friction",
     ),
     Figure(
         "pocket_impact_power_W",
@@ -219,8 +226,50 @@ DAMAGE = (
         lambda scene: None if scene.model.pocket == "off" or scene.model.pocket_film else 1.0,
         kind="damage",
         words="power that impacts lose in all pockets [W]",
+        needs="dry pockets, for model.pocket is off or model.pocket_film on",
+    ),
+    Figure(
+        "impact_return_force_N",
+        f"force on a pocket that one of {RETURN_WINDOWS} impact windows exceeds, by Gumbel's law (from {FEWEST_WINDOWS} windows on)",
+        RETURN_FORCE,
+        lambda scene: None if scene.model.pocket == "off" else 1.0,
+        kind="damage",
+        slow=False,
+        words=f"impact force that one of {RETURN_WINDOWS} windows exceeds [N]",
+        needs="pockets",
+        is_defined=is_fitted,
+    ),
+    Figure(
+        "bar_stress_MPa",
+        "bending stress of a clamped cage bar under the impact return force; a fatigue limit is 0.3 to 0.4 of the strength, at least",
+        RETURN_FORCE,
+        lambda scene: None if scene.model.pocket == "off" else scene.bar_stress_MPa_N,
+        kind="damage",
+        slow=False,
+        words="stress of a bar under it, at least [MPa]",
+        needs="pockets or the section of a bar (cage.bar_width_mm and three more)",
+        is_defined=is_fitted,
     ),
 )
+
+
+def why_missing(scene: "Scene", key: str) -> str | None:
+    """Why a scene has no such figure of damage, with the fix; None where it has."""
+    figure = next((figure for figure in DAMAGE if figure.key == key), None)
+    if figure is None:
+        return None
+    if figure.scale_in(scene) is None:
+        return f"the scene leaves out {figure.needs}; state it or choose another figure"
+    numerics = scene.numerics
+    windows = least_windows(numerics.turns, numerics.impact_window_turns, numerics.replicates)
+    if figure.statistic is RETURN_FORCE and windows < FEWEST_WINDOWS:
+        return (
+            f"numerics gives {windows} impact windows, and a return force needs {FEWEST_WINDOWS}; raise numerics.turns or "
+            "numerics.replicates, or shorten numerics.impact_window_turns"
+        )
+    return None
+
+
 _PLACES = {"oil": "oil that leaves the bearing", "outer": "outer ring", "inner": "inner ring", "rollers": "rollers"}
 HEAT = tuple(
     # The accuracy is that of a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).

@@ -31,6 +31,7 @@ from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
+from rbdyn.dynamics.statistics.extremes import return_force_notes
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
@@ -147,6 +148,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
             scene, figures, ensemble.fault, TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
         ),
         *whirl_notes(scene, figures.get("cage_orbit_radius_share")),
+        *return_force_notes(runs),
         *heat_notes(scene, figures["power_loss_W"].value),
         *friction_notes(maker),
         *race_notes(scene, races),

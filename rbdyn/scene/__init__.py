@@ -33,9 +33,10 @@ from rbdyn.scene.bearing import (
     material_of,
     section_misfits,
     section_notes,
+    section_of,
     with_bar_stiffness_of_section,
 )
-from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
+from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Damage, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import (
     RHEOLOGY_OILS,
     Lubricant,
@@ -70,10 +71,10 @@ class Scene(SceneFile):
 
     bearing, cage, lubricant, operation : drawings, oil, speeds and loads; required.
     mounting, support, thermal : fits and temperatures, a flexible housing, a heat balance; optional.
-    materials, traction, model, numerics : with defaults.
+    materials, traction, model, damage, numerics : with defaults.
     """
 
-    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None}
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None, "damage": {}}
 
     bearing: Bearing
     """The drawing of the bearing."""
@@ -97,6 +98,8 @@ class Scene(SceneFile):
     """Traction of the races."""
     model: Laws = Laws()
     """The laws of each interaction."""
+    damage: Damage = Damage()
+    """Inputs of figures of damage."""
     numerics: Numerics = Numerics()
     """Tolerance, length and replication of a run."""
     uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
@@ -414,6 +417,17 @@ class Scene(SceneFile):
         clearance = self.guide_play_m
         landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
         return None if landless or clearance is None else 0.5 * clearance
+
+    @property
+    def bar_stress_MPa_N(self) -> float | None:  # noqa: N802
+        """Stress in a clamped bar of the cage per load of a roller, with its concentration [MPa/N]; None without a section."""
+        section = section_of(self.bearing, self.cage)
+        if section is None:
+            return None
+        from rbdyn.contact.cage_bar import clamped_stress
+
+        contact = self.cage.pocket_contact_length or self.bearing.effective_length
+        return 1e-6 * self.damage.stress_concentration * clamped_stress(section, min(contact, section.bar_length))
 
     @property
     def cage_play_m(self) -> float | None:

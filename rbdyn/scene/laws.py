@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from rbdyn.base.faults import SI, Consistent, NonNegative, NotVanishing, Positive, Share
+from rbdyn.base.faults import SI, Consistent, NonNegative, NotVanishing, Positive, Share, Sparse
 from rbdyn.properties.materials import MATERIALS, SOFTEST_METAL
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
@@ -133,6 +133,15 @@ class Laws(Consistent):
             return alpha_of_restitution(restitution, getattr(self, f"{part}_restitution_speed_m_s"))
         alpha = getattr(self, f"{part}_damping_alpha_s_m")
         return METAL_ON_METAL_ALPHA if alpha is None else float(alpha)
+
+
+class Damage(Sparse):
+    """Inputs of figures of damage; no motion depends on them."""
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"stress_concentration": 2.0}
+
+    stress_concentration: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
+    """Stress at the corner of a pocket over that of a smooth bar, for bar_stress_MPa."""
 
 
 class Numerics(Consistent):

@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 from functools import cache
 
+import numpy as np
 import pytest
 from conftest import ROOT
+from short_studies import short_study
 
 import rbdyn
 from doe.clearance import responses_of
+from doe.workflow.problem import Problem
+from rbdyn.base.faults import InputError
+from rbdyn.contact.cage_bar import CageSection, clamped_stress
 from rbdyn.dynamics.figures import DAMAGE
+from rbdyn.dynamics.statistics.extremes import LARGEST_DISTANCE, RETURN_WINDOWS, distance, moments_of, return_level
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -67,3 +73,74 @@ def test_a_figure_without_its_law_is_left_out(override, missing):
     scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", [override])
     (figure,) = (figure for figure in DAMAGE if figure.key == missing)
     assert figure.scale_in(scene) is None
+
+
+def test_return_level_is_the_quantile_of_gumbels_law():
+    """Maxima of a known law give its quantile; equal ones give themselves."""
+    maxima = np.random.default_rng(1).gumbel(80.0, 3.0, 200_000)
+    exact = 80.0 - 3.0 * np.log(-np.log(1.0 - 1.0 / RETURN_WINDOWS))
+    assert return_level(moments_of(maxima).sum(axis=0)) == pytest.approx(exact, rel=2e-3)
+    assert return_level(moments_of(np.full(40, 7.0)).sum(axis=0)) == pytest.approx(7.0, rel=1e-6)
+
+
+def test_other_laws_are_refused():
+    """Of samples of Gumbel's law 3 to 8 % are refused; uniform and bounded ones nearly always, and equal forces always."""
+    random = np.random.default_rng(2)
+
+    def refused(draw) -> float:
+        return float(np.mean([distance(draw()) > LARGEST_DISTANCE for _ in range(1000)]))
+
+    for count in (30, 100, 400):
+        assert 0.03 <= refused(lambda count=count: random.gumbel(80.0, 3.0, count)) <= 0.08
+    assert refused(lambda: random.uniform(0.0, 1.0, 200)) > 0.99
+    assert refused(lambda: 5.0 - random.weibull(1.0, 200)) > 0.99
+    assert distance(np.full(40, 7.0)) > LARGEST_DISTANCE
+
+
+def test_return_force_needs_windows_and_exceeds_their_mean():
+    """Eight windows of a turn bear no return force; 36 of them bear one above their mean, with an error."""
+    fewer = result("numerics.impact_window_turns=1", "numerics.replicates=2").damage
+    assert "impact_return_force_N" not in fewer
+    run = result("numerics.impact_window_turns=1", "numerics.replicates=9", "numerics.seed=3")
+    force = run.damage["impact_return_force_N"]
+    assert force.value > run.impact_force_N.value and force.statistical_error > 0.0
+
+
+def test_stress_of_a_clamped_bar():
+    """F L/8 under a load in the middle, F L/12 under one along the whole bar, over the section modulus t b^2/6."""
+    section = CageSection(3e-3, 2e-3, 12e-3, 2e-3, 43.5e-3, 10)
+    modulus = 2e-3 * 3e-3**2 / 6.0
+    assert clamped_stress(section, 0.0) == pytest.approx(12e-3 / 8.0 / modulus)
+    assert clamped_stress(section, 12e-3) == pytest.approx(12e-3 / 12.0 / modulus)
+
+
+def test_stress_follows_the_return_force_and_its_concentration():
+    """The stress is the return force times the stress per force, which doubles with the concentration."""
+    sizes = ("bar_width", "bar_thickness", "bar_length", "side_ring_width")
+    section = [f"cage.{key}_mm={size}" for key, size in zip(sizes, (3.0, 3.0, 9.5, 2.0), strict=True)]
+    stress = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", section).bar_stress_MPa_N
+    sharp = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", [*section, "damage.stress_concentration=4"])
+    assert sharp.bar_stress_MPa_N == pytest.approx(2.0 * stress)
+    run = result("numerics.impact_window_turns=1", "numerics.replicates=9", "numerics.seed=3", *section)
+    force = run.damage["impact_return_force_N"].value
+    assert run.damage["bar_stress_MPa"].value == pytest.approx(stress * force)
+
+
+@pytest.mark.parametrize(
+    ("name", "override", "sentence"),
+    [
+        ("impact_return_force_N", "model.drag_coefficient=1.0", "6 impact windows, and a return force needs 30"),
+        ("bar_stress_MPa", "model.drag_coefficient=1.0", "the section of a bar"),
+        ("land_sliding_N_m_s", "model.guide_land=off", "leaves out the guide land"),
+        ("wear_life_h", "model.drag_coefficient=1.0", "wear needs K/H of a rig"),
+    ],
+)
+def test_a_study_is_refused_a_figure_that_its_scene_lacks(tmp_path, name, override, sentence):
+    """One sentence names the response and the fix before anything runs."""
+    text = short_study(tmp_path, replace=("set = [", f'set = ["{override}", ')).read_text(encoding="utf-8")
+    path = tmp_path / "named.toml"
+    path.write_text(text.replace("power_loss_W", name), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        assert Problem.load(path).plan
+    (fault,) = refused.value.faults
+    assert f"response.name = {name!r}: " in fault and sentence in fault

@@ -294,7 +294,7 @@ def quantities(
     unknown = moving and not settled(runs, since)
     for figure in FIGURES:
         statistic, scale = figure.statistic, figure.scale_in(scene)
-        if statistic is None or scale is None:
+        if statistic is None or scale is None or not figure.is_defined(runs):
             continue
         # Most scenes have no work at all of some losses.
         counts = steady and figure.slow and any(statistic.moments(run)[:, 1].any() for run in runs)
