@@ -35,6 +35,7 @@ from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, 
 from doe.threads import one_thread
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record, keyed, outside_json
 from rbdyn.base.words import counted
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
@@ -74,24 +75,23 @@ class Plan:
         return round(FRESH * self.budget)
 
 
-@dataclass(frozen=True)
-class Batch:
+class Batch(Record, kw_only=True):
     """State of the search after ``runs`` runs that went well, those of the design included.
 
     ``hypervolume`` of the predicted front and its standard ``deviation`` over the functions drawn from the emulators; ``gained``
-    by the last batch (NaN before the first); ``remaining``: mean of what would be gained if all were known, and its standard
+    by the last batch (None before the first); ``remaining``: mean of what would be gained if all were known, and its standard
     deviation ``remaining_error`` over these functions. All are on the scale of the predicted front at that time. ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front.
     ``why`` the next batch was made: "improvement", "check" of the predicted front, or "extension"; "" after the last.
     """
 
     runs: int
-    hypervolume: float
+    reached: float = keyed("hypervolume", default=float("nan"))
     deviation: float
-    gained: float
-    remaining: float
-    remaining_error: float
+    gained: float | None
+    remaining: float = keyed("left")
+    remaining_error: float = keyed("left_error")
     why: str
-    reached: float = float("nan")
+    hypervolume: float = outside_json(default=float("nan"))
 
 
 # Takes the state after a batch, the finished runs and those of the whole search.
@@ -272,7 +272,7 @@ class _Search:
             runs=len(emulators.runs.points),
             hypervolume=float(now.mean()),
             deviation=float(now.std()),
-            gained=float((now - previous).mean()) if len(self.fronts) > 1 else float("nan"),
+            gained=float((now - previous).mean()) if len(self.fronts) > 1 else None,
             remaining=float((best - now).mean()),
             remaining_error=float((best - now).std()),
             why="",
@@ -446,7 +446,8 @@ def nothing_gained(history: Sequence[Batch], since: int) -> bool:
     """Whether the last batches after the one numbered ``since`` gained nothing."""
     last = history[since + 1 :][-BATCHES:]
     return len(last) == BATCHES and all(
-        state.gained < max(SHARE * state.deviation, LEAST * state.hypervolume) for state in last
+        state.gained is not None and state.gained < max(SHARE * state.deviation, LEAST * state.hypervolume)
+        for state in last
     )
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
+    from rbdyn.scene.duty import DutyPoint
 
 RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
 FACTOR = """[[factor]]
@@ -48,6 +49,11 @@ HINT = """# Add to a factor: tolerance = 0.005, the half width that manufacture 
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
 BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}
+POINT = """[[duty]]
+name = {name}
+share = {share!r} # {unit}
+set = {set}
+"""
 # By name of the response, then "upper" or "lower".
 Limits = dict[str, dict[str, float]]
 
@@ -209,12 +215,25 @@ def _duty(path: Path | None, scene: "Scene") -> tuple[str, bool]:
     """The duty of the study, and whether its shares are hours; empty without a file of its points. Raises InputError."""
     if path is None:
         return "", False
-    from doe.commands.new_duty import duty_text
     from rbdyn.scene.duty import duty_scenes, in_hours, read_duty
 
     points = read_duty(path)
     duty_scenes(scene, points, str(path))
     return duty_text(points, in_hours(points)), in_hours(points)
+
+
+def _quoted(value: str | list[str]) -> str:
+    """A value in TOML, without the characters that have a meaning in a template."""
+    text = json.dumps(value, ensure_ascii=False)
+    return "".join(f"\\u{ord(character):04x}" if character in "{}#" else character for character in text)
+
+
+def duty_text(points: "Sequence[DutyPoint]", hours: bool) -> str:
+    """The [[duty]] tables of a study; ``hours``: whether shares are hours."""
+    unit = "h" if hours else "of the time"
+    return "\n".join(
+        POINT.format(name=_quoted(point.name), share=point.share, unit=unit, set=_quoted(point.set)) for point in points
+    )
 
 
 def _factor_text(factor: Factor, manufacture: "Manufacture | None" = None) -> str:

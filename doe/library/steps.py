@@ -296,11 +296,11 @@ def front(
 
     from doe.report.identity import study_identity
     from doe.report.sections.front import front_sheet
-    from doe.workflow.dangers import extrapolation_notes
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
     from doe.workflow.problem import Problem
     from doe.workflow.settings import Asked
     from doe.workflow.surface_front import StatedPoint, SurfaceFront
+    from doe.workflow.surfaces import extrapolation_notes
 
     path = path_given(path, "path")
     table, folder = (

@@ -30,6 +30,7 @@ from doe.workflow.runs import Runs
 from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
+from rbdyn.base.records import Record
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -250,20 +251,25 @@ def _samples_about_finalists(study: Problem, search: AdaptiveFront) -> Samples:
     return Samples(study.actual(coded), means, deviations)
 
 
-@dataclass(frozen=True, eq=False)
-class FrontComparison:
-    """Hypervolumes of fronts between ``ideal`` and ``nadir`` (q,) of the predicted front, in costs.
+class FreshVolume(Record):
+    """Hypervolume of the points of a search by their fresh runs, with a 95 % half width."""
 
-    By the last emulators: ``search`` (b,), of the predicted fronts before every batch and after the last; ``surfaces``, of
-    the front on the surfaces at the resolution of the drawing. By the simulator: ``fresh``, of the finalists by their fresh
-    runs, with its standard error.
+    hypervolume: float
+    error: float
+
+
+class FrontComparison(Record):
+    """Hypervolumes of fronts between one ``ideal`` and ``nadir``, those of the predicted front, in costs by response.
+
+    By the last emulators: ``search``, of the predicted fronts before every batch and after the last; ``surfaces``, of
+    the front on the surfaces at the resolution of the drawing. By the simulator: ``fresh``, of the finalists.
     """
 
-    ideal: Array
-    nadir: Array
-    search: Array
+    ideal: dict[str, float]
+    nadir: dict[str, float]
+    search: list[float]
     surfaces: float
-    fresh: tuple[float, float]
+    fresh: FreshVolume
 
 
 def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> FrontComparison:
@@ -272,13 +278,17 @@ def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> Fr
     costs = goals.costs(search.predictions)
     best = costs[non_dominated(costs)]
     scale = best.min(axis=0), best.max(axis=0)
+    ideal, nadir = (
+        dict(zip((study.responses[index] for index in goals.objectives), ends.tolist(), strict=True)) for ends in scale
+    )
+    front = search.front
+    fresh, error = noisy_hypervolume(front.costs, front.cost_errors, *scale, NOISE_DRAWS, front.seed)
     return FrontComparison(
-        *scale,
-        search=np.array(
-            [hypervolume(goals.costs(search.emulators.predict(front)[0]), *scale) for front in search.fronts]
-        ),
-        surfaces=hypervolume(predicted_costs(study, adaptive, on_surfaces), *scale),
-        fresh=noisy_hypervolume(search.front.costs, search.front.cost_errors, *scale, NOISE_DRAWS, search.front.seed),
+        ideal,
+        nadir,
+        [hypervolume(goals.costs(search.emulators.predict(points)[0]), *scale) for points in search.fronts],
+        hypervolume(predicted_costs(study, adaptive, on_surfaces), *scale),
+        FreshVolume(fresh, 1.96 * error),
     )
 
 

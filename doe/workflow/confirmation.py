@@ -20,9 +20,9 @@ from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
 from rbdyn.base.faults import RunError
-from rbdyn.base.notes import DANGER, Notes, condensed, of_level
+from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
-from rbdyn.base.words import chance, decimals, quantity, with_error
+from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
 from rbdyn.result import TEMPERATURES, Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
@@ -189,6 +189,16 @@ def gains(study: Problem, baseline: Confirmed, pick: Confirmed) -> dict[str, Gai
         study.responses[index]: Gain(float(p), float(e), study.file.response[index].goal, float(dof))
         for index, p, e, dof in columns
     }
+
+
+def worse_notes(gains: Mapping[str, Gain]) -> Notes:
+    """A note on a pick that is worse than the baseline, by its simulated ``gains`` by response."""
+    worse = [
+        f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"
+        for name, gain in gains.items()
+        if gain.verdict == "worse"
+    ]
+    return (Note("worse", f"the pick is worse than the baseline: {', '.join(worse)}"),) if worse else ()
 
 
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:

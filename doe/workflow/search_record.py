@@ -13,39 +13,13 @@ from doe.workflow.pick import SearchedPick
 from doe.workflow.problem import Problem
 from doe.workflow.surface_front import EstimatedPoint
 from rbdyn.base.arrays import Rows
-from rbdyn.base.records import Record, derived, finite, keyed
+from rbdyn.base.records import Record, derived, keyed
 
 
 class SearchedPoint(EstimatedPoint):
     """The pick of the searched front by the rule of the study, and why it is that."""
 
     reason: str
-
-
-class BatchState(Record):
-    """The search after so many runs: its ``hypervolume`` with the ``deviation``, the gain of the batch and that expected to be left,
-    with its standard deviation, and what the next runs are for."""
-
-    runs: int
-    hypervolume: float
-    deviation: float
-    gained: float | None
-    left: float
-    left_error: float
-    why: str
-
-    @classmethod
-    def of(cls, batch: Batch) -> Self:
-        """The state at a batch."""
-        return cls(
-            runs=batch.runs,
-            hypervolume=batch.reached,
-            deviation=batch.deviation,
-            gained=finite(batch.gained),
-            left=batch.remaining,
-            left_error=batch.remaining_error,
-            why=batch.why,
-        )
 
 
 class Extension(Record):
@@ -133,35 +107,6 @@ class Emulated(Record):
         )
 
 
-class FreshVolume(Record):
-    """Hypervolume of the points of a search by their fresh runs, with a 95 % half width."""
-
-    hypervolume: float
-    error: float
-
-
-class Compared(Record):
-    """Hypervolumes between one ``ideal`` and ``nadir``, in costs: by the last emulators those of the predicted fronts in the course of
-    the ``search`` and of the front on the ``surfaces``; ``fresh``."""
-
-    ideal: dict[str, float]
-    nadir: dict[str, float]
-    search: list[float]
-    surfaces: float
-    fresh: FreshVolume
-
-    @classmethod
-    def of(cls, names: Sequence[str], volumes: FrontComparison) -> Self:
-        """Hypervolumes of fronts of responses of these ``names``."""
-        return cls(
-            ideal=dict(zip(names, volumes.ideal.tolist(), strict=True)),
-            nadir=dict(zip(names, volumes.nadir.tolist(), strict=True)),
-            search=volumes.search.tolist(),
-            surfaces=volumes.surfaces,
-            fresh=FreshVolume(volumes.fresh[0], 1.96 * volumes.fresh[1]),
-        )
-
-
 class OtherRow(Record):
     """The row that is the pick in most of the other draws."""
 
@@ -214,7 +159,7 @@ class SearchResult(Record, kw_only=True):
     hypervolume: float
     hypervolume_fresh: float
     hypervolume_fresh_error: float
-    history: list[BatchState]
+    history: list[Batch]
     stopped: str
     extended: list[Extension]
     region: dict[str, list[float]]
@@ -227,7 +172,7 @@ class SearchResult(Record, kw_only=True):
     seed: int
     seconds: float
     emulator_seconds: float
-    compared: Compared
+    compared: FrontComparison
     held: str
     sentences: list[str]
     sentence: str = derived(lambda self: " ".join(self.sentences))
@@ -250,7 +195,6 @@ class SearchResult(Record, kw_only=True):
         costs = front.goals.costs(search.predictions)
         scale = costs.min(axis=0), costs.max(axis=0)
         fresh, fresh_error = noisy_hypervolume(front.costs, front.cost_errors, *scale, NOISE_DRAWS, front.seed)
-        names = [study.responses[index] for index in front.goals.objectives]
         half_ranges = study.half_ranges
         return cls(
             front=points,
@@ -260,7 +204,7 @@ class SearchResult(Record, kw_only=True):
             hypervolume=search.history[-1].reached,
             hypervolume_fresh=fresh,
             hypervolume_fresh_error=1.96 * fresh_error,
-            history=[BatchState.of(batch) for batch in search.history],
+            history=list(search.history),
             stopped=search.stopped,
             extended=[
                 Extension(
@@ -289,7 +233,7 @@ class SearchResult(Record, kw_only=True):
             seed=front.seed,
             seconds=adaptive.seconds,
             emulator_seconds=search.seconds,
-            compared=Compared.of(names, volumes),
+            compared=volumes,
             held=held,
             sentences=list(sentences),
             chosen=None if pick is None else Chosen.of(pick),

@@ -28,9 +28,9 @@ from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, read_runs
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import InputError, MethodError, refuse
-from rbdyn.base.notes import Note
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, keyed, outside_json
-from rbdyn.base.words import are, error_alone, improvement
+from rbdyn.base.words import are, error_alone, improvement, quantity
 
 # Runs with which a Gaussian process takes some 10 s; with 1000 it took 3 s, with 3000 45 s and 0.9 GB.
 MOST_RIVALLED = 1500
@@ -235,6 +235,26 @@ def half_widths(surfaces: Sequence[Surface], coded: Array) -> Array:
     """95 % half widths (n, m) of the mean responses at coded points (n, k)."""
     reach = [special.stdtrit(surface.interval_dof, 0.975) for surface in surfaces]
     return np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces]) * reach
+
+
+def extrapolation_notes(surfaces: Sequence[Surface], coded: Array) -> Notes:
+    """A note where surfaces are less sure at a ``coded`` point (k,) than at every run: there they rest on no run nearby.
+
+    By the largest variance of the mean at a run, for hidden extrapolation in several factors (Montgomery, Peck, Vining).
+    """
+    beyond = [surface.name for surface in surfaces if _variance_ratio(surface, coded) > 1.0 + 1e-9]
+    if not beyond:
+        return ()
+    names = ", ".join(quantity(name)[0] for name in beyond)
+    sentence = f"extrapolation: at the pick the surfaces of {names} are less sure than at any run; simulate it, or add runs there"
+    return (Note("extrapolation", sentence),)
+
+
+def _variance_ratio(surface: Surface, coded: Array) -> float:
+    """Variance of the mean at a point over the largest at a run; 0 for a surface without scatter."""
+    errors = surface.coefficient_error(np.vstack([coded, surface.data.points]))
+    largest = float(errors[1:].max())
+    return float(errors[0]) / largest if largest > 0.0 else 0.0
 
 
 def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:

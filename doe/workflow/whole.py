@@ -35,8 +35,8 @@ from doe.workflow.confirmation import (
     simulate_original,
     verdict_of,
     whirl_sentence,
+    worse_notes,
 )
-from doe.workflow.dangers import worse_notes
 from doe.workflow.design import check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.effort import Effort

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from doe_command import doe
 
-from doe.commands.new_duty import duty_text
+from doe.commands.new import duty_text
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene

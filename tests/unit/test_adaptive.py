@@ -113,7 +113,8 @@ def test_what_gains_next_to_nothing_for_much_is_no_front():
 
 
 def state(gained):
-    return Batch(20, 1.0, 0.04, gained, 0.1, 0.05, "improvement")
+    measures = {"hypervolume": 1.0, "deviation": 0.04, "remaining": 0.1, "remaining_error": 0.05}
+    return Batch(runs=20, gained=gained, why="improvement", **measures)
 
 
 def test_three_batches_in_a_row_must_gain_nothing():

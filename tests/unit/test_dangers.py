@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 import rbdyn
 from doe.response_surface import fit
-from doe.workflow.confirmation import Gain
-from doe.workflow.dangers import extrapolation_notes, worse_notes
+from doe.workflow.confirmation import Gain, worse_notes
 from doe.workflow.obstacles import MissedLimit, Obstacles
+from doe.workflow.surfaces import extrapolation_notes
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import CODES, Level, Note, condensed, ranked, status_notes, status_of, verdict
 from rbdyn.cli.app import app

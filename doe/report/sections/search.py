@@ -50,7 +50,7 @@ def in_few_runs(summary: Summary) -> list[Block]:
         return []
     progress, *places = search_stills(summary, adaptive)
     rows = [
-        (shown(state.runs), f"{volume:.3f}", with_error(state.left, state.left_error), state.why)
+        (shown(state.runs), f"{volume:.3f}", with_error(state.remaining, state.remaining_error), state.why)
         for state, volume in zip(adaptive.history, adaptive.compared.search, strict=True)
     ]
     header = ("runs", "hypervolume", "expected further gain", "next runs for")
@@ -261,12 +261,12 @@ def trust_sentence(study: Problem, adaptive: Adaptive) -> str:
 
 def comparison_sentence(adaptive: Adaptive, volumes: FrontComparison) -> str:
     """The hypervolumes of the front and of those that it is compared with."""
-    prediction, (fresh, error) = float(volumes.search[-1]), volumes.fresh
+    prediction, fresh = volumes.search[-1], volumes.fresh
     points = len(adaptive.search.front.points)
     share = f" ({100.0 * volumes.surfaces / prediction:.0f} % of the first)" if prediction > 0.0 else ""
     fronts = [
         f"front predicted {prediction:.3f}",
-        f"its {counted(points, 'point')} by their fresh runs {with_error(fresh, 1.96 * error)}",
+        f"its {counted(points, 'point')} by their fresh runs {with_error(fresh.hypervolume, fresh.error)}",
         f"front on the surfaces, by the same emulators, {volumes.surfaces:.3f}{share}",
     ]
     return f"Hypervolumes on one scale, with the noise of their runs alone: {'; '.join(fronts)}."
