@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
     from rbdyn.dynamics.motion import History
 
-
-# Receiver of the key of a run under way, its finished share and the time [s] of that; None without a receiver.
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
 # Offsets of seeds that no design run has; the input sets are those of an uncertainty.

@@ -19,7 +19,7 @@ from doe.commands.options import (
     Verbose,
     command,
 )
-from rbdyn.base.command import Force, Json, Set, Workers, flag, folder_option, valued, verbose_flag
+from rbdyn.base.command import Set, Workers, flag, folder_option, valued, verbose_flag
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")]
 STORE = "Folder of results and of the store of finished runs."
@@ -33,11 +33,9 @@ study = command(
     "results",
     path=StudyPath,
     out=StudyOut,
-    force=Force,
     **RUNS,
     adaptive=Adaptive,
     robust=Robust,
-    as_json=Json,
     quiet=Quiet,
     verbose=Verbose,
 )
@@ -46,8 +44,6 @@ design = command(
     "Print the design: every run, and how well the runs identify the terms of the models.",
     path=StudyPath,
     out=Save,
-    force=Force,
-    as_json=Json,
     as_csv=Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")],
     quiet=Annotated[bool, flag("--quiet", "-q", says="Actual values only.")],
     verbose=Annotated[bool, verbose_flag("Also seeds and leverages.")],
@@ -80,9 +76,7 @@ fit = command(
         valued("NAME", "linear, interaction, pure_quadratic, quadratic or reduced, without STUDY.", "quadratic"),
     ],
     out=Out,
-    force=Force,
     **RUNS,
-    as_json=Json,
     quiet=Quiet,
     verbose=Annotated[bool, verbose_flag("Also residual, leverage and Cook's distance of each run.")],
 )
@@ -92,7 +86,6 @@ front = command(
     path=StudyPath,
     data=Data,
     out=Out,
-    force=Force,
     **RUNS,
     point=Annotated[
         str | None,
@@ -102,7 +95,6 @@ front = command(
             "none",
         ),
     ],
-    as_json=Json,
     quiet=Quiet,
     verbose=Annotated[bool, verbose_flag("Also every point of the front.")],
 )
@@ -113,8 +105,6 @@ chain = command(
         Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
     ],
     out=Save,
-    force=Force,
-    as_json=Json,
     quiet=Annotated[bool, flag("--quiet", "-q", says="Parts only.")],
     verbose=Annotated[bool, verbose_flag("Also yields by distribution, quantiles, classes.")],
 )
@@ -138,9 +128,7 @@ uncertainty = command(
     ],
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "SCENE_uncertainty")],
-    force=Force,
     **RUNS,
-    as_json=Json,
     quiet=Quiet,
 )
 calibrate = command(
@@ -155,8 +143,6 @@ calibrate = command(
     free=Annotated[Texts, valued("KEY", "Key to identify; repeatable.", "all unknown inputs", "--free")],
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "SCENE_calibration")],
-    force=Force,
     **RUNS,
-    as_json=Json,
     quiet=Quiet,
 )

@@ -12,6 +12,8 @@ import typer
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import (
     FAILED,
+    Force,
+    Json,
     alarm,
     checkpoint_message,
     flag,
@@ -92,8 +94,8 @@ def bars(quiet: bool) -> "Iterator[Callable[[str, int, int], None]]":
 def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callable[..., None]:
     """The command of the function ``name`` of ``doe``; ``about`` is its help.
 
-    ``options``: annotation of each parameter that is an option, in their order; ``quiet``, ``verbose`` and ``as_csv`` say what is
-    printed. ``kept``: results are always in a folder, by default of the file's name and this. The function's own defaults hold for
+    ``options``: annotation of each parameter that is an option, in their order, --force and --json apart; ``quiet``, ``verbose``
+    and ``as_csv`` say what is printed. ``kept``: results are always in a folder, by default of the file's name and this. The function's own defaults hold for
     what is not stated.
     """
 
@@ -116,9 +118,13 @@ def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callabl
             else:
                 _hand_over(answer, as_json, Detail.of(*levels))
 
+    before = {"out": (), "as_csv": (("as_json", Json),), "quiet": (("as_json", Json),)}
+    kinds = dict[str, Any]()
+    for key, kind in options.items():
+        kinds |= dict(before.get(key, ())) | {key: kind} | ({"force": Force} if key == "out" else {})
     parameters = [
         Parameter(key, Parameter.POSITIONAL_OR_KEYWORD, default=_default(kind), annotation=kind)
-        for key, kind in options.items()
+        for key, kind in kinds.items()
     ]
     first = [parameter for parameter in parameters if parameter.default is Parameter.empty]
     rest = [parameter for parameter in parameters if parameter.default is not Parameter.empty]

@@ -6,9 +6,9 @@ gains has an interval.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Self, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy import special
@@ -222,8 +222,7 @@ SCALES = np.geomspace(1.0, 100.0, 81)  # factors on the standard errors, compare
 MOST_RUNS = 300  # design runs whose misses count; evenly spread if there are more
 
 
-@dataclass(frozen=True, eq=False)
-class Misses:
+class Misses(NamedTuple):
     """Simulated less predicted values of one response at coded points (c, k): ``misses`` (c,).
 
     ``errors`` and ``forecast_errors`` (c,) are the standard errors of simulation and prediction.
@@ -234,14 +233,9 @@ class Misses:
     errors: Array
     forecast_errors: Array
 
-    def with_points(self, points: Array, misses: Array, errors: Array, forecast_errors: Array) -> Self:
-        """The same with more points."""
-        more = zip(
-            (self.points, self.misses, self.errors, self.forecast_errors),
-            (points, misses, errors, forecast_errors),
-            strict=True,
-        )
-        return type(self)(*(np.concatenate(pair) for pair in more))
+    def joined(self, other: "Misses") -> "Misses":
+        """Those of both."""
+        return Misses(*map(np.concatenate, zip(self, other, strict=True)))
 
 
 class ErrorField:
@@ -280,7 +274,8 @@ class SurfaceDoubt:
                 coded = study.coded(np.array([point.point for point in simulated]))
                 errors = standard_errors_of(simulated)[:, index]
                 misses = np.array([point.values[index] for point in simulated]) - surface.predict(coded)
-                all_misses = all_misses.with_points(coded, misses, errors, surface.prediction_standard_error(coded))
+                more = Misses(coded, misses, errors, surface.prediction_standard_error(coded))
+                all_misses = all_misses.joined(more)
                 self._more[index] = float(errors.max())
             self._fields[index] = ErrorField(all_misses)
 

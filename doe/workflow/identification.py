@@ -18,7 +18,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
-from rbdyn.base.words import quantity
+from rbdyn.base.words import quantity, shown
 from rbdyn.scene.unknown import Input, value_of
 
 # Verdicts on a calibration.
@@ -64,6 +64,17 @@ class InputAnswer(Record, kw_only=True):
     high: float | None = None
     before: tuple[float, float] | None = None
     seen: str
+
+    @property
+    def after_words(self) -> str:
+        """Its densest 90 %, or the shares of its choices."""
+        shares = ", ".join(f"{value} {100.0 * share:.0f} %" for value, share in (self.shares or {}).items())
+        return shares or f"{shown(self.low)} to {shown(self.high)}"
+
+    @property
+    def before_words(self) -> str:
+        """Its range before; empty for choices."""
+        return " to ".join(map(shown, self.before or ()))
 
 
 class Cell(Record):

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -45,52 +45,30 @@ MOVED, MOST_MOVED = 0.5, 3
 SHOWN, END = 8, 1e-3
 
 
-class InputRow(NamedTuple):
-    """An input by its key, its contraction and its posterior."""
-
-    key: str
-    contraction: float
-    answer: InputAnswer
-
-    @property
-    def after(self) -> str:
-        """Its densest 90 %, or the shares of its choices."""
-        answer = self.answer
-        shares = ", ".join(f"{value} {100.0 * share:.0f} %" for value, share in (answer.shares or {}).items())
-        return shares or f"{shown(answer.low)} to {shown(answer.high)}"
-
-    @property
-    def before(self) -> str:
-        """Its range before; empty for choices."""
-        return " to ".join(map(shown, self.answer.before or ()))
-
-
-class OutputRow(NamedTuple):
-    """An output by its name."""
-
-    name: str
-    answer: OutputAnswer
+# Key, contraction and posterior of an input; name and answer of an output.
+InputRow = tuple[str, float, InputAnswer]
+OutputRow = tuple[str, OutputAnswer]
 
 
 INPUTS: tuple[Column[InputRow], ...] = (
-    Column("input", at="key", meaning="key of the input"),
-    Column("", words="before", at="before", form=str, text=True),
-    Column("", words="after", at="after", form=str, text=True),
-    Column("median", at=("answer", "median"), meaning="median of the posterior"),
-    Column("contraction", ".2f", meaning="1 - sd after / sd before"),
-    Column("seen", words="", at=("answer", "seen"), form=str, text=True, meaning="whether it was learned"),
-    Column("low", at=("answer", "low"), screen=False, meaning="densest 90 % after"),
-    Column("high", at=("answer", "high"), screen=False),
-    Column("before_low", at=lambda row: (row.answer.before or (None, None))[0], screen=False, meaning="range before"),
-    Column("before_high", at=lambda row: (row.answer.before or (None, None))[1], screen=False),
+    Column("input", at=0, meaning="key of the input"),
+    Column("", words="before", at=(2, "before_words"), form=str, text=True),
+    Column("", words="after", at=(2, "after_words"), form=str, text=True),
+    Column("median", at=(2, "median"), meaning="median of the posterior"),
+    Column("contraction", ".2f", at=1, meaning="1 - sd after / sd before"),
+    Column("seen", words="", at=(2, "seen"), form=str, text=True, meaning="whether it was learned"),
+    Column("low", at=(2, "low"), screen=False, meaning="densest 90 % after"),
+    Column("high", at=(2, "high"), screen=False),
+    Column("before_low", at=(2, "before", 0), screen=False, meaning="range before"),
+    Column("before_high", at=(2, "before", 1), screen=False),
 )
 OUTPUTS: tuple[Column[OutputRow], ...] = (
-    Column("output", at="name", meaning="figure"),
-    Column("explained", at=("answer", "explained"), meaning="whether the simulation explains it"),
-    Column("allowed", at=("answer", "allowed"), meaning="allowed error of the simulation"),
-    Column("accuracy_percent", at=("answer", "accuracy_percent"), meaning="accuracy of the sensor"),
-    Column("evidence", at=("answer", "evidence"), meaning="Bayes factor of a larger error"),
-    Column("resolution", at=("answer", "resolution"), meaning="largest offset that would not be seen"),
+    Column("output", at=0, meaning="figure"),
+    Column("explained", at=(1, "explained"), meaning="whether the simulation explains it"),
+    Column("allowed", at=(1, "allowed"), meaning="allowed error of the simulation"),
+    Column("accuracy_percent", at=(1, "accuracy_percent"), meaning="accuracy of the sensor"),
+    Column("evidence", at=(1, "evidence"), meaning="Bayes factor of a larger error"),
+    Column("resolution", at=(1, "resolution"), meaning="largest offset that would not be seen"),
 )
 CELLS: tuple[Column[Cell], ...] = (
     Column("row", meaning="row of the table"),
@@ -120,20 +98,16 @@ def prediction_columns(when: str) -> list[Column[Cell]]:
 def input_sheet(calibration: Calibration) -> Sheet[InputRow]:
     """A row an input, those that contract most first."""
     learned, answers = calibration.learnt.learned, calibration.inputs
-    rows = sorted(
-        (InputRow(key, learned[key], answer) for key, answer in answers.items()), key=lambda row: -row.contraction
-    )
+    rows = sorted(((key, learned[key], answer) for key, answer in answers.items()), key=lambda row: -row[1])
     choices = dict.fromkeys(value for answer in answers.values() for value in answer.shares or ())
-    shares = Column[InputRow]("share_{}", at=("answer", "shares", "{}"), screen=False, meaning="share of a choice").of(
-        choices
-    )
+    shares = Column[InputRow]("share_{}", at=(2, "shares", "{}"), screen=False, meaning="share of a choice").of(choices)
     caption = "Inputs: 5 to 95 % before, the densest 90 % or more after, which may reach an end of the range"
     return Sheet(caption, (*INPUTS, *shares), rows)
 
 
 def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
     """A row an output."""
-    return Sheet("", OUTPUTS, [OutputRow(name, answer) for name, answer in calibration.outputs.items()])
+    return Sheet("", OUTPUTS, list(calibration.outputs.items()))
 
 
 def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after")) -> Sheet[Cell]:

@@ -262,26 +262,17 @@ class DutyFigure(NamedTuple):
     point: AtPoint
     response: str
     limit: PickLimit | None
+    baseline: SimulatedValue
+    pick: SimulatedValue
+    gain: Gain | None
+    cost: PredictedGain | None
 
-    @property
-    def baseline(self) -> SimulatedValue:
-        """Simulated at the baseline."""
-        return self.point.baseline[self.response]
-
-    @property
-    def pick(self) -> SimulatedValue:
-        """Simulated at the pick."""
-        return self.point.pick[self.response]
-
-    @property
-    def gain(self) -> Gain | None:
-        """Gain of the pick over the baseline; None without a goal."""
-        return self.point.gains.get(self.response)
-
-    @property
-    def cost(self) -> PredictedGain | None:
-        """What the compromise costs; None without a pick of the point or a goal."""
-        return None if self.point.own is None else self.point.own.gains_over_pick.get(self.response)
+    @classmethod
+    def of(cls, point: AtPoint, response: str, limit: PickLimit | None) -> "DutyFigure":
+        """A response with its ``limit`` there; gains are None without a goal, costs also without a pick of the point."""
+        cost = None if point.own is None else point.own.gains_over_pick.get(response)
+        ends = point.baseline[response], point.pick[response]
+        return cls(point, response, limit, *ends, point.gains.get(response), cost)
 
 
 DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
@@ -344,7 +335,7 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
 def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
     """Every response at every point, at baseline and pick."""
     rows = [
-        DutyFigure(point, name, summary.limits.get(at_point(point.name, name)))
+        DutyFigure.of(point, name, summary.limits.get(at_point(point.name, name)))
         for point in (summary.duty.points if summary.duty else ())
         for name in summary.asked.names
         if name in point.pick
