@@ -26,7 +26,7 @@ def files() -> "dict[str, type[BaseModel]]":
 
 def kinds() -> "dict[str, type[BaseModel]]":
     """These, the tables of a scene that ``doe`` reads, and the tables of measurements, whose keys are columns."""
-    from doe.workflow.rig_columns import RigTable, SceneTables
+    from doe.workflow.rig import RigTable, SceneTables
 
     measured = "measurements on a rig, column"
     return {**files(), "unknown inputs and calibration of a scene": SceneTables, measured: RigTable}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.designs.model import Terms, model_matrix
-from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.arrays import Array
 
 # Makes information matrices comparable that do not estimate all terms.
 RIDGE = 1e-6
@@ -25,10 +25,6 @@ class Remaining:
     def excess(self, coded: Array) -> Array:
         """How much nearer (n,) coded points (n, k) lie to a failed run than to one that went well; at most 0 in what remains."""
         return _distance(coded, self.ran) - _distance(coded, self.failed)
-
-    def holds(self, coded: Array) -> Mask:
-        """Whether coded points (n, k) lie in what remains."""
-        return np.asarray(self.excess(coded) <= 0.0)
 
 
 def _distance(points: Array, others: Array) -> Array:

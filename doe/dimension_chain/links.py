@@ -326,15 +326,14 @@ def stated_parts(links: Sequence[Link]) -> list[Part]:
     return [stated_part(link, by_name) for link in links if link.is_dimension or link.thermal_growth]
 
 
-def allocated_part(link: Link, tolerance: float, grade: str | None = None, slope: float | None = None) -> Part:
+def allocated_part(link: Link, tolerance: float, grade: str | None, slope: float) -> Part:
     """The part of a link with a tolerance, mm, at the link's ``position``.
 
-    ``slope``: change of the closing link per unit of this link; by default its coefficient.
+    ``slope``: change of the closing link per unit of this link.
     """
     if link.position == "symmetric":
         lower, upper = -tolerance / 2, tolerance / 2
     elif link.position == "unilateral":
-        slope = link.coefficient if slope is None else slope
         lower, upper = (-tolerance, 0.0) if slope > 0 else (0.0, tolerance)
     else:
         lower, upper = position_limits(link.nominal, link.position, tolerance)

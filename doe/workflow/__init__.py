@@ -6,9 +6,9 @@
   limits, with ``surface_front`` as its record; ``adaptive``: the front by emulators, with ``search_record``
 - ``pick``: the point of the front, the edge of the region; ``rivals``: better simulated points; ``tolerances``: its widest ones
 - ``parts``: parts of a clearance and their grades; ``confirmation``: simulated points, intervals, limits
-- ``dangers``, ``obstacles``: what is bad about a choice, and what keeps a study from its demands
+- ``obstacles``: what keeps a study from its demands
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: whether the pick is better over
   them, with ``judgement`` as its record; ``duty``: the answer at every point of a duty
-- ``rig``, ``rig_columns``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
+- ``rig``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
 - ``status``: stages and status of a command; ``effort``: threads or a cluster; ``whole``: the study
 """

@@ -5,7 +5,7 @@ the study's pick to that, on these surfaces, is what the compromise costs at the
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from types import MappingProxyType
 from typing import Any
 
@@ -130,9 +130,8 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
         for end, confirmed in both.items()
         if isinstance(confirmed.result, DutyResult)
     }
-    life = lives(
-        study, {end: point.point for end, point in both.items()}, {end: point.hot for end, point in both.items()}
-    )
+    hot = {end: point.hot for end, point in both.items()}
+    life = lives(study, {end: point.point for end, point in both.items()}, hot)
     return DutyAnswer(points, aggregate, worst, {end: LifeOverDuty.of(figures, names) for end, figures in life.items()})
 
 
@@ -172,7 +171,7 @@ def study_at(study: Problem, name: str) -> Problem:
             changes |= {"goal": "none", "target": None}
         responses.append(response.model_copy(update=changes))
     front = study.file.front.model_copy(update={"tolerance_aware": "none"})
-    return replace(study, file=study.file.model_copy(update={"response": responses, "duty": [], "front": front}))
+    return study.with_file(response=responses, duty=[], front=front)
 
 
 @one_thread
@@ -187,8 +186,7 @@ def own_pick(study: Problem, runs: Runs, pick: Array) -> OwnPick:
         raise out_of_reach(study, front.points[0], front.violations)
     point = study.rounded_within(front.points[front.pick])
     values = predict_all(study.surfaces, study.coded(point)[None])[0]
-    from_pick = study.file.model_copy(update={"baseline": study.by_factor(pick)})
-    over_pick = predicted_gains(replace(study, file=from_pick), point)
+    over_pick = predicted_gains(study.with_file(baseline=study.by_factor(pick)), point)
     responses = dict(zip(study.responses, values.tolist(), strict=True))
     return OwnPick(study.by_factor(point), responses, front.pick_reason, {gain.response: gain for gain in over_pick})
 

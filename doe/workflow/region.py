@@ -10,7 +10,6 @@ itself: it takes more than at the centre, and may close altogether.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -356,7 +355,7 @@ def _moved(study: Problem, short: Mapping[str, Taken], kept: float) -> Problem:
             continue
         factors[place] = factor.model_copy(update={"centre": centre, "step": step})
     refuse(faults)
-    moved = replace(study, file=study.file.model_copy(update={"factor": factors}))
+    moved = study.with_file(factor=factors)
     try:
         for point in (moved.actual(np.full(len(factors), sign * reach)) for sign in (-1.0, 1.0)):
             _scenes(moved, point, kind=DrawnScene)
@@ -434,4 +433,4 @@ def _with_baseline(
                 f"Seizure: {words} of the original design in operation {left}{heats}; gains are over the middle of the region instead.",
             )
         )
-    return replace(moved, file=moved.file.model_copy(update={"baseline": baseline})), notes
+    return moved.with_file(baseline=baseline), notes

@@ -1,23 +1,28 @@
-"""Measurements on a rig: a CSV table with a row for each operating condition."""
+"""Measurements on a rig: a CSV table with a row for each operating condition, and its columns as ``doe keys`` lists them.
+
+Further columns are named by keys of the scene, such as operation.inner_speed_rpm.
+"""
 
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, create_model
 
 from doe.study_file.table import gap_notes
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError, refuse
+from rbdyn.base.faults import InputError, Strict, refuse
 from rbdyn.base.notes import Notes
 from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
-from rbdyn.base.words import counted
-from rbdyn.dynamics.figures import FIGURES
+from rbdyn.base.words import counted, quantity
+from rbdyn.dynamics.figures import FIGURES, Figure
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene.key_columns import key_values, unknown_keys
+from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.
 # Of each output the accuracy of its sensor in percent, where a table states none.
@@ -220,3 +225,46 @@ def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> Row:
     values = {name: value for name in outputs if (value := cells.number(name, place)) is not None}
     sds = {name: cells.number(name + SD, place) for name in values}
     return Row(place + 1, keys, values, sds, cells.number(TURNS, place), cells.text(HOLD, place).lower() in YES)
+
+
+Positive = Annotated[float, Field(gt=0.0)]
+Percent = Annotated[float, Field(ge=0.0, le=100.0)]
+
+
+class SceneTables(Strict):
+    """Tables of a scene for doe uncertainty and doe calibrate; all other tables are described by rbdyn keys."""
+
+    uncertain: Uncertain | None = None
+    """Unknown inputs of the scene, with laws or documented ranges: doe uncertainty varies them, doe calibrate estimates them."""
+    calibrate: Calibrate | None = None
+    """Settings of doe calibrate, which estimates the unknown inputs; no run depends on them."""
+
+
+class Rows(Strict):
+    """Columns of RIG.csv next to those named by keys of the scene and by outputs.
+
+    Of each output NAME_sd is the scatter of the single row, and NAME_accuracy_percent the offset that all rows share."""
+
+    turns: Positive | None = None
+    """Shaft turns of the measurement: its scatter is that of a run as long, where no standard deviation is stated."""
+    hold: Literal["1", "yes", "true", "0", "no", "false"] | None = None
+    """Whether the row is held out of the calibration to test it: 1 for a row that is held out, else 0."""
+
+
+def _columns(figure: Figure) -> dict[str, Any]:
+    """The measured output, its scatter and the accuracy of its sensor."""
+    words, heat = quantity(figure.key)[0], figure.kind == "temperature"
+    offset = f"standard deviation of one offset of all rows, {figure.accuracy:g} unless stated"
+    texts = {
+        "": f"Measured {figure.meaning}{', of a scene with [thermal]' if heat else ''}.",
+        "_sd": f"Standard deviation of the measured {words}; {'turns do not replace it' if heat else 'or give turns'}.",
+        "_accuracy_percent": f"Accuracy of the sensor of the {words}: {offset}.",
+    }
+    return {
+        figure.key + end: ((Percent if "percent" in end else Positive) | None, Field(None, description=text))
+        for end, text in texts.items()
+    }
+
+
+_OUTPUTS = {name: column for figure in FIGURES if figure.accuracy for name, column in _columns(figure).items()}
+RigTable = create_model("RigTable", __base__=Rows, __module__=__name__, **_OUTPUTS)

@@ -14,7 +14,7 @@ from doe.commands.keys import files as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
 from doe.workflow import rig
-from doe.workflow.rig_columns import RigTable
+from doe.workflow.rig import RigTable
 from rbdyn.base.words import label, quantity
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.plots.ball import label as axis_label

@@ -58,8 +58,7 @@ def figure(folder: Path) -> dict[str, bool]:
     run("map", SCENE, *SHORT, *speeds, "--out", folder / "map")
     from doe.clearance import responses_of
     from doe.commands.new import limits_of
-    from doe.workflow.rig import ACCURACIES
-    from doe.workflow.rig_columns import RigTable
+    from doe.workflow.rig import ACCURACIES, RigTable
     from doe.workflow.uncertainty import OUTPUTS
     from rbdyn.dynamics.duty_simulation import WORST
     from rbdyn.plots.roller import PANELS
