@@ -127,16 +127,16 @@ class Duty:
         scatter widely. Ratios are those to the first design.
         """
         shape = (*smooth.shape[:2], len(self.shares), len(self.rules))
-        whole = [array.reshape(shape) for array in (*outputs, smooth)]
+        tables = [array.reshape(shape) for array in (*outputs, smooth)]
         names = list(self.shares)
         places = [names.index(group[0]) for group in self.groups]
         columns = [
-            self._response(rule, *(array[:, :, places, figure] for array in whole))
+            self._response(rule, *(array[:, :, places, figure] for array in tables))
             for figure, rule in enumerate(self.rules.values())
         ]
         figures = list(self.rules)
         columns += [
-            tuple(array[:, :, names.index(point), figures.index(figure)] for array in whole[:3])
+            tuple(array[:, :, names.index(point), figures.index(figure)] for array in tables[:3])
             for point, figure in self.limits
         ]
         values, errors, degrees = (np.stack(arrays, axis=-1) for arrays in zip(*columns, strict=True))
@@ -202,9 +202,9 @@ def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene 
     columns = [scenes(overrides) for overrides in duty.overrides.values()]
     runs = list[Run | str]()
     for row in zip(*columns, strict=True):
-        whole = {name: scene for name, scene in zip(duty.shares, row, strict=True) if isinstance(scene, Scene)}
-        faults = [f"at {name}: {one}" for name, one in zip(duty.shares, row, strict=True) if isinstance(one, str)]
-        runs.append(faults[0] if faults else DutyScenes(duty, whole))
+        possible = {name: scene for name, scene in zip(duty.shares, row, strict=True) if isinstance(scene, Scene)}
+        faults = [f"at {name}: {fault}" for name, fault in zip(duty.shares, row, strict=True) if isinstance(fault, str)]
+        runs.append(faults[0] if faults else DutyScenes(duty, possible))
     return runs
 
 

@@ -137,7 +137,7 @@ def fit_emulators(
     good = runs.rows(runs.good)
     variances = _pooled(good, good.points) / good.replicates[:, None]
     responses = good.values.shape[1]
-    starts = [None] * responses if previous is None else [one.hyperparameters for one in previous.by_response]
+    starts = [None] * responses if previous is None else [emulator.hyperparameters for emulator in previous.by_response]
     choices = [(), shares] if any(shares) else [()]
     by_response, shares_by_response = [], []
     for values, variance, start in zip(good.values.T, variances.T, starts, strict=True):

@@ -100,9 +100,9 @@ def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callabl
     """
 
     def run(*stated: Any, **named: Any) -> None:
-        given = run.__signature__.bind(*stated, **named)  # type: ignore[attr-defined]
-        given.apply_defaults()
-        values = given.arguments
+        bound = run.__signature__.bind(*stated, **named)  # type: ignore[attr-defined]
+        bound.apply_defaults()
+        values = bound.arguments
         as_json, as_csv, *levels = (values.pop(key, False) for key in ("as_json", "as_csv", "quiet", "verbose"))
         if kept and values["out"] is None:
             values["out"] = Path(f"{values['path'].stem}_{kept}")

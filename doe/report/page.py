@@ -72,8 +72,8 @@ def window_title(summary: Summary) -> str:
 def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[Section]:
     """Sections with something to say."""
     chapters = [chapter(summary, motion) for chapter in CHAPTERS]
-    whole = [replace(section, blocks=readable(section.blocks, summary.asked)) for section in chapters if section]
-    return [section for section in whole if section.blocks]
+    filled = [replace(section, blocks=readable(section.blocks, summary.asked)) for section in chapters if section]
+    return [section for section in filled if section.blocks]
 
 
 def text(name: str) -> str:

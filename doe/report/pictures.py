@@ -51,8 +51,8 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
         notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in response.bounds)]
         axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
         axis.tick_params(labelsize=8)
-        for one in (axis.xaxis, axis.yaxis, axis.zaxis):
-            one.set_major_locator(MaxNLocator(4))
+        for side in (axis.xaxis, axis.yaxis, axis.zaxis):
+            side.set_major_locator(MaxNLocator(4))
         axis.view_init(elev=24, azim=-128)
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)

@@ -107,8 +107,8 @@ def _figure(stills: Sequence[Still], columns: int) -> Any:
         near, upper, right, lower = still.frame
         corner = (column * first.width + near) / wide, ((rows - row) * first.height - lower) / high
         axis = figure.add_axes((*corner, (right - near) / wide, (lower - upper) / high))
-        for one in (axis.xaxis, axis.yaxis):
-            one.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        for side in (axis.xaxis, axis.yaxis):
+            side.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         still.draw(axis)
     return figure
 

@@ -185,7 +185,7 @@ def main_effects(quantiles: Array, values: Array) -> Array:
     The share that chance would have in so few runs is subtracted; quantiles (n, d).
     """
     runs, outputs = len(quantiles), _unit(values)
-    variances = np.array([((_base(one).T @ outputs) ** 2).sum(axis=0) for one in quantiles.T])
+    variances = np.array([((_base(column).T @ outputs) ** 2).sum(axis=0) for column in quantiles.T])
     chance = TERMS / max(runs - 1, TERMS + 1)
     return ((variances - chance) / (1.0 - chance)).clip(0.0)
 

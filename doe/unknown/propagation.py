@@ -293,7 +293,9 @@ def _effects(joint: Joint, function: Function, points: int, seed: int) -> Array:
     # Variance explained by no input and by all of them.
     explained = {bytes(count): 0.0, bytes([1] * count): whole}
     effects = np.zeros(count)
-    for order in (order for _ in range(ORDERS) for one in (random.permutation(count),) for order in (one, one[::-1])):
+    for order in (
+        order for _ in range(ORDERS) for drawn in (random.permutation(count),) for order in (drawn, drawn[::-1])
+    ):
         subset, before = np.zeros(count, dtype=bool), 0.0
         for place in order:
             subset[place] = True

@@ -84,7 +84,7 @@ class Confirmed:
         result = self.result
         results = result.points if isinstance(result, DutyResult) else {EVERYWHERE: result}
         return {
-            name: simulated_scene(one) for name, one in results.items() if one is not None and one.thermal is not None
+            name: simulated_scene(run) for name, run in results.items() if run is not None and run.thermal is not None
         }
 
     @property

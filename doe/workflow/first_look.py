@@ -27,11 +27,11 @@ Outcome = SimulationResult | DutyResult | Failure
 
 def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
     """Figures of the original at each point of the duty, and the limits that it misses."""
-    whole = zip(study.responses, baseline.values.tolist(), baseline.error.tolist(), strict=True)
+    responses = zip(study.responses, baseline.values.tolist(), baseline.error.tolist(), strict=True)
     figures: Mapping[str, Mapping[str, tuple[float, float | None]]] = {
-        f" at {point}": {name: (one.value, one.stated_error) for name, one in at_point.items()}
+        f" at {point}": {name: (figure.value, figure.stated_error) for name, figure in at_point.items()}
         for point, at_point in baseline.at_points.items()
-    } or {"": {name: (value, error) for name, value, error in whole}}
+    } or {"": {name: (value, error) for name, value, error in responses}}
     sentences = [
         f"original design{point}: {', '.join(_figure(name, *figure) for name, figure in row.items())}"
         for point, row in figures.items()

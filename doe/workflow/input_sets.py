@@ -426,7 +426,7 @@ def run(
     """
     values = unknown.table_of(laws_of(inputs), quantiles)
     seed = case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds
-    runs = over_points(case.duty, lambda one: case.scenes(inputs, values, seed, [*overrides, *one], set_overrides))
+    runs = over_points(case.duty, lambda sets: case.scenes(inputs, values, seed, [*overrides, *sets], set_overrides))
     impossible = tuple(run for run in runs if isinstance(run, str))
     check_holes(len(impossible), len(runs), (), impossible)
     results = outcomes(runs, [f"{title} {place + 1}" for place in range(len(runs))], simulations, title)

@@ -71,7 +71,9 @@ def demands_of(
         simulated and {name for name, gain in gains(study, *simulated).items() if gain.percent > gain.error_percent},
     )
     least = {name: settings.at_least.get(name, settings.keep * by_name[name]) for name in names if name in counted}
-    return tuple(Demand(one.name, one.goal, by_name[one.name], least.get(one.name)) for one in responses)
+    return tuple(
+        Demand(response.name, response.goal, by_name[response.name], least.get(response.name)) for response in responses
+    )
 
 
 def _counted(settings: Tolerances, percent: Mapping[str, float], real: Collection[str] | None) -> Collection[str]:
@@ -200,9 +202,9 @@ class PickTolerances:
         if not self.any_width:
             return self.widest.sentence
         counted = [
-            f"{one.words} {shown(one.least, 2)} of {shown(one.percent, 2)} %"
-            for one in self.demands
-            if one.least is not None
+            f"{demand.words} {shown(demand.least, 2)} of {shown(demand.percent, 2)} %"
+            for demand in self.demands
+            if demand.least is not None
         ]
         kept = f"Gains that parts keep at least: {', '.join(counted)}." if counted else ""
         return " ".join(filter(None, [self.widest.sentence, kept, *self._rule_sentences(bool(counted))]))
@@ -210,12 +212,12 @@ class PickTolerances:
     def _rule_sentences(self, counted: bool) -> list[str]:
         """The gains that do not count with the reason, and where their responses lie among the parts."""
         settings = self.settings
-        free = [one for one in self.demands if one.least is None]
-        gains = ", ".join(f"{one.words} {improvement(one.percent, None, one.goal)}" for one in free)
+        free = [demand for demand in self.demands if demand.least is None]
+        gains = ", ".join(f"{demand.words} {improvement(demand.percent, None, demand.goal)}" for demand in free)
         smallest = f"{ENOUGH:g} times the smallest difference that matters, {settings.smallest_difference_percent:g} %"
         if settings.gains is not None or settings.at_least:
             sentences = [f"[tolerances] does not name {gains}."] if free else []
-        elif any(one.percent >= ENOUGH * settings.smallest_difference_percent for one in self.demands):
+        elif any(demand.percent >= ENOUGH * settings.smallest_difference_percent for demand in self.demands):
             verb = "does" if len(free) == 1 else "do"
             sentences = [f"A gain counts from {smallest}; {gains} {verb} not."] if free else []
         else:
@@ -227,7 +229,7 @@ class PickTolerances:
 
     def _spread(self, names: Collection[str]) -> str:
         """'power loss 0.90 % more to 1.20 % less' of responses whose gains do not count."""
-        goals = {one.response: one.goal for one in self.demands}
+        goals = {demand.response: demand.goal for demand in self.demands}
         texts = []
         for name in names:
             low, high = (improvement(end, None, goals[name]) for end in self.free[name])
@@ -317,15 +319,13 @@ def _none(widest: WidestTolerances) -> WidestTolerances:
 
 def _impossible(demands: Sequence[Demand]) -> str:
     """The first gain that the pick itself does not have, in a sentence; empty if it has them all."""
-    for one in demands:
-        if one.least is not None and one.percent <= 0.0:
+    for demand in demands:
+        if demand.least is not None and demand.percent <= 0.0:
+            return f"No tolerance is possible: the pick has no gain in {demand.words} to keep; leave it out of [tolerances]."
+        if demand.least is not None and demand.least > demand.percent:
             return (
-                f"No tolerance is possible: the pick has no gain in {one.words} to keep; leave it out of [tolerances]."
-            )
-        if one.least is not None and one.least > one.percent:
-            return (
-                f"No tolerance is possible: at_least.{one.response} = {one.least:g} exceeds the predicted gain of "
-                f"{shown(one.percent, 3)} %; state less."
+                f"No tolerance is possible: at_least.{demand.response} = {demand.least:g} exceeds the predicted gain of "
+                f"{shown(demand.percent, 3)} %; state less."
             )
     return ""
 
@@ -410,10 +410,10 @@ class _PickParts:
 
     def _widest(self, demands: Sequence[Demand], draws: Draws | None) -> WidestTolerances:
         study, settings, free = self.study, self.settings, self.free_factors
-        least = np.array([-np.inf if one.least is None else one.least for one in demands]) * np.maximum(
+        least = np.array([-np.inf if demand.least is None else demand.least for demand in demands]) * np.maximum(
             self.unit, 1e-300
         )
-        share = np.array([one.least is not None and one.response not in settings.at_least for one in demands])
+        share = np.array([demand.least is not None and demand.response not in settings.at_least for demand in demands])
         least[share] = settings.keep * self.gain[share]
         slack = 1e-9 * np.abs(self.gain).max()
         no_violations = np.zeros((1, len(self.goals.limited)))
@@ -438,7 +438,7 @@ class _PickParts:
 
     def _promise(self, demands: Sequence[Demand]) -> str:
         """What parts keep, in words."""
-        counted = any(one.least is not None for one in demands)
+        counted = any(demand.least is not None for demand in demands)
         kept = [*["the gains that count"] * counted, *["all limits"] * bool(self.goals.limited)]
         return f"keep {' and '.join(kept)}"
 
@@ -457,9 +457,9 @@ class _PickParts:
         costs = self._costs(self.point[self.free_factors] + half * offsets)
         ends = np.quantile(self._reference - costs[:, : len(demands)], MIDDLE, axis=0) / np.maximum(self.unit, 1e-300)
         return {
-            one.response: (float(low), float(high))
-            for one, low, high in zip(demands, *ends, strict=True)
-            if one.least is None
+            demand.response: (float(low), float(high))
+            for demand, low, high in zip(demands, *ends, strict=True)
+            if demand.least is None
         }
 
 

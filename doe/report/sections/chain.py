@@ -77,8 +77,8 @@ def _parts_table(name: str, chain: ChainResult) -> Table:
     """Sizes for the drawing: stated ones as they are written, allocated ones at its resolution."""
     title = f"Dimension chain {label(name)}"
     if chain.refused:
-        given = all(size.origin == "stated" for size in chain.drawn_sizes.values())
-        title += f": {'the stated sizes' if given else 'even the narrowest tolerances'} miss the limits"
+        stated = all(size.origin == "stated" for size in chain.drawn_sizes.values())
+        title += f": {'the stated sizes' if stated else 'even the narrowest tolerances'} miss the limits"
     elif chain.status == "ok":
         title += ": the stated sizes meet the limits"
     return _sizes_table(title, name, chain.drawn_sizes, estimates_note(chain.drawn_sizes))

@@ -64,7 +64,7 @@ def _points(asked: Asked, result: StudyDesign) -> Table:
         RUN,
         KIND,
         *([BLOCK] if len({run.block for run in runs}) > 1 else []),
-        *(Column(each.name, partial(each.text, further=2), at=("factors", each.name)) for each in asked.factors),
+        *(Column(factor.name, partial(factor.text, further=2), at=("factors", factor.name)) for factor in asked.factors),
         *Column[StudyRun](
             "{}", at=("responses", "{}", "value"), error=("responses", "{}", "error"), missing="failed"
         ).of(asked.names),

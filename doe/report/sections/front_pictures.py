@@ -153,7 +153,7 @@ def _simulated(point: ConfirmedPoint, one: str, two: str) -> tuple[Point, tuple[
 
 def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:
     """What ``front.js`` needs to find a point: kind, place and ends of every axis, and the frame."""
-    rows = [[one.kind, one.place, *one.ends] for one in axes]
+    rows = [[axis.kind, axis.place, *axis.ends] for axis in axes]
     return json.dumps({"kind": kind, "axes": rows, "frame": still.frame}, separators=(",", ":"))
 
 

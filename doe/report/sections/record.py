@@ -54,7 +54,7 @@ def nearest(asked: Asked, place: Mapping[str, float], candidates: Mapping[str, M
     """
 
     def distance(name: str) -> float:
-        steps = [abs(candidates[name][each.name] - place[each.name]) / each.step for each in asked.factors]
+        steps = [abs(candidates[name][factor.name] - place[factor.name]) / factor.step for factor in asked.factors]
         return math.hypot(*steps)
 
     return min(candidates, key=distance)
@@ -68,7 +68,9 @@ def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]
     names = [] if asked is None else [*asked.columns, *asked.names]
     # The longest first, for a name may begin with another.
     words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
-    ratios = {label(each.name): each.label for each in (asked.responses if asked else ()) if each.is_ratio}
+    ratios = {
+        label(response.name): response.label for response in (asked.responses if asked else ()) if response.is_ratio
+    }
     return [_without_unit(_spelt(block, words), ratios) for block in blocks if has_content(block)]
 
 
