@@ -27,6 +27,11 @@ def path_given(argument: Any, name: str) -> Path:
         raise InputError([f"{name} = {shown}: must be the path of a file or a folder; check the call"]) from None
 
 
+def optional_path(argument: Any, name: str) -> Path | None:
+    """The same of an argument that may be left out; None where it is."""
+    return None if argument is None else path_given(argument, name)
+
+
 def texts_given(argument: Any, name: str, example: str) -> list[str]:
     """The argument ``name`` of a call as a list of texts; None is an empty one. Raises InputError for anything else."""
     if argument is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import path_given, registered, saved, step_folder, texts_given
+from doe.library.effort import optional_path, path_given, registered, saved, step_folder, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Paragraph, with_notes
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
@@ -79,7 +79,7 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     from doe.workflow.region import region_that_runs
     from doe.workflow.whole import check_study
 
-    path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
+    path, folder = path_given(path, "path"), optional_path(out, "out")
     with step_folder(folder, "design", ("design",), force) as output:
         study = Problem.load(path)
         # Without a scene the runs are made elsewhere, and only the design itself is checked.
@@ -155,10 +155,7 @@ def fit(
     from doe.response_surface.statistics import fits_of
     from doe.workflow.surfaces import unrivalled, with_rivals
 
-    table, folder = (
-        None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
-    )
-    study_path = None if path is None else path_given(path, "path")
+    table, folder, study_path = optional_path(data, "data"), optional_path(out, "out"), optional_path(path, "path")
     with step_folder(folder, "fit", ("anova", "coefficients", "runs"), force) as output, ExitStack() as stack:
         study, notes = _study_or_table(study_path, table, factors, responses, model)
         output.claim(study.path, *_read_later(study, table))
@@ -303,9 +300,7 @@ def front(
     from doe.workflow.surfaces import extrapolation_notes
 
     path = path_given(path, "path")
-    table, folder = (
-        None if given is None else path_given(given, name) for given, name in ((data, "data"), (out, "out"))
-    )
+    table, folder = optional_path(data, "data"), optional_path(out, "out")
     with step_folder(folder, "front", ("front",), force) as output, registered(path, folder):
         study = Problem.load(path)
         check_goals(study)
@@ -417,7 +412,7 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
     from doe.report.sections.chain import chains_record, part_sheet, share_sheet
     from rbdyn.base.identity import identity_of
 
-    path, folder = path_given(path, "path"), None if out is None else path_given(out, "out")
+    path, folder = path_given(path, "path"), optional_path(out, "out")
     with step_folder(folder, "chain", ("part_dimensions", "contributions"), force) as output:
         several = is_several(path)
         chains = read_chains(path)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import path_given, registered, texts_given
+from doe.library.effort import optional_path, path_given, registered, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
@@ -91,7 +91,7 @@ def uncertainty(
     from rbdyn.dynamics.target import target_of, valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')
-    folder = Path(f"{path.stem}_uncertainty") if out is None else path_given(out, "out")
+    folder = optional_path(out, "out") or Path(f"{path.stem}_uncertainty")
     effort = Effort(workers, scheduler, retry, progress, notice)
     outputs = texts_given(figures, "figures", '["outer_max_pressure_MPa"]')
     refuse(_points_faults(points))
@@ -191,10 +191,8 @@ def calibrate(
     from doe.workflow.status import content_digest
 
     path, table = path_given(path, "path"), path_given(data, "data")
-    folder = Path(f"{path.stem}_calibration") if out is None else path_given(out, "out")
-    free, assignments = (
-        texts_given(given, name, '["cage.mass_g"]') for given, name in ((free, "free"), (overrides, "overrides"))
-    )
+    folder, example = optional_path(out, "out") or Path(f"{path.stem}_calibration"), '["cage.mass_g"]'
+    free, assignments = texts_given(free, "free", example), texts_given(overrides, "overrides", example)
     effort = Effort(workers, scheduler, retry, progress, notice)
     with output_folder(folder, "doe", FILES, force=force) as output, registered(path, folder):
         question = read_question(path, table, free, assignments)

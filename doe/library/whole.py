@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import path_given, registered
+from doe.library.effort import optional_path, path_given, registered
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Section
 from rbdyn.base.folder import output_folder
@@ -174,7 +174,7 @@ def study(
     from doe.workflow.status import finished_record, inputs_digest
 
     path = path_given(path, "path")
-    folder = Path(f"{path.stem}_results") if out is None else path_given(out, "out")
+    folder = optional_path(out, "out") or Path(f"{path.stem}_results")
     effort = Effort(workers, scheduler, retry, progress, notice)
     with output_folder(folder, "doe", STUDY_FILES, force=force) as output, registered(path, folder):
         loaded = Problem.load(path)
