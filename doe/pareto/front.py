@@ -39,24 +39,31 @@ from doe.pareto.search import (
 )
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 
 SELECTIONS = 300  # draws on which the rule picks anew, so many that their error is below that of the gain
+
+
+class Dominance(Record):
+    """Probability that the pick dominates the baseline, with the Monte Carlo error of its draws."""
+
+    probability: float
+    standard_error: float
+    draws: int
 
 
 @dataclass(frozen=True, eq=False)
 class FrontUncertainty:
     """Uncertainty of a front.
 
-    ``non_dominated`` (f,): probability that no other front point dominates a point. ``pick_dominates``: probability that the
-    pick dominates the baseline, with its Monte Carlo standard error. ``optimism`` (q,): excess of the predicted gain of each
+    ``non_dominated`` (f,): probability that no other front point dominates a point. ``pick_dominates`` the
+    baseline with a probability. ``optimism`` (q,): excess of the predicted gain of each
     cost, because the rule prefers points with favourable errors.
     """
 
     non_dominated: Array
-    pick_dominates: float
-    pick_dominates_error: float
+    pick_dominates: Dominance
     optimism: Array
-    draws: int
 
 
 def draw_coefficients(
@@ -108,8 +115,8 @@ def front_uncertainty(
     wins, error = share(dominates(costs[:, pick], base))
     real = goals.costs(original) - goals.costs(values)
     optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
-    sure = float(wins), float(error)
-    return FrontUncertainty(non_dominated_share(costs), *sure, optimism, len(responses))
+    dominance = Dominance(float(wins), float(error), len(responses))
+    return FrontUncertainty(non_dominated_share(costs), dominance, optimism)
 
 
 def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:

@@ -31,6 +31,7 @@ from doe.pareto.goals import NAMES, Goals, Rule, thinning
 from doe.pareto.search import Archive, Barred, Doubt, Judged, barring, check_search, dominates, hypervolume, search
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
+from rbdyn.base.records import Record
 
 EXACT_FACTORS = (
     4  # number of factors up to which every face of a box is searched; beyond, corners and lines along factors
@@ -250,16 +251,28 @@ class ToleranceBox:
         return np.stack([surface.around(points, offset) for surface in surfaces], axis=-1)
 
 
+class Survival(Record):
+    """Shares of the parts that still dominate the nominal baseline, at the pick without tolerances and at that with them.
+
+    ``standard_error``: of as many random parts, an upper bound for even ones. Intervals have the errors of the surfaces, None until
+    they are drawn; ``open_errors``: the errors that they hold and leave out.
+    """
+
+    plain_pick: float | None
+    pick: float | None
+    standard_error: float | None
+    plain_pick_interval: Interval | None
+    pick_interval: Interval | None
+    open_errors: str
+
+
 @dataclass(frozen=True, eq=False)
 class ToleranceAware:
     """Front of robust costs.
 
     ``points`` (f, k) are coded, ``costs`` (f, q) robust, ``values`` (f, m) nominal responses, ``picks`` rows.
     ``baseline_costs`` (q,): robust costs of the baseline. ``nominal_loss_percent``: loss of hypervolume by the nominal values
-    compared with the plain front; ``robust_gain_percent``: gain of hypervolume by the robust costs. ``plain_survives``,
-    ``pick_survives``: share of the parts at the plain pick and at this front's pick that dominate the nominal baseline.
-    ``survival_error``: standard error of as many random parts, an upper bound for even ones. ``plain_interval``,
-    ``pick_interval``: of these shares with the errors of the surfaces, None until they are drawn. Unless ``plain_inside``,
+    compared with the plain front; ``robust_gain_percent``: gain of hypervolume by the robust costs. Unless ``plain_inside``,
     the box of the plain pick exceeds the region and its figures extrapolate.
     """
 
@@ -276,11 +289,7 @@ class ToleranceAware:
     robust_gain_percent: float
     plain_pick_costs: Array
     plain_inside: bool
-    plain_survives: float
-    pick_survives: float
-    survival_error: float
-    plain_interval: Interval | None = None
-    pick_interval: Interval | None = None
+    survival: Survival
 
 
 def tolerance_aware_front(
@@ -332,6 +341,7 @@ def tolerance_aware_front(
     candidates = np.vstack([plain.points[plain_pick], points[rows[picks[pick]]]])
     part_costs = goals.costs(box.parts(surfaces, candidates, SURVIVAL_PARTS))
     survives = np.mean(dominates(part_costs, nominal_baseline), axis=1).tolist()
+    error = max(error_of_share(share, SURVIVAL_PARTS) for share in survives)
     return ToleranceAware(
         box=box,
         points=points[rows],
@@ -346,9 +356,7 @@ def tolerance_aware_front(
         robust_gain_percent=100.0 * (gaining[0] / gaining[1] - 1.0) if gaining[1] > 0.0 else np.inf,
         plain_pick_costs=judge(plain.points[[plain_pick]]).costs[0],
         plain_inside=bool(np.take(inside, plain_pick)),
-        plain_survives=survives[0],
-        pick_survives=survives[1],
-        survival_error=max(error_of_share(share, SURVIVAL_PARTS) for share in survives),
+        survival=Survival(survives[0], survives[1], error, None, None, ""),
     )
 
 

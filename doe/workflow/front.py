@@ -107,7 +107,10 @@ def with_survival(study: Problem, pareto: ParetoFront, confirmed: Mapping[str, C
         survival(study, draws, point, aware.box)
         for point in (study.coded(pareto.points[pareto.pick]), aware.points[aware.pick])
     )
-    return replace(pareto, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
+    shares = replace(
+        aware.survival, plain_pick_interval=plain, pick_interval=pick, open_errors=open_errors(study.surfaces)
+    )
+    return replace(pareto, tolerance_aware=replace(aware, survival=shares))
 
 
 def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int) -> AnyFront:

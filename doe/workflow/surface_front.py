@@ -6,10 +6,11 @@ from typing import Self
 import numpy as np
 
 from doe.pareto import ParetoFront
-from doe.pareto.manufacture import ToleranceAware
+from doe.pareto.front import Dominance
+from doe.pareto.manufacture import Survival, ToleranceAware
 from doe.pareto.search import REFERENCE, dominates
 from doe.workflow.confirmation import point_words
-from doe.workflow.front import SurfaceDoubt, open_errors
+from doe.workflow.front import SurfaceDoubt
 from doe.workflow.pick import place_of
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import PredictedGain, half_widths, predict_all, predicted_gains, statement
@@ -88,14 +89,6 @@ class RobustPick(RobustPoint):
         return {**self.factors, **self.responses}
 
 
-class Dominance(Record):
-    """Probability that the pick dominates the baseline, with the Monte Carlo error of its draws."""
-
-    probability: float
-    standard_error: float
-    draws: int
-
-
 class SurfaceLimit(Record):
     """A limit at a point: what the surfaces say there, and the probability of keeping it, found and demanded."""
 
@@ -107,17 +100,6 @@ class SurfaceLimit(Record):
     kept: bool
     probability: float
     demanded_probability: float
-
-
-class Survival(Record):
-    """Shares of the parts that still dominate the baseline, at the pick without tolerances and at that with them."""
-
-    plain_pick: float | None
-    pick: float | None
-    standard_error: float | None
-    plain_pick_interval: list[float] | None
-    pick_interval: list[float] | None
-    open_errors: str
 
 
 class ToleranceFront(Record, kw_only=True):
@@ -168,14 +150,7 @@ class ToleranceFront(Record, kw_only=True):
             nominal_loss_percent=aware.nominal_loss_percent,
             robust_gain_percent=finite(aware.robust_gain_percent),
             pick_gains_percent={gain.response: gain.percent for gain in predicted_gains(study, points[aware.pick])},
-            survival=Survival(
-                plain_pick=aware.plain_survives,
-                pick=aware.pick_survives,
-                standard_error=aware.survival_error,
-                plain_pick_interval=None if aware.plain_interval is None else list(aware.plain_interval),
-                pick_interval=None if aware.pick_interval is None else list(aware.pick_interval),
-                open_errors=open_errors(study.surfaces),
-            ),
+            survival=aware.survival,
         )
 
 
@@ -266,7 +241,7 @@ class SurfaceFront(Record, kw_only=True):
             ),
             picks=picks if with_tolerances is None else picks | {"tolerance_aware": with_tolerances.pick},
             baseline=EstimatedPoint.predicted(study, study.baseline),
-            pick_dominates_baseline=Dominance(sure.pick_dominates, sure.pick_dominates_error, sure.draws),
+            pick_dominates_baseline=sure.pick_dominates,
             predicted_gains={
                 gain.response: replace(gain, selection_optimism_percent=100.0 * excess / abs(gain.baseline))
                 for gain, excess in zip(gains, sure.optimism.tolist(), strict=True)

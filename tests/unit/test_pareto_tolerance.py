@@ -134,7 +134,7 @@ def test_worst_case_front_of_two_bowls_is_known():
         [(np.abs(x) + half) ** 2 + (middle + half) ** 2, (np.abs(1 - x) + half) ** 2 + 8 * (middle + half) ** 2]
     )
     assert found.costs == pytest.approx(exact, abs=1e-12)
-    assert found.pick_survives == 1.0 and "at the ends of their tolerances" in found.pick_reason
+    assert found.survival.pick == 1.0 and "at the ends of their tolerances" in found.pick_reason
     assert found.costs[found.pick] == pytest.approx(exact[found.pick])
 
 
@@ -146,8 +146,8 @@ def test_no_tolerance_costs_nothing():
 
 def test_wide_tolerances_cost_and_parts_fail():
     found = robust(ToleranceBox(np.full(2, 0.6), "quantile"))
-    assert found.plain_survives < 0.9
-    assert found.pick_survives >= found.plain_survives - 3 * found.survival_error
+    assert found.survival.plain_pick < 0.9
+    assert found.survival.pick >= found.survival.plain_pick - 3 * found.survival.standard_error
     assert (found.points + 0.6 <= 2.0 + 1e-12).all() and (found.points - 0.6 >= -2.0 - 1e-12).all()
 
 

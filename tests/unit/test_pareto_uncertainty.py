@@ -128,7 +128,7 @@ def test_probability_of_dominance_of_two_independent_gains():
         baseline=np.ones((20000, 2)),
         original=np.ones(2),
     )
-    assert sure.pick_dominates == pytest.approx(0.8413**2, abs=4 * sure.pick_dominates_error)
+    assert sure.pick_dominates.probability == pytest.approx(0.8413**2, abs=4 * sure.pick_dominates.standard_error)
     assert sure.non_dominated.tolist() == [1.0]
 
 
@@ -178,5 +178,5 @@ def test_front_of_the_published_table_knows_its_errors(table):
     coded = study.coded(found.points)
     errors = np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces])
     assert half_widths(surfaces, coded) == pytest.approx(errors * [2.2010, 2.5706, 2.5706], rel=1e-4)
-    assert 0.3 < sure.pick_dominates < 0.95
+    assert 0.3 < sure.pick_dominates.probability < 0.95
     assert 0.0 < sure.non_dominated.min() < sure.non_dominated.max() <= 1.0
