@@ -20,14 +20,14 @@ CANDIDATES, MOST_PAIRS = 4, 1024
 EXPLAINED = 0.5
 
 
-class FrontPoint(Record):
+class GainPoint(Record):
     """A predicted point of the robust front: its factors, and the mean or quantile of each gain over the inputs."""
 
     factors: dict[str, float]
     gains: dict[str, float]
 
 
-class RobustPoint(Record):
+class ConfirmedGain(Record):
     """A design simulated over the unknown inputs, the reason for its choice, its gains as above, and how likely it gains."""
 
     name: str
@@ -43,8 +43,8 @@ class RobustFront(Record):
     ``q2``: predictivity of the emulator of each gain. ``note``: why there is no front; empty if there is one.
     """
 
-    points: list[FrontPoint]
-    confirmed: list[RobustPoint]
+    points: list[GainPoint]
+    confirmed: list[ConfirmedGain]
     q2: dict[str, float]
     note: str = ""
 

@@ -35,7 +35,7 @@ from doe.workflow.input_sets import (
     strongest_inputs,
     work_of_set,
 )
-from doe.workflow.judgement import Decider, Decision, FrontPoint, Pair, Robust, RobustFront, RobustPoint, worded
+from doe.workflow.judgement import ConfirmedGain, Decider, Decision, GainPoint, Pair, Robust, RobustFront, worded
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import refuse, set_key
@@ -164,16 +164,16 @@ def find_robust_front(
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
     fresh_pairs, new_failures = simulate_designs(case, case.every, quantiles, designs, simulations)
-    confirmed = list[RobustPoint]()
+    confirmed = list[ConfirmedGain]()
     for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
         gains, variances = fresh_pairs.gains(goals, number)
         gained = dict(zip(names, _over_inputs(shrunk(gains, variances), share).tolist(), strict=True))
         odds_of_gains = gain_chances(names, gains, variances, case.uncertain.seed)
-        confirmed.append(RobustPoint(name, reason, study.by_factor(point), gained, odds_of_gains))
+        confirmed.append(ConfirmedGain(name, reason, study.by_factor(point), gained, odds_of_gains))
     # The baseline and the pick ran before at the sets that are the study's own.
     spent += CONFIRMED * (len(candidates) - 1) + 2 * int((rows >= settings.points).sum())
     predicted = [
-        FrontPoint(study.by_factor(point), dict(zip(names, gains, strict=False)))
+        GainPoint(study.by_factor(point), dict(zip(names, gains, strict=False)))
         for point, gains in zip(robust_front.points, robust_front.values.tolist(), strict=True)
     ]
     return RobustFront(predicted, confirmed, q2), spent, (*sets.failures, *new_failures)

@@ -28,7 +28,7 @@ from doe.report.summary import Summary
 from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
 from doe.workflow.confirmation import Gain
-from doe.workflow.judgement import Robust, RobustFront, RobustPoint
+from doe.workflow.judgement import ConfirmedGain, Robust, RobustFront
 from doe.workflow.pick import BeyondBound, Outward
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
@@ -358,7 +358,7 @@ def test_the_odds_of_the_gains_follow_these():
     )
     better = dict.fromkeys(names, Share(0.8, 0.7, 0.9))
     odds, factors = GainChances(better, Share(0.57, 0.51, 0.63)), dict.fromkeys(FACTORS, 0.1)
-    front = RobustFront([], [RobustPoint("robust knee", "", factors, dict.fromkeys(names, 0.031), odds)], {})
+    front = RobustFront([], [ConfirmedGain("robust knee", "", factors, dict.fromkeys(names, 0.031), odds)], {})
     robust = Robust(
         chances=odds, undecided=None, pair=None, halved=0.6, front=front, explained=dict.fromkeys(names, 0.9), inputs=[],
         screened={}, pairs=128, runs=256, doubtful=0, sentences=[sentence],

@@ -10,9 +10,7 @@ from doe.report.sections.search import in_few_runs
 from doe.report.still import Still
 from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint
-from doe.workflow.judgement import FrontPoint as GainPoint
-from doe.workflow.judgement import RobustFront
-from doe.workflow.judgement import RobustPoint as ConfirmedGain
+from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
 from doe.workflow.settings import Asked
 from doe.workflow.surface_front import (
     WITHOUT,
