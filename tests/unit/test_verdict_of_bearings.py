@@ -1,0 +1,33 @@
+"""Verdict on cages of bearings by their histories: known answers of the example at 24 000 rpm."""
+
+import numpy as np
+import pytest
+
+from rbdyn.dynamics.motion import History, history
+from rbdyn.verdict.orbits import Orbit, Thresholds, orbit_class, orbit_measures
+
+EXAMPLE = "examples/cylindrical_roller.toml"
+
+
+def measured(motion: History, play: float) -> Orbit:
+    """Orbit of the cage at 64 samples of each whole cage turn."""
+    angle = motion.cage_angle - motion.cage_angle[0]
+    even = np.arange(64 * int(angle[-1] / (2 * np.pi))) * (2 * np.pi / 64)
+    return orbit_measures(np.interp(even, angle, motion.cage_x) + 1j * np.interp(even, angle, motion.cage_y), play)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "offset", "rate", "name"),
+    [
+        ([], (0.86, 0.88), None, "held"),
+        (["cage.imbalance_um=100"], (0.78, 0.80), (0.99, 1.01), "held"),
+        (["operation.radial_load_N=0"], (0, 0.05), (0.435, 0.505), "circling"),
+    ],
+)
+def test_the_cage_of_the_example_has_its_known_class(overrides, offset, rate, name):
+    """A load holds it, with an imbalance too; without a load its film turns it at half its speed."""
+    motion = history(EXAMPLE, turns=40, samples_per_turn=64, overrides=overrides)
+    orbit = measured(motion, play=motion.scene.cage.guide_clearance_mm * 0.5e-3)
+    assert offset[0] < orbit.offset < offset[1]
+    assert rate is None or rate[0] < orbit.rate < rate[1]
+    assert orbit_class(orbit, Thresholds()) == name
