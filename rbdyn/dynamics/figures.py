@@ -17,7 +17,15 @@ from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
-from rbdyn.losses import LAND_FRICTION, POCKET_DAMPING, POCKET_FRICTION, POWER_TERMS, SHAFT
+from rbdyn.losses import (
+    LAND_FRICTION,
+    POCKET_DAMPING,
+    POCKET_FORCE,
+    POCKET_FRICTION,
+    POCKET_SQUEEZE,
+    POWER_TERMS,
+    SHAFT,
+)
 from rbdyn.result import TEMPERATURES
 
 if TYPE_CHECKING:
@@ -220,13 +228,22 @@ DAMAGE = (
         needs="the guide land or model.land_friction",
     ),
     Figure(
+        "pocket_force_mean_N",
+        "force on a pocket, mean over time and pockets; with films that on its more loaded wall",
+        timed(partial(_work, POCKET_FORCE)),
+        lambda scene: None if scene.model.pocket == "off" else 1.0 / scene.bearing.rollers,
+        kind="damage",
+        words="mean force on a pocket [N]",
+        needs="pockets",
+    ),
+    Figure(
         "pocket_impact_power_W",
-        "power that impacts lose in all dry pockets",
-        timed(partial(_work, POCKET_DAMPING)),
-        lambda scene: None if scene.model.pocket == "off" or scene.model.pocket_film else 1.0,
+        "power that impacts lose in all pockets: by damping of the walls and by squeezing films",
+        timed(lambda run: run.work[:, POCKET_DAMPING] + run.work[:, POCKET_SQUEEZE]),
+        lambda scene: None if scene.model.pocket == "off" else 1.0,
         kind="damage",
         words="power that impacts lose in all pockets [W]",
-        needs="dry pockets, for model.pocket is off or model.pocket_film on",
+        needs="pockets",
     ),
     Figure(
         "impact_return_force_N",

@@ -99,7 +99,7 @@ def loss() -> dict[str, bool]:
         "power": POWER_TERMS[-1] == "grease_churning",
         "heat": shares(Effusivities(1.0, 1.0, 1.0), "outer", 0.5)[row].tolist() == [1.0, 0.0, 0.0, 0.0],
         "balance": TERMS_OF_POWERS[row].tolist()
-        == [float(term == "grease_churning") for term in [*POWER_TERMS, *"..."]],
+        == [float(term == "grease_churning") for term in [*POWER_TERMS, *"....."]],
         "responses": "grease_churning_power_W" in responses_of(heats=False),
     }
 

@@ -187,7 +187,7 @@ def test_invariant_pocket_wrench(name, motion):
     limits = (abs(offset) - HALF, abs(offset) - HALF + FLOOR, abs(height) - LIPPED.half_clearance)
     assume(min(map(abs, limits)) > 1e-8)
     (_, ex, ey, dx, dy, vx, vy, spin, cage), found = wrench(pocket, motion)
-    fx, fy, on_roller, on_cage, load, friction, damping, film, on_wall = found
+    fx, fy, on_roller, on_cage, load, friction, damping, film, on_wall, squeeze = found
     size = abs(fx) + abs(fy)
     assert dx * fy - dy * fx + on_roller + on_cage == pytest.approx(0.0, abs=1e-13 * size + 1e-18)
     # The pocket turns: the energy's rate by a difference along the motion.
@@ -203,6 +203,8 @@ def test_invariant_pocket_wrench(name, motion):
     tolerance = 1e-6 * (abs(stored) + damping + friction) + 1e-5 * size + 1e-9
     assert lost == pytest.approx(friction + damping + film + stored, rel=1e-5, abs=tolerance)
     assert min(load, friction, damping, film) >= 0.0
+    # Opening gives back no more than the film's rolling loses.
+    assert squeeze <= film * (1.0 + 1e-4) + 1e-9
     assert abs(on_wall) == load if "wet" not in name else abs(on_wall) >= load
 
 
@@ -280,7 +282,7 @@ def test_unit_lips_hold_radially():
     lipped = LippedPocket(plain, 21.75e-3, 30e-6, RADIUS, CONTACT, NoDamping(), NoTraction())
     for height in (0.0, 29e-6, -29e-6):
         motion = (0.3, 1e-5, height, 0.0, 0.0, 100.0, 900.0)
-        assert wrench(lipped, motion)[1] == wrench(plain, motion)[1] == (0.0,) * 9
+        assert wrench(lipped, motion)[1] == wrench(plain, motion)[1] == (0.0,) * 10
     for height in (33e-6, -33e-6):
         _, found = wrench(lipped, (0.3, 0.0, height, 0.0, 0.0, 0.0, 0.0))
         expected = -math.copysign(CONTACT.stiffness * 3e-6 ** (10.0 / 9.0), height)

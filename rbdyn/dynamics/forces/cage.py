@@ -57,7 +57,8 @@ class PocketWrench(NamedTuple):
     """What a pocket does to its roller: force [N]; moments on the roller and on the cage about its centre [N m].
 
     Then the contact load [N], the powers lost [W], and ``on_wall``: force of contact and film on the more loaded wall [N],
-    negative on the rear one. The force on the cage is the opposite.
+    negative on the rear one. ``squeeze``: power of the films' push by closing [W], part of ``film``. The force on the cage is the
+    opposite.
     """
 
     x: float
@@ -69,6 +70,7 @@ class PocketWrench(NamedTuple):
     damping: float
     film: float
     on_wall: float
+    squeeze: float
 
 
 @kernel
@@ -117,7 +119,7 @@ def pocket_contact(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_s
 
 @pocket_contact.body(NoPocket)
 def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
-    return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pocket_contact.body(Pocket)
@@ -131,7 +133,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
     offset = dy * ex - dx * ey
     approach = abs(offset) - clearance_of(pocket, radius)
     if approach <= 0.0:
-        return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     wall = math.copysign(1.0, offset)
     height = dx * ex + dy * ey
     approach_rate = wall * (dvy * ex - dvx * ey - cage_speed * height)
@@ -154,6 +156,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
         (load - elastic) * approach_rate,
         0.0,
         wall * load,
+        0.0,
     )
 
 
@@ -174,7 +177,7 @@ def film_on_wall(film, wall, half_clearance, radius, offset, height, across, alo
     normal = -wall * push
     # The pressure on the wall acts off the contact point, so that the film as a whole has no moment.
     cage_moment = -height * normal + offset * tangential + lever * shear
-    return PocketWrench(tangential, normal, -lever * shear, cage_moment, 0.0, 0.0, 0.0, power, -normal)
+    return PocketWrench(tangential, normal, -lever * shear, cage_moment, 0.0, 0.0, 0.0, power, -normal, push * closing)
 
 
 @pocket_contact.body(LubricatedPocket)
@@ -197,6 +200,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
         dry.damping,
         front.film + rear.film,
         on_front if on_front >= on_rear else -on_rear,
+        front.squeeze + rear.squeeze,
     )
 
 
@@ -227,6 +231,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
         walls.damping + (load - elastic) * approach_rate,
         walls.film,
         walls.on_wall if abs(walls.on_wall) >= load else math.copysign(load, offset),
+        walls.squeeze,
     )
 
 

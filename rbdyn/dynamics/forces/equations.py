@@ -45,7 +45,9 @@ from rbdyn.losses import (
     OUTER_TRACTION,
     POCKET_DAMPING,
     POCKET_FILM,
+    POCKET_FORCE,
     POCKET_FRICTION,
+    POCKET_SQUEEZE,
     RACE_DAMPING,
     ROLLING,
     SHAFT,
@@ -148,7 +150,10 @@ def roller_gap(bearing, y, cage, j):
 
 
 class OnCage(NamedTuple):
-    """What the rollers do to the cage: force [N] and moment [N m]; powers lost [W]; largest loads of a wall [N]."""
+    """What the rollers do to the cage: force [N] and moment [N m]; powers lost [W]; largest loads of a wall [N].
+
+    Then the sum of the forces on all walls [N], and the squeeze power of their films [W].
+    """
 
     x: float
     y: float
@@ -158,6 +163,8 @@ class OnCage(NamedTuple):
     film: float
     load: float
     contact_load: float
+    force: float
+    squeeze: float
 
 
 @kernel
@@ -179,7 +186,7 @@ def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
     """Add the forces of the pocket walls to row ``row`` of ``dy``, which still holds forces and moments on the rollers."""
     z = roller_count(bearing)
     fx = fy = moment = friction = damping = film = 0.0
-    load = contact_load = 0.0
+    load = contact_load = force = squeeze = 0.0
     for i in range(touching):
         j = scratch.touching[i]
         wall = roller_pocket(bearing, y, cage, j)
@@ -194,7 +201,9 @@ def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
         friction += wall.friction
         damping += wall.damping
         film += wall.film
-    return OnCage(fx, fy, moment, friction, damping, film, load, contact_load)
+        force += abs(wall.on_wall)
+        squeeze += wall.squeeze
+    return OnCage(fx, fy, moment, friction, damping, film, load, contact_load, force, squeeze)
 
 
 @kernel
@@ -274,6 +283,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
     power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
     power[row, INNER_ROLLING] = on_inner.rolling
+    power[row, POCKET_FORCE] = pockets.force
+    power[row, POCKET_SQUEEZE] = pockets.squeeze
     loads[row, state.POCKET_LOAD] = pockets.load
     loads[row, state.OUTER_LOAD] = on_outer.load
     loads[row, state.INNER_LOAD] = on_inner.load
