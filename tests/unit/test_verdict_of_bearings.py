@@ -31,3 +31,15 @@ def test_the_cage_of_the_example_has_its_known_class(overrides, offset, rate, na
     assert offset[0] < orbit.offset < offset[1]
     assert rate is None or rate[0] < orbit.rate < rate[1]
     assert orbit_class(orbit, Thresholds()) == name
+
+
+@pytest.mark.parametrize(
+    ("friction", "rate", "name"), [(0.1, 0.92, "circling"), (0.2, 1.95, "fast whirl"), (0.3, 3.74, "fast whirl")]
+)
+def test_friction_of_pockets_turns_a_cage_on_its_rollers_to_fast_whirl(friction, rate, name):
+    """The known instability of cages by friction: between 0.1 and 0.2 the whirl outruns the cage."""
+    overrides = ["cage.guidance=roller", "bearing.radial_clearance_mm=-0.01", "operation.radial_load_N=0"]
+    motion = history(EXAMPLE, 80, samples_per_turn=128, overrides=[*overrides, f"model.pocket_friction={friction}"])
+    orbit = measured(motion, play=motion.scene.cage.pocket_clearance_mm * 0.5e-3)
+    assert orbit.rate == pytest.approx(rate, rel=0.1)
+    assert orbit_class(orbit, Thresholds()) == name
