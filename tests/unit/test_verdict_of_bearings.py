@@ -43,3 +43,14 @@ def test_friction_of_pockets_turns_a_cage_on_its_rollers_to_fast_whirl(friction,
     orbit = measured(motion, play=motion.scene.cage.pocket_clearance_mm * 0.5e-3)
     assert orbit.rate == pytest.approx(rate, rel=0.1)
     assert orbit_class(orbit, Thresholds()) == name
+
+
+def test_a_cage_that_a_rotating_load_drives_circles_at_its_order():
+    """Its rate of 2.57 would be fast whirl, were the order of the shaft not known."""
+    overrides = ["operation.radial_load_N=0", "operation.rotating_load_N=1300", "model.land_friction=0.3"]
+    motion = history(EXAMPLE, turns=60, samples_per_turn=128, overrides=[*overrides, "model.guide_land=dry"])
+    orbit = measured(motion, play=motion.scene.cage.guide_clearance_mm * 0.5e-3)
+    shaft_order = np.ptp(motion.inner_angle) / np.ptp(motion.cage_angle)
+    assert orbit.rate == pytest.approx(2.57, rel=0.01)
+    assert orbit_class(orbit, Thresholds(), (1, shaft_order)) == "circling"
+    assert orbit_class(orbit, Thresholds()) == "fast whirl"
