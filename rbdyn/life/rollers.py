@@ -368,3 +368,61 @@ def seat_heat(seat: float) -> float:
 def _heat_of_seat(seat: float) -> float:
     """Heat flow [W] through a seat [mm^2]."""
     return HEAT_FLOW * seat * max(seat / LARGE_SEAT, 1.0) ** LARGE_SEAT_EXPONENT
+
+
+class Stiffness(NamedTuple):
+    """Stiffness of a row of rollers under a static radial load, means over a pitch of its rollers.
+
+    ``along``, ``across`` the load [N/m]; ``compliance``: how far the shaft's centre moves over a pitch along and across the load [m].
+    """
+
+    along: float
+    across: float
+    compliance: tuple[float, float]
+
+
+def static_stiffness(
+    contacts: RollerContacts, rollers: int, load: float, clearance: float, centrifugal: float = 0.0, places: int = 64
+) -> Stiffness:
+    """dF/dx of the static loads of ISO/TS 16281, mean over ``places`` of the rollers within a pitch; arguments as ``static_loads``.
+
+    The terms that couple both directions have the mean 0 by symmetry. Raises MethodError where no balance is found.
+    """
+    matrices, centres = [], []
+    for place in (np.arange(places) + 0.5) / places:
+        angle = 2.0 * math.pi * (np.arange(rollers) + place) / rollers
+        centre, matrix = _balanced(contacts, np.stack((np.cos(angle), np.sin(angle))), load, clearance, centrifugal)
+        centres.append(centre)
+        matrices.append(matrix)
+    mean, moved = np.mean(matrices, axis=0), np.ptp(centres, axis=0)
+    return Stiffness(float(mean[0, 0]), float(mean[1, 1]), (float(moved[0]), float(moved[1])))
+
+
+def _balanced(
+    contacts: RollerContacts, normals: Array, load: float, clearance: float, centrifugal: float
+) -> tuple[Array, Array]:
+    """Centre of the inner ring (2,) [m] that bears the load along x, and dF/dx there (2, 2) [N/m]: Newton, shortened steps."""
+    most = max(float(np.max(relief)) for relief in contacts.relief)
+    lamina = contacts.stiffness / contacts.relief[0].shape[1]
+    target = np.array([load, 0.0])
+
+    def response(centre: Array) -> tuple[Array, Array, float]:
+        races = _race_loads(contacts, centre @ normals - 0.5 * clearance, centrifugal)
+        inner, outer = ((LINE_EXPONENT * lamina**0.9 * loads**0.1).sum(axis=1) for loads in races)
+        # Contacts in series; a roller without load inside bears nothing of a displacement.
+        series = np.divide(inner * outer, inner + outer, out=np.zeros(inner.shape), where=inner > 0.0)
+        roller_loads = races[0].sum(axis=1)
+        return target - normals @ roller_loads, (normals * series) @ normals.T, float(roller_loads.sum())
+
+    reach = max(clearance, 0.0) / math.cos(math.pi / normals.shape[1])
+    centre = np.array([0.5 * reach + 2.0 * (most + (load / contacts.stiffness) ** (1.0 / LINE_EXPONENT)), 0.0])
+    for _ in range(BALANCE_STEPS):
+        missing, matrix, carried = response(centre)
+        # Under a preload the loads of the rollers cancel, and their own errors remain.
+        if np.linalg.norm(missing) <= 10.0 * BALANCE_ERROR * max(load, carried):
+            return centre, matrix
+        step = np.linalg.lstsq(matrix, missing, rcond=1e-12)[0]
+        while np.linalg.norm(step) > 0.0 and np.linalg.norm(response(centre + step)[0]) >= np.linalg.norm(missing):
+            step = 0.5 * step
+        centre = centre + step
+    raise MethodError(f"no static balance was found for a load of {load:g} N; give a load or an interference")
