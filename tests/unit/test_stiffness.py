@@ -21,7 +21,7 @@ def contacts(slices=1):
     ],
 )  # fmt: skip
 def test_literature_nu_209(load, clearance, along, across):
-    """NU 209, computed apart from this code; few places in a pitch explain the deviation across the load."""
+    """NU 209, computed apart from this code: within 2 % along the load, 8 % across it; four times the places move it by 1.3 %."""
     stiffness = static_stiffness(contacts(), 15, load, clearance * 1e-6)
     assert stiffness.along * 1e-6 == pytest.approx(along, rel=0.02)
     assert stiffness.across * 1e-6 == pytest.approx(across, rel=0.08, abs=2.5)
