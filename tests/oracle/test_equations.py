@@ -43,6 +43,8 @@ FILM = {
     "cage spin rate": 1e-3,
     "pocket_film": 5e-3,
     "wall": 5e-5,
+    "pocket_force": 5e-5,
+    "pocket_squeeze": 5e-5,
 }
 # The polynomials of a film that a layer feeds are within 1e-5 of the flooded one; its layer within the round-off of static loads.
 LAYER = {
@@ -239,7 +241,7 @@ def fed(scene):
 
 def test_unit_twin_names_the_powers():
     """Unit: the twin's own list of powers is that of the equations."""
-    assert (*POWER_TERMS, "shaft", "load", "inner_rolling") == tuple(POWERS)
+    assert (*POWER_TERMS, "shaft", "load", "inner_rolling", "pocket_force", "pocket_squeeze") == tuple(POWERS)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

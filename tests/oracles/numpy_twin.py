@@ -37,7 +37,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(300)
 NAMES = (
     "outer_race_traction", "inner_race_traction", "rolling_resistance", "race_damping", "pocket_friction",
     "pocket_damping", "pocket_film", "land_film", "land_friction", "land_damping", "roller_drag", "support_damping",
-    "shaft", "load", "inner_rolling",
+    "shaft", "load", "inner_rolling", "pocket_force", "pocket_squeeze",
 )  # fmt: skip
 POWERS = {name: index for index, name in enumerate(NAMES)}
 
@@ -183,7 +183,7 @@ def touch(scene, roller, cage, point, to_wall, along, approach):
 
 
 def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
-    """Rigid cylinder on a plane in isoviscous oil, seen from axes that turn with the plane. Returns (push, power lost)."""
+    """Rigid cylinder on a plane in isoviscous oil, seen from axes that turn with the plane. Returns (push, powers lost, by closing)."""
     laws = scene.model
     radius = 0.5e-3 * scene.bearing.roller_diameter_mm
     h = max(gap, laws.pocket_film_floor_um * 1e-6)
@@ -215,26 +215,26 @@ def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
     cage.force, cage.moment = cage.force + film.force, cage.moment + film.moment
     force, moment = roller.force - before[0], roller.moment - before[1]
     lost = -float(force @ roller.velocity - force @ cage.velocity)
-    return push, lost - moment * roller.spin - film.moment * cage.spin
+    return push, lost - moment * roller.spin - film.moment * cage.spin, push * closing
 
 
 def pocket(scene, roller, cage, radius, mid_line):
-    """One pocket: walls, films, lips. Returns (force on a wall, contact load, powers in friction, damping, film)."""
+    """One pocket: walls, films, lips. Returns (force on a wall, contact load, powers in friction, damping, film, squeeze)."""
     if scene.model.pocket == "off":
-        return np.zeros(5)
+        return np.zeros(6)
     # Pocket and lips are cut for the nominal roller.
     larger = radius - 0.5e-3 * scene.bearing.roller_diameter_mm
-    half, laws, result = 0.5 * scene.pocket_clearance_m - larger, scene.model, np.zeros(5)
+    half, laws, result = 0.5 * scene.pocket_clearance_m - larger, scene.model, np.zeros(6)
     floor = laws.pocket_film_floor_um * 1e-6 if laws.pocket_film else 0.0
     for to_wall in (turned(mid_line), -turned(mid_line)):
         gap = half - float((roller.centre - cage.centre) @ to_wall)
         point = roller.centre + radius * to_wall
         load, friction, damping = touch(scene, roller, cage, point, to_wall, mid_line, floor - gap)
-        push, film = 0.0, 0.0
+        push, film, squeeze = 0.0, 0.0, 0.0
         if laws.pocket_film:
-            push, film = film_on_wall(scene, roller, cage, point, to_wall, mid_line, gap)
+            push, film, squeeze = film_on_wall(scene, roller, cage, point, to_wall, mid_line, gap)
         on_wall, contact = max(result[0], load + push), max(result[1], load)
-        result = np.array((on_wall, contact, *np.add(result[2:], (friction, damping, film))))
+        result = np.array((on_wall, contact, *np.add(result[2:], (friction, damping, film, squeeze))))
     if scene.cage.lip_clearance_mm is not None:
         play, orbit = 0.5 * scene.lip_clearance_m - larger, 0.5 * sum(raceways(scene))
         for side in (1.0, -1.0):
@@ -243,7 +243,7 @@ def pocket(scene, roller, cage, radius, mid_line):
             load, friction, damping = touch(
                 scene, roller, cage, point, side * mid_line, turned(mid_line), height - play
             )
-            result = np.array((*np.maximum(result[:2], load), *np.add(result[2:], (friction, damping, 0.0))))
+            result = np.array((*np.maximum(result[:2], load), *np.add(result[2:], (friction, damping, 0.0, 0.0))))
     return result
 
 
@@ -346,7 +346,8 @@ def twin(scene: Scene, y: Any) -> Twin:
         angle = cage.angle + 2.0 * math.pi * j / z
         wall = pocket(scene, roller, cage, radii[j], np.array([math.cos(angle), math.sin(angle)]))
         loads[[0, 4]] = np.maximum(loads[[0, 4]], wall[:2])
-        power[4:7] += wall[2:]
+        power[4:7] += wall[2:5]
+        power[[POWERS["pocket_force"], POWERS["pocket_squeeze"]]] += wall[0], wall[5]
         for term, body, encloses in ((0, outer, True), (1, inner, False)):
             contact = race(scene, mass, body, roller, radii[j], encloses, coefficients[term, j])
             load, slipping, rolling, damping, following[term, j] = contact
