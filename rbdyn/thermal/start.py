@@ -1,0 +1,312 @@
+"""Temperatures of a machine while it warms: nodes with heat capacities, their heat by power laws about simulated moments.
+
+C dT/dt = Q + b - G T. The housing and the shaft, which follow their rings by seats, are two more nodes than ``network`` has, and the
+steady state is that of ``network``. The mechanics settles in milliseconds, so that each power follows the present state:
+
+    P = sum_k w_k P_k (eta/eta_k)^p (n/n_k)^q (F/F_k)^r
+
+over the moments k that were simulated, with viscosity eta of the film, speed n and load F. The weights w_k fall with the fourth
+power of the distance from a moment, and sum to 1. Conductances have the same weights. Nothing here knows a bearing.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
+from rbdyn.thermal.losses import DEGREES, HOTTEST
+from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, source
+
+WARMING_NODES = (*NODES, "housing", "shaft")
+HOUSING, SHAFT = len(NODES), len(NODES) + 1
+# Heat that ISO 15312 lets a seat pass, so that the seat itself conducts more than that: by this factor at least.
+LEAST_SEAT = 2.0
+# Tolerance of LSODA, relative and in kelvins.
+TOLERANCE = 1e-7
+# Rows a factor e of time, and the time from which they are so dense [s].
+ROWS, FIRST = 24.0, 2.0
+# Time constants of the slowest node after which a network at rest is steady: exp(-16) of 100 K are 1e-5 K.
+SETTLED = 16.0
+# Speed and load, over the largest of a course, below which the power laws see no further fall, or logarithms have no end.
+SLOWEST, LIGHTEST = 1e-3, 1e-2
+# Least and largest exponents of viscosity, speed and load.
+LEAST_EXPONENTS, MOST_EXPONENTS = (0.0, 0.0, -1.0), (1.2, 4.0, 3.0)
+# Spread of the exponents about their priors, over that of the logarithm of a power.
+PRIOR_SPREAD = 30.0
+
+# Net heat of the nodes (n,) [W] at a time [s] and temperatures (n,) [C].
+NetHeat = Callable[[float, Array], Array]
+
+
+class Seats(NamedTuple):
+    """Conductances of the seats: outer ring to housing, inner ring to shaft [W/K]."""
+
+    housing: float
+    shaft: float
+
+
+def seat(area: float, gap: float, conductivity: float, roughness: float) -> float:
+    """Conductance of a seat of ``area`` [m^2] [W/K]: k A/(gap + roughness), with the radial ``gap`` [m], 0 for a tight fit.
+
+    ``conductivity`` k of what fills it [W/(m K)]. ``roughness`` [m]: gap that a tight seat keeps.
+    """
+    return conductivity * area / (gap + roughness)
+
+
+def warming_network(conductances: Conductances, seats: Seats, boundaries: Boundaries) -> tuple[Array, Array]:
+    """G (6, 6) [W/K] and b (6,) [W] of ``WARMING_NODES``.
+
+    Housing and shaft lose to the surroundings so much that in series with their seats the rings lose what they do in ``network``.
+    """
+    inside = conductances._replace(outer_ambient=0.0, inner_ambient=0.0)
+    whole, inflow = np.zeros((len(WARMING_NODES),) * 2), np.zeros(len(WARMING_NODES))
+    whole[: len(NODES), : len(NODES)], inflow[: len(NODES)] = matrix(inside), source(inside, boundaries)
+    for ring, part, way_out, between in (
+        (OUTER, HOUSING, conductances.outer_ambient, seats.housing),
+        (INNER, SHAFT, conductances.inner_ambient, seats.shaft),
+    ):
+        between = max(between, LEAST_SEAT * way_out)
+        outside = way_out * between / (between - way_out) if way_out else 0.0
+        whole[ring, ring] += between
+        whole[part, part] += between + outside
+        whole[ring, part] -= between
+        whole[part, ring] -= between
+        inflow[part] += outside * boundaries.ambient
+    return whole, inflow
+
+
+class Course(NamedTuple):
+    """Speed and load over time, linear between ``times`` [s] and constant before and after."""
+
+    times: Array
+    speeds: Array
+    loads: Array
+
+    def at(self, time: float | Array) -> tuple[Array, Array]:
+        """Speed and load at times, without a sign."""
+        return np.asarray(np.interp(time, self.times, self.speeds)), np.asarray(np.interp(time, self.times, self.loads))
+
+    def logarithms(self, time: float | Array) -> Array:
+        """Logarithms of speed and load (..., 2), which a machine at rest or without load keeps finite."""
+        floors = SLOWEST * self.speeds.max(), LIGHTEST * max(self.loads.max(), 1e-9)
+        return np.log(np.stack([np.maximum(x, least) for x, least in zip(self.at(time), floors, strict=True)], axis=-1))
+
+
+class Moment(NamedTuple):
+    """A simulated moment: temperatures (6,) [C], logarithms of speed and load (2,), powers (terms,) [W], its network."""
+
+    temperatures: Array
+    course: Array
+    powers: Array
+    network: tuple[Array, Array]
+
+
+class Law(NamedTuple):
+    """Heat and network between moments (k).
+
+    ``exponents`` (terms, 3): of viscosity, speed and load. ``films`` (terms, 6): weights of the nodes in the temperature of the
+    film of a term. ``shares`` (terms, 6): of the nodes in its heat. ``log_viscosity``: at ``DEGREES``. ``reach``: ``reaches`` of
+    the distances.
+    """
+
+    temperatures: Array
+    courses: Array
+    powers: Array
+    matrices: Array
+    sources: Array
+    exponents: Array
+    films: Array
+    shares: Array
+    log_viscosity: Array
+    reach: tuple[Array, Array]
+
+    def viscosities(self, temperatures: Array) -> Array:
+        """Logarithm of the viscosity in each film (..., terms) at temperatures of the nodes (..., 6)."""
+        return np.asarray(np.interp(temperatures @ self.films.T, DEGREES, self.log_viscosity))
+
+    def distances(self, temperatures: Array, course: Array) -> Array:
+        """Largest distance over its reach from each moment (..., k): of a film, what else the reach has, speed or load."""
+        return np.maximum(*(np.abs(part).max(axis=-1) for part in self._apart(temperatures, course)))
+
+    def weights(self, temperatures: Array, course: Array) -> Array:
+        """Weights of the moments (..., k)."""
+        warmer, other = ((part**2).sum(axis=-1) for part in self._apart(temperatures, course))
+        near = 1.0 / (1e-12 + warmer + other) ** 2
+        return np.asarray(near / near.sum(axis=-1, keepdims=True))
+
+    def _apart(self, temperatures: Array, course: Array) -> tuple[Array, Array]:
+        warmer = (temperatures[..., np.newaxis, :] - self.temperatures) @ self.reach[0].T
+        return warmer, (course[..., np.newaxis, :] - self.courses) / self.reach[1]
+
+    def powers_at(self, temperatures: Array, course: Array, weights: Array) -> Array:
+        """Powers (..., terms) [W]."""
+        changes = self.viscosities(temperatures)[..., np.newaxis, :] - self.viscosities(self.temperatures)
+        growth = changes * self.exponents[:, 0] + (course[..., np.newaxis, :] - self.courses) @ self.exponents[:, 1:].T
+        return np.asarray(np.einsum("...k,...kt->...t", weights, self.powers * np.exp(growth)))
+
+    def heat(self, temperatures: Array, course: Array, running: Array | float = 1.0) -> Array:
+        """Heat of the nodes (..., 6) [W]; ``running``: 0 for a machine at rest, whose power laws end above rest."""
+        powers = self.powers_at(temperatures, course, self.weights(temperatures, course))
+        return np.asarray(np.asarray(running)[..., np.newaxis] * (powers @ self.shares))
+
+    def net_heat(self, course: Course) -> NetHeat:
+        """Heat less what the network carries off, over a course."""
+
+        def net(time: float, temperatures: Array) -> Array:
+            logarithms, running = course.logarithms(time), float(course.at(time)[0] > 0.0)
+            weights = self.weights(temperatures, logarithms)
+            powers = running * self.powers_at(temperatures, logarithms, weights)
+            outflows = np.einsum("...knm,...m->...kn", self.matrices, temperatures) - self.sources
+            heat = np.einsum("...t,...tn->...n", powers, self.shares)
+            return np.asarray(heat - np.einsum("...k,...kn->...n", weights, outflows))
+
+        return net
+
+    def without(self, place: int) -> "Law":
+        """The law without one moment."""
+        fields = ("temperatures", "courses", "powers", "matrices", "sources")
+        return self._replace(**{name: np.delete(getattr(self, name), place, axis=0) for name in fields})
+
+
+def law_of(
+    moments: Sequence[Moment],
+    films: Array,
+    shares: Array,
+    log_viscosity: Array,
+    priors: Array,
+    reach: tuple[Array, Array],
+) -> Law:
+    """The law through moments, with exponents ``fitted`` to them about ``priors`` (terms, 3)."""
+    law = Law(
+        temperatures=np.array([moment.temperatures for moment in moments]),
+        courses=np.array([moment.course for moment in moments]),
+        powers=np.array([moment.powers for moment in moments]),
+        matrices=np.array([moment.network[0] for moment in moments]),
+        sources=np.array([moment.network[1] for moment in moments]),
+        exponents=priors,
+        films=films,
+        shares=shares,
+        log_viscosity=log_viscosity,
+        reach=reach,
+    )
+    return law._replace(exponents=fitted_exponents(law))
+
+
+def fitted_exponents(law: Law) -> Array:
+    """Exponents (terms, 3) of viscosity, speed and load from the moments: least squares about those of the law.
+
+    A term without power at a moment keeps its prior. So does one whose moments do not differ.
+    """
+    exponents = law.exponents.copy()
+    viscosities = law.viscosities(law.temperatures)
+    for term in np.flatnonzero((law.powers > 0.0).all(axis=0)):
+        causes = np.column_stack((viscosities[:, term], law.courses))
+        causes = causes - causes.mean(axis=0)
+        power = np.log(law.powers[:, term])
+        missing = power - power.mean() - causes @ exponents[term]
+        stacked = np.vstack((causes, np.eye(3) / PRIOR_SPREAD))
+        exponents[term] += np.linalg.lstsq(stacked, np.concatenate((missing, np.zeros(3))), rcond=None)[0]
+    return np.asarray(np.clip(exponents, LEAST_EXPONENTS, MOST_EXPONENTS))
+
+
+class Warming(NamedTuple):
+    """Temperatures (rows, ..., nodes) [C] at times (rows,) [s]."""
+
+    times: Array
+    temperatures: Array
+
+    @property
+    def is_hot(self) -> bool:
+        """Whether a temperature passes what any oil bears."""
+        return bool(self.temperatures.max() > HOTTEST)
+
+    def until(self, rows: int) -> "Warming":
+        """The first rows."""
+        return Warming(self.times[:rows], self.temperatures[:rows])
+
+    def until_hot(self) -> "Warming":
+        """The rows up to the first above what any oil bears."""
+        # An event of the solver can fail on the interpolant of LSODA, so the end is cut here.
+        over = np.flatnonzero(self.temperatures.reshape(len(self.times), -1).max(axis=1) > HOTTEST)
+        return self.until(int(over[0]) + 1) if over.size else self
+
+
+def rows_of(end: float, breaks: Sequence[float] = ()) -> Array:
+    """Times of rows [s] from 0 to ``end``: dense at the start and after each of the ``breaks``."""
+    bounds = [0.0, *sorted({time for time in breaks if 0.0 < time < end}), end]
+    parts = [np.zeros(1)]
+    for first, last in pairwise(bounds):
+        count = max(round(ROWS * np.log1p((last - first) / FIRST)), 2)
+        parts.append(first + FIRST * np.expm1(np.linspace(0.0, np.log1p((last - first) / FIRST), count + 1)[1:]))
+        parts[-1][-1] = last
+    return np.concatenate(parts)
+
+
+def warming(
+    capacities: Array,
+    net: NetHeat,
+    start: Array,
+    end: float,
+    breaks: Sequence[float] = (),
+    tolerance: float = TOLERANCE,
+) -> Warming:
+    """Temperatures from ``start`` (..., n) [C] until ``end`` [s]: C dT/dt = net heat, by LSODA.
+
+    ``capacities`` C (..., n) [J/K]; further axes are machines that do not meet. ``breaks``: times [s] at which the net heat has a
+    kink or a step. ``tolerance``: relative, and absolute in kelvins.
+    """
+    from scipy.integrate import solve_ivp
+
+    shape, band = np.shape(start), np.shape(start)[-1] - 1
+    flat = np.array(start, dtype=np.float64).ravel()
+    # Machines that do not meet have a Jacobian of blocks.
+    bands = {"lband": band, "uband": band} if flat.size > band + 1 else {}
+
+    def rise(time: float, nodes: Array) -> Array:
+        return np.asarray(net(time, nodes.reshape(shape)) / capacities).ravel()
+
+    times, found = rows_of(end, breaks), [flat[np.newaxis]]
+    for first, last in pairwise([0.0, *sorted({time for time in breaks if 0.0 < time < end}), end]):
+        rows = times[(times > first) & (times <= last)]
+        part = solve_ivp(
+            rise, (first, last), found[-1][-1], method="LSODA", t_eval=rows, rtol=tolerance, atol=tolerance, **bands
+        )
+        if not part.success:
+            raise MethodError(f"temperatures over time: the integration ends at {part.t[-1]:.3g} s: {part.message}")
+        found.append(part.y.T)
+    return Warming(times, np.concatenate(found).reshape(-1, *shape))
+
+
+def slowest(capacities: Array, whole: Array) -> float:
+    """Time constant of the slowest mode of a network [s]: infinite where a node has no way out."""
+    rates = np.linalg.eigvals(whole / capacities[:, np.newaxis]).real
+    return float(1.0 / rates.min()) if rates.min() > 0.0 else np.inf
+
+
+def settling_time(times: Array, table: Array, steady: Array, within: float) -> float | None:
+    """First time [s] from which all columns of the ``table`` (rows, n) stay ``within`` that of the ``steady`` state (n,); None without."""
+    away = np.flatnonzero(np.abs(table - steady).max(axis=1) > within)
+    if not away.size:
+        return float(times[0])
+    return float(times[away[-1] + 1]) if away[-1] + 1 < len(times) else None
+
+
+def least_of(times: Array, values: Array) -> tuple[float, float, bool]:
+    """Least of a column, its time [s], and whether it is a minimum inside, lower than both ends by more than a millionth.
+
+    A parabola through three rows refines it.
+    """
+    place = int(values.argmin())
+    span = float(values.max() - values.min())
+    inside = min(values[0], values[-1]) - values[place] > 1e-6 * span
+    if not 0 < place < len(values) - 1:
+        return float(values[place]), float(times[place]), bool(inside)
+    near, about = values[place - 1 : place + 2], times[place - 1 : place + 2]
+    curve = np.polyfit(about - about[1], near, 2)
+    if not curve[0] > 0.0:
+        return float(values[place]), float(times[place]), bool(inside)
+    shift = float(np.clip(-0.5 * curve[1] / curve[0], about[0] - about[1], about[2] - about[1]))
+    return float(np.polyval(curve, shift)), float(about[1] + shift), bool(inside)
