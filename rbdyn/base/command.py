@@ -11,6 +11,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -210,8 +211,8 @@ def flag(*names: str, says: str, **more: Any) -> Any:
     return typer.Option(*names, help=says, **more)
 
 
-def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
-    """An option with a value; ``default`` describes the value without the option."""
+def valued(metavar: str, says: str, default: str | bool, *names: str, **more: Any) -> Any:
+    """An option with a value; ``default`` describes the value without the option, True where that is its default."""
     return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
 
 
@@ -305,7 +306,12 @@ def fill_template(template: str, values: Mapping[str, Any]) -> str:
 
 
 def _has_values(line: str, values: Mapping[str, Any]) -> bool:
-    return all(values[name] is not None for _, name, _, _ in string.Formatter().parse(line) if name)
+    """Whether every name in the line has a value; a part of what is None has none."""
+    names = (name.split(".") for _, name, _, _ in string.Formatter().parse(line) if name)
+    return all(
+        reduce(lambda whole, part: getattr(whole, part, None), parts, values[name]) is not None
+        for name, *parts in names
+    )
 
 
 def _fill_line(line: str, values: Mapping[str, Any]) -> str:
@@ -329,24 +335,21 @@ FACTORS = {
 
 
 def plain_number(text: str, unit: str = "", fault: Callable[[float], str | None] = lambda value: None) -> float:
-    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit and for what is no number.
-
-    ``fault``: that of a value; a value that has one is not advised.
+    """A number that is typed, in a ``unit``. Raises MethodError for a decimal comma, a unit, for what is no number, and with the
+    ``fault`` of the value; a value that has one is not advised.
     """
-    try:
-        return float(text)
-    except ValueError:
-        pass
     comma, typed = comma_fault(text, float), TYPED.fullmatch(text)
     factor = 1.0 if typed and typed[2] in (unit, f"\u00b0{unit}") else typed and FACTORS.get((typed[2], unit))
-    if comma:
-        value, advice = float(text.replace(",", ".")), comma
-    elif typed and factor:
+    try:
+        value, advice = float(text.replace(",", ".") if comma else text), comma
+    except ValueError:
+        if not typed or not factor:
+            raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}") from None
         value = factor * float(typed[1].replace(",", "."))
         advice = f"has a unit; write {value:.10g}"
-    else:
-        raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}")
-    raise MethodError(fault(value) or advice)
+    if sentence := fault(value) or advice:
+        raise MethodError(sentence)
+    return value
 
 
 def comma_fault(text: str, reader: Callable[[str], Any]) -> str:

@@ -1,132 +1,30 @@
-"""Options of ``rbdyn new`` as they are typed: numbers with their limits, clearances, choices; every fault is one sentence."""
+"""Options of ``rbdyn new``: one table of what each takes, its help, reader, key and remedy; readers; every fault is one sentence."""
 
 import math
 import re
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any, TypeVar
 
-from rbdyn.base.command import comma_fault, plain_number
+from rbdyn.base.command import comma_fault, plain_number, valued
 from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line
-
-if TYPE_CHECKING:
-    from rbdyn.cli.new_scene import Heat
+from rbdyn.properties.catalogue import CLEARANCE_CLASSES
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.properties.oils import NamedOil, oil_named
+from rbdyn.scene.lubricant import SUPPLIES
 
 Value = TypeVar("Value")
-# Limits of a number that is typed, and its unit.
-LIMITS = {
-    "--speed": (-1e6, 1e6, "rpm"),
-    "--load": (0.0, 1e7, "N"),
-    "--preload": (-1e8, 1e8, "N"),
-    "--temperature": (-60.0, 220.0, "C"),
-    "--oil-flow": (1e-4, 1e3, "L/min"),
-    "--oil-inlet": (-60.0, 220.0, "C"),
-    "--ambient": (-60.0, 220.0, "C"),
-    "--bore": (1.0, 2000.0, "mm"),
-    "--outside": (2.0, 4000.0, "mm"),
-    "--width": (0.5, 1000.0, "mm"),
-    "--pitch": (2.0, 1200.0, "mm"),
-    "--ball": (0.5, 200.0, "mm"),
-    "--contact-angle": (0.0, 85.0, "degrees"),
-}
-COUNTS = {"--rollers": (3, 500), "--balls": (3, 500)}
 ROLLER_DIAMETERS, ROLLER_LENGTHS, CLEARANCES = (1.0, 150.0), (0.5, 400.0), (-0.2, 2.0)
 CONFORMITIES = (0.501, 0.7)
 ROLLER = re.compile(r"\s*([\d.]+)\s*[xX\u00d7*]\s*([\d.]+)\s*(?:mm)?\s*")
-GUIDANCES = ("outer", "inner", "roller")
-# Options that keys of the scene come from.
-OPTIONS_OF_KEYS = {
-    "operation.inner_speed_rpm": "--speed",
-    "operation.radial_load_N": "--load",
-    "operation.preload_N": "--preload",
-    "lubricant.temperature_C": "--temperature",
-    "lubricant.oil_flow_l_min": "--oil-flow",
-    "lubricant.oil_inlet_temperature_C": "--oil-inlet",
-    "thermal.ambient_C": "--ambient",
-    "bearing.radial_clearance_mm": "--clearance",
-    "mounting.inner_interference_um": "--shaft",
-    "mounting.outer_interference_um": "--housing",
-}
-# Estimated clearances that heat and rotation may take away where the bearing is mounted.
-SEIZED_KEYS = ("cage.guide_clearance_mm", "cage.pocket_radial_clearance_mm")
-# Options that an estimated key comes from, with what to say of it.
-ESTIMATED_KEYS = {
-    "model.pocket_bar_stiffness_N_m": (
-        "--rollers",
-        "leaves bars of a cage that are too slender for such rollers; take fewer or shorter ones",
-    ),
-    "cage.side_ring_width_mm": ("--width", "leaves side rings of a cage out of proportion to such rollers; narrow it"),
-}
-# Options of one kind of bearing, whatever names it.
-OF_ROLLERS, OF_BALLS = ("--guidance", "--cage-material", "--lubrication"), ("--preload",)
-# Options that write [thermal].
-HEAT = "--oil-flow", "--oil-inlet", "--ambient"
+POLYAMIDE_NAME = "polyamide"
+TEMPERATURE_C, OIL = 70.0, "ISO VG 68"
 SLOWEST_RPM = 0.1
-# A fault of a key of the scene: source, key, value, what is wrong.
-KEYED = re.compile(r"[^=]*: ([\w.]+) = [^:]*: (.*)")
-
-
-class Typed:
-    """Texts of options by name, None of those left out; reading them gathers ``faults``."""
-
-    def __init__(self, texts: Mapping[str, str | None]) -> None:
-        self.texts, self.faults = texts, list[str]()
-
-    def __getitem__(self, option: str) -> str | None:
-        return self.texts[option]
-
-    def listing(self, *options: str) -> list[str]:
-        """Those of the options that are typed, with their values: "--pitch 60"."""
-        return [self.words(option) for option in options if self.texts[option] is not None]
-
-    def words(self, option: str) -> str:
-        """An option with its value on one line."""
-        return f"{option} {one_line(self.texts[option] or '', LONGEST_NAME)}".strip()
-
-    def note(self, sentence: str) -> None:
-        """Note a fault, once however often it shows."""
-        if sentence not in self.faults:
-            self.faults.append(sentence)
-
-    def fault(self, option: str, sentence: str) -> None:
-        """Note what is wrong with an option."""
-        self.note(f"{self.words(option)}: {sentence}")
-
-    def read(self, option: str, reader: Callable[[str], Value]) -> Value | None:
-        """What a reader makes of an option; None where it is left out, or refused by a MethodError, which is noted."""
-        text = self.texts[option]
-        if text is None:
-            return None
-        try:
-            return reader(text)
-        except MethodError as error:
-            self.fault(option, str(error))
-            return None
-
-    def number(self, option: str) -> float | None:
-        """A number within its limits; None where it is left out or refused."""
-        text = self.texts[option]
-        if text is None:
-            return None
-        try:
-            value = plain_number(text, LIMITS[option][2], lambda value: _range_fault(value, *LIMITS[option]))
-        except MethodError as error:
-            self.fault(option, str(error))
-            return None
-        if (sentence := _range_fault(value, *LIMITS[option])) is None:
-            return value
-        self.note(f"{option} {value:g}: {sentence}")
-        return None
-
-    def read_numbers(self) -> None:
-        """Note what is wrong with any number, also one that nothing reads."""
-        for option in LIMITS:
-            self.number(option)
-        for option in COUNTS:
-            self.count(option)
-
-    def count(self, option: str) -> int | None:
-        """A whole number of rolling elements; None where it is left out or refused."""
-        return self.read(option, lambda text: _whole_number(text, *COUNTS[option]))
+LISTED, OF_OWN = "as listed; of own: estimated", "only with own"
+# Options that write [thermal], and those of one kind of bearing, whatever names it.
+HEAT = "--oil-flow", "--oil-inlet", "--ambient"
+OF_ROLLERS, OF_BALLS = ("--guidance", "--cage-material", "--lubrication"), ("--preload",)
 
 
 def _range_fault(value: float, least: float, largest: float, unit: str) -> str | None:
@@ -140,15 +38,20 @@ def _range_fault(value: float, least: float, largest: float, unit: str) -> str |
     return f"must be from {least:g} to {largest:g} {unit}; {remedy}"
 
 
-def _whole_number(text: str, least: int, largest: int) -> int:
+def number(least: float, largest: float, unit: str) -> Callable[[str], float]:
+    """Reader of a number in a unit, within its limits."""
+    fault = partial(_range_fault, least=least, largest=largest, unit=unit)
+    return lambda text: plain_number(text, unit, fault)
+
+
+def count(text: str, least: int = 3, largest: int = 500) -> int:
+    """A whole number of rolling elements. Raises MethodError."""
+
     def fault(value: float) -> str | None:
         whole = value.is_integer() and least <= value <= largest
         return None if whole else f"must be a whole number from {least} to {largest}; fix it"
 
-    value = plain_number(text, fault=fault)
-    if sentence := fault(value):
-        raise MethodError(sentence)
-    return int(value)
+    return int(plain_number(text, fault=fault))
 
 
 def roller_size(text: str) -> tuple[float, float]:
@@ -170,10 +73,7 @@ def roller_size(text: str) -> tuple[float, float]:
 
 def clearance_of(text: str) -> str | float:
     """A clearance class as the tables name it, or a diametral clearance [mm]. Raises MethodError."""
-    from rbdyn.properties.catalogue import CLEARANCE_CLASSES
-
-    name = text.strip().upper()
-    if name in CLEARANCE_CLASSES:
+    if (name := text.strip().upper()) in CLEARANCE_CLASSES:
         return name
 
     def fault(value: float) -> str | None:
@@ -182,15 +82,12 @@ def clearance_of(text: str) -> str | float:
         return sentence.replace("fix it", um) if sentence and 2.0 < value <= 2000.0 else sentence
 
     try:
-        value = plain_number(text, "mm", fault)
+        return plain_number(text, "mm", fault)
     except MethodError as error:
         if not str(error).startswith("is no number"):
             raise
         classes = ", ".join(CLEARANCE_CLASSES)
         raise MethodError(f"is no clearance class; choose one of {classes}, or write millimetres, as 0.02") from None
-    if sentence := fault(value):
-        raise MethodError(sentence)
-    return value
 
 
 def conformity_of(text: str) -> tuple[float, float]:
@@ -199,93 +96,212 @@ def conformity_of(text: str) -> tuple[float, float]:
     words = f"must be groove radius over ball diameter, from {least} to {largest}; write 0.52, or 0.515/0.525 for inner and outer"
     parts = text.split("/")
     factors = [plain_number(part, fault=lambda value: None if least <= value <= largest else words) for part in parts]
-    if len(factors) > 2 or not all(least <= factor <= largest for factor in factors):
+    if len(factors) > 2:
         raise MethodError(words)
     return factors[0], factors[-1]
 
 
-def supply_of(typed: Typed) -> str:
-    """How the bearing gets its oil, as typed or as the oil says; what contradicts the oil is noted."""
-    from rbdyn.properties.oils import oil_named
-    from rbdyn.scene.lubricant import SUPPLIES
+def choice(refusal: str, *names: str) -> Callable[[str], str]:
+    """Reader of one of the names, however it is written."""
 
-    oil, text = typed.read("--oil", oil_named), typed["--lubrication"]
-    usual = "grease" if oil is not None and oil.grease else "bath" if typed["--oil-flow"] is None else "jet"
-    if text is None:
-        return usual
-    supply, name = text.strip().lower().replace("-", "_"), typed.words("--oil")
-    if supply not in SUPPLIES:
-        typed.fault("--lubrication", f"is no lubrication known here; choose one of {', '.join(SUPPLIES)}")
-    elif oil is not None and oil.grease and supply != "grease":
-        typed.fault("--lubrication", f"contradicts the grease of {name}; leave one out")
-    elif oil is not None and supply == "grease" and not oil.grease:
-        typed.fault("--lubrication", f'{name} is no grease; write --oil "grease VG 100" with its base oil')
-    return supply
+    def read(text: str) -> str:
+        name = text.strip().lower()
+        if (name := name.replace("-", "_")) not in names:
+            raise MethodError(f"{refusal}; choose one of {', '.join(names)}")
+        return name
+
+    return read
 
 
-def heat_of(typed: Typed) -> "Heat | None":
-    """The heat balance that the options ask for, its contradictions noted; None without one of them."""
-    from rbdyn.cli.new_scene import Heat
-
-    if not typed.listing(*HEAT):
-        return None
-    heat = Heat(*(typed.number(option) for option in HEAT))
-    flow, inlet = typed["--oil-flow"], typed["--oil-inlet"]
-    if flow is None and inlet is not None:
-        typed.fault("--oil-inlet", "has no effect without a flow; add --oil-flow in L/min, as 0.4, or leave it out")
-    if flow is not None and inlet is None:
-        typed.fault("--oil-flow", "needs the temperature at which the oil flows in; add --oil-inlet in C, as 60")
-    if typed["--temperature"] is not None:
-        typed.fault("--temperature", f"{' '.join(typed.listing(*HEAT))} computes the temperatures; leave it out")
-    supply = supply_of(typed)
-    if flow is not None and supply == "grease":
-        typed.fault("--oil-flow", "contradicts a grease, which does not flow; leave one out")
-    if flow is None and supply == "jet":
-        typed.fault("--lubrication", "with --ambient it needs --oil-flow in L/min and --oil-inlet in C; add them")
-    return heat
+MILLIMETRES, CELSIUS = partial(number, unit="mm"), number(-60.0, 220.0, "C")
+guidance_of = choice("guides no cage", "outer", "inner", "roller")
+cage_material_of = choice("is no material known here", *MATERIALS, POLYAMIDE_NAME)
+supply_of = choice("is no lubrication known here", *SUPPLIES)
 
 
-def kind_faults(typed: Typed, rollers: bool) -> None:
-    """Note options that this kind of bearing has no use for, and a shaft that stands still or an oil that contradicts its supply."""
-    alien: tuple[str, ...] = OF_BALLS if rollers else OF_ROLLERS
-    kind = "ball" if rollers else "cylindrical roller"
-    if typed.listing(*HEAT):
-        alien = tuple(option for option in alien if option != "--lubrication")
-    for words in typed.listing(*alien):
-        typed.note(f"{words}: is one of {kind} bearings; leave it out")
-    speed = typed.number("--speed")
-    if rollers and speed is not None and abs(speed) < SLOWEST_RPM:
-        typed.note(f"--speed {speed:g}: a run is counted in shaft turns; give at least {SLOWEST_RPM:g}")
-    if rollers:
-        supply_of(typed)
+def option(
+    metavar: str, says: str, default: str | bool, reader: Callable[[str], Any] = str, key: str = "", **more: str
+) -> Any:
+    """Entry of the table: metavar, help, the value without the option, what reads its text, and the key of the scene that takes it.
+
+    ``remedy``: what to write where it is missing. ``preset``: its text where it is left out.
+    """
+    return field(default=None, metadata={"option": valued(metavar, says, default), "reader": reader, "key": key} | more)
 
 
-def typed_fault(typed: Typed, fault: str) -> str:
-    """A fault of the scene as one of the option that its key comes from, where that was typed."""
-    match = KEYED.fullmatch(fault)
-    key, sentence = match.groups() if match else ("", "")
-    if key in SEIZED_KEYS and (classes := " ".join(typed.listing("--shaft", "--housing"))):
-        return f"{classes}: {key}: {sentence}; leave the classes out, or widen it in a scene without them and add [mounting]"
-    option, sentence = ESTIMATED_KEYS.get(key, (OPTIONS_OF_KEYS.get(key), sentence))
-    if option == "--clearance" and typed[option] is None:
-        return f"{option}: missing; that of the usual class is {sentence.replace('check its unit', 'write it in mm, as 0.01')}"
-    return fault if option is None or typed[option] is None else f"{typed.words(option)}: {sentence}"
+@dataclass
+class Options:
+    """What the texts of options say: None of what is left out, or refused by a sentence in ``faults``. ``texts``: by option, "--pitch"."""
+
+    texts: Mapping[str, str | None]
+    # fmt: off
+    rollers: int | None = option("Z", "Number of rollers.", OF_OWN, count, remedy="write the number of rollers, as 16")
+    roller: tuple[float, float] | None = option(
+        "DxL", "Diameter x length of a roller in mm: 7x7.", OF_OWN, roller_size,
+        remedy="write diameter x length of a roller in mm, as 7x7")
+    balls: int | None = option("Z", "Number of balls.", OF_OWN, count, remedy="write the number of balls, as 16")
+    ball: float | None = option(
+        "MM", "Diameter of a ball.", OF_OWN, MILLIMETRES(0.5, 200.0), remedy="write the diameter of a ball in mm, as 9.525")
+    pitch: float | None = option(
+        "MM", "Diameter of the circle through the centres of rollers or balls.", OF_OWN, MILLIMETRES(2.0, 1200.0),
+        remedy="write the diameter of the circle through the centres in mm, as 60")
+    contact_angle: float | None = option("DEG", "Contact angle of the balls.", OF_OWN, number(0.0, 85.0, "degrees"))
+    conformity: tuple[float, float] | None = option(
+        "SHARE", "Groove radius over ball diameter, or INNER/OUTER: 0.515/0.525.", "0.52/0.53, only with own", conformity_of)
+    speed: float | None = option(
+        "RPM", "Speed of the inner ring.", "half the reference speed", number(-1e6, 1e6, "rpm"), "operation.inner_speed_rpm")
+    load: float | None = option("N", "Radial load.", "0.1 C", number(0.0, 1e7, "N"), "operation.radial_load_N")
+    preload: float | None = option(
+        "N", "Axial preload of a ball bearing.", "what loads half of the balls", number(-1e8, 1e8, "N"), "operation.preload_N")
+    oil: NamedOil = option(  # noqa: RUF009
+        "NAME", '"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".', True, oil_named, preset=OIL)
+    temperature: float | None = option(
+        "C", "Temperature of the oil.", f"{TEMPERATURE_C:g}, or by the heat balance of --ambient", CELSIUS, "lubricant.temperature_C")
+    oil_flow: float | None = option(
+        "L_MIN", "Oil flow in L/min; a heat balance computes the temperatures.", "no flow", number(1e-4, 1e3, "L/min"),
+        "lubricant.oil_flow_l_min")
+    oil_inlet: float | None = option(
+        "C", "Temperature of the oil that flows in.", "no flow", CELSIUS, "lubricant.oil_inlet_temperature_C")
+    ambient: float | None = option(
+        "C", "Temperature around housing and shaft; writes the heat balance.", "20 with --oil-flow", CELSIUS, "thermal.ambient_C")
+    clearance: str | float | None = option(
+        "CLASS|MM", "C2, CN, C3, C4 or C5, or diametral in mm.", "of DESIGNATION, else CN", clearance_of, "bearing.radial_clearance_mm")
+    lubrication: str | None = option(
+        "HOW", "bath, drop, jet, oil_air or grease.", "bath; grease if --oil is one, jet with --oil-flow", supply_of)
+    guidance: str | None = option(
+        "PART", "What guides the cage: outer, inner or roller.", "of DESIGNATION, else outer", guidance_of)
+    cage_material: str | None = option(
+        "NAME", "Material of the cage: brass, peek, polyamide.", "of DESIGNATION, else brass", cage_material_of)
+    bore: float | None = option("MM", "Bore, where the table lacks the bearing.", LISTED, MILLIMETRES(1.0, 2000.0))
+    outside: float | None = option("MM", "Outside diameter.", LISTED, MILLIMETRES(2.0, 4000.0))
+    width: float | None = option("MM", "Width.", LISTED, MILLIMETRES(0.5, 1000.0))
+    shaft: str | None = option(
+        "CLASS", "Tolerance class of the shaft: k5. Writes the table mounting.", "loose", str, "mounting.inner_interference_um")
+    housing: str | None = option(
+        "CLASS", "Tolerance class of the housing: H7. Writes the table mounting.", "loose", str, "mounting.outer_interference_um")
+    # fmt: on
+    faults: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for entry in TABLE.values():
+            setattr(self, entry.name, self.read(dashed(entry.name), entry.metadata["reader"]))
+
+    def __getitem__(self, name: str) -> str | None:
+        return self.texts.get(name)
+
+    def typed(self, *names: str) -> list[str]:
+        """Those of the options that are typed, with their values: "--pitch 60"."""
+        return [self.words(name) for name in names if self[name] is not None]
+
+    def words(self, name: str) -> str:
+        """An option with its value on one line."""
+        return f"{name} {one_line(self[name] or '', LONGEST_NAME)}".strip()
+
+    def note(self, sentence: str) -> None:
+        """Note a fault, once however often it shows."""
+        if sentence not in self.faults:
+            self.faults.append(sentence)
+
+    def fault(self, name: str, sentence: str) -> None:
+        """Note what is wrong with an option."""
+        self.note(f"{self.words(name)}: {sentence}")
+
+    def read(self, name: str, reader: Callable[[str], Value]) -> Value | None:
+        """What a reader makes of an option; None where it is left out, or refused by a MethodError, which is noted."""
+        try:
+            return None if (text := self[name]) is None else reader(text)
+        except MethodError as error:
+            self.fault(name, str(error))
+            return None
+
+    def require(self, *names: str) -> None:
+        """Note what is missing."""
+        for name in names:
+            if self[name] is None:
+                self.fault(name, f"missing; {TABLE[name].metadata['remedy']}")
+
+    @property
+    def heat(self) -> list[str]:
+        """Options that ask for a heat balance, with their values."""
+        return self.typed(*HEAT)
+
+    @property
+    def mounted(self) -> list[str]:
+        """Options that write the table mounting, with their values."""
+        return self.typed("--shaft", "--housing", *HEAT)
+
+    @property
+    def supply(self) -> str:
+        """How the bearing gets its oil, as typed or as the oil says."""
+        usual = "grease" if self.oil and self.oil.grease else "bath" if self["--oil-flow"] is None else "jet"
+        return self.lubrication or usual
+
+    @property
+    def oil_temperature(self) -> float | None:
+        """Of the oil [C]; None where a heat balance computes it."""
+        return None if self.heat else TEMPERATURE_C if self.temperature is None else self.temperature
+
+    def check_kind(self, rollers: bool) -> None:
+        """Note options that this kind of bearing has no use for, and options that contradict each other."""
+        kind, alien = ("ball", OF_BALLS) if rollers else ("cylindrical roller", OF_ROLLERS)
+        for words in self.typed(*(name for name in alien if not (self.heat and name == "--lubrication"))):
+            self.note(f"{words}: is one of {kind} bearings; leave it out")
+        if rollers and self.speed is not None and abs(self.speed) < SLOWEST_RPM:
+            self.fault("--speed", f"a run is counted in shaft turns; give at least {SLOWEST_RPM:g}")
+        if (rollers or self.heat) and self.oil and self.lubrication:
+            self._check_supply(self.lubrication, self.oil.grease)
+        if self.heat:
+            self._check_heat()
+
+    def _check_supply(self, supply: str, grease: bool) -> None:
+        oil = self.words("--oil") if self["--oil"] else f"--oil {OIL}"
+        if grease and supply != "grease":
+            self.fault("--lubrication", f"contradicts the grease of {oil}; leave one out")
+        elif supply == "grease" and not grease:
+            self.fault("--lubrication", f'{oil} is no grease; write --oil "grease VG 100" with its base oil')
+
+    def _check_heat(self) -> None:
+        flow, inlet = self["--oil-flow"], self["--oil-inlet"]
+        if flow is None and inlet is not None:
+            self.fault("--oil-inlet", "has no effect without a flow; add --oil-flow in L/min, as 0.4, or leave it out")
+        if flow is not None and inlet is None:
+            self.fault("--oil-flow", "needs the temperature at which the oil flows in; add --oil-inlet in C, as 60")
+        if self["--temperature"] is not None:
+            self.fault("--temperature", f"{' '.join(self.heat)} computes the temperatures; leave it out")
+        if flow is not None and self.supply == "grease":
+            self.fault("--oil-flow", "contradicts a grease, which does not flow; leave one out")
+        if flow is None and self.supply == "jet":
+            self.fault("--lubrication", "with --ambient it needs --oil-flow in L/min and --oil-inlet in C; add them")
+
+    def of_scene(self, fault: str) -> str:
+        """A fault of the scene as one of the option that its key comes from, where that was typed."""
+        match = KEYED.fullmatch(fault)
+        key, sentence = match.groups() if match else ("", "")
+        if key in SEIZED_KEYS and (classes := " ".join(self.typed("--shaft", "--housing"))):
+            return f"{classes}: {key}: {sentence}; leave the classes out, or widen it in a scene without them and add [mounting]"
+        usual = next((name for name, entry in TABLE.items() if key and entry.metadata["key"] == key), "")
+        name, sentence = ESTIMATED_KEYS.get(key, (usual, sentence))
+        if name == "--clearance" and self[name] is None:
+            return f"{name}: missing; that of the usual class is {sentence.replace('check its unit', 'write it in mm, as 0.01')}"
+        return fault if self[name] is None else f"{self.words(name)}: {sentence}"
 
 
-def guidance_of(text: str) -> str:
-    """What guides the cage. Raises MethodError."""
-    name = text.strip().lower()
-    if name not in GUIDANCES:
-        raise MethodError(f"guides no cage; choose one of {', '.join(GUIDANCES)}")
-    return name
+def dashed(name: str) -> str:
+    """The option of a field."""
+    return f"--{name.replace('_', '-')}"
 
 
-def cage_material_of(text: str) -> str:
-    """Name of a material of a cage. Raises MethodError."""
-    from rbdyn.cli.new_scene import POLYAMIDE_NAME
-    from rbdyn.properties.materials import MATERIALS
-
-    name = text.strip().lower()
-    if name != POLYAMIDE_NAME and name not in MATERIALS:
-        raise MethodError(f"is no material known here; choose one of {', '.join([*MATERIALS, POLYAMIDE_NAME])}")
-    return name
+# The fields of the options, by option.
+TABLE = {dashed(entry.name): entry for entry in fields(Options) if entry.metadata}
+# Estimated clearances that heat and rotation may take away where the bearing is mounted.
+SEIZED_KEYS = ("cage.guide_clearance_mm", "cage.pocket_radial_clearance_mm")
+# Options that an estimated key comes from, with what to say of it.
+ESTIMATED_KEYS = {
+    "model.pocket_bar_stiffness_N_m": (
+        "--rollers",
+        "leaves bars of a cage that are too slender for such rollers; take fewer or shorter ones",
+    ),
+    "cage.side_ring_width_mm": ("--width", "leaves side rings of a cage out of proportion to such rollers; narrow it"),
+}
+# A fault of a key of the scene: source, key, value, what is wrong.
+KEYED = re.compile(r"[^=]*: ([\w.]+) = [^:]*: (.*)")

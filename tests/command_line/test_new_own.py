@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.cli.new import scene_text
-from rbdyn.cli.new_options import Typed, clearance_of, conformity_of, roller_size
+from rbdyn.cli.new_options import Options, clearance_of, conformity_of, roller_size
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import Envelope, envelope, read_designation, roller_interior
 from rbdyn.properties.drawing import BallDrawing, RollerDrawing, ball_boundary, roller_boundary
@@ -240,17 +240,12 @@ def test_invariant_a_drawing_gives_a_scene_or_names_an_option(
 ):
     """Invariant: whatever is drawn gives a scene that validates, or sentences that begin with the option at fault."""
     pitch = around * diameter
-    texts = dict.fromkeys(
-        ("--rollers", "--roller", "--balls", "--ball", "--pitch", "--contact-angle", "--conformity", "--speed", "--load",
-         "--preload", "--oil", "--temperature", "--oil-flow", "--oil-inlet", "--ambient", "--clearance", "--lubrication", "--guidance", "--cage-material", "--bore",
-         "--outside", "--width", "--shaft", "--housing")
-    )  # fmt: skip
-    texts |= {"--rollers": str(max(3, int(filling * math.pi * around))), "--pitch": f"{pitch:.4g}", "--oil": "VG 68"}
+    texts = {"--rollers": str(max(3, int(filling * math.pi * around))), "--pitch": f"{pitch:.4g}", "--oil": "VG 68"}
     texts |= {"--roller": f"{diameter:.4g}x{slender * diameter:.4g}", "--temperature": "70", "--clearance": "0.02"}
     texts |= {"--guidance": guidance, "--cage-material": material}
     texts["--width"] = None if width is None else f"{width * slender * diameter:.4g}"
     try:
-        scene = Scene.from_dict(tomllib.loads(scene_text("own", Typed(texts))))
+        scene = Scene.from_dict(tomllib.loads(scene_text("own", Options(texts))))
         assert scene.bearing.effective_length_mm < scene.bearing.roller_length_mm and scene.cage.mass_g > 0.0
     except InputError as error:
         assert all(NAMED.match(fault) for fault in error.faults), error.faults

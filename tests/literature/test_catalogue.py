@@ -8,7 +8,8 @@ import math
 import pytest
 from conftest import ROOT
 
-from rbdyn.cli.new_scene import OperatingPoint, ball_values, catalogue_subject, roller_values
+from rbdyn.cli.new_options import Options
+from rbdyn.cli.new_scene import ball_values, catalogue_subject, roller_values
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import (
@@ -19,7 +20,6 @@ from rbdyn.properties.catalogue import (
     read_designation,
     roller_interior,
 )
-from rbdyn.properties.oils import oil_named
 from rbdyn.scene import Scene
 
 # Orders of a catalogue (Timken, ball bearing housed units, table A-9): number of balls BPFO + BPFI, and BSF = (1/g - g)/2
@@ -76,8 +76,8 @@ def test_literature_every_roller_bearing_of_the_catalogue(size):
     assert static == pytest.approx(sizes.static_capacity, rel=1e-3)
     # 1.00 of the classic ratings, 0.87 of those raised by 15 %; up to 1.12 where the catalogue lists one raceway only.
     assert 0.85 < dynamic / sizes.dynamic_capacity < 1.13
-    subject = catalogue_subject(named, sizes)
-    values = roller_values(subject, OperatingPoint(None, None, None, oil_named("VG 68"), 70.0, "CN"))
+    options = Options({"--oil": "VG 68"})
+    values = roller_values(catalogue_subject(named, sizes, options), options)
     assert Scene.from_dict(data_of("roller_scene.toml", values)).unit_notes == ()
 
 
@@ -143,8 +143,8 @@ def test_unit_every_listed_ball_bearing_gives_a_scene(series):
     """Unit: each bore of each series gives a scene that validates."""
     for code in ("00", "01", "02", "03", *(f"{number:02d}" for number in range(4, 21))):
         named = read_designation(series + code)
-        subject = catalogue_subject(named, envelope(named))
-        values = ball_values(subject, OperatingPoint(3000.0, None, None, oil_named("VG 68"), 70.0, "CN"))
+        options = Options({"--oil": "VG 68", "--speed": "3000"})
+        values = ball_values(catalogue_subject(named, envelope(named), options), options)
         Scene.from_dict(data_of("ball_scene.toml", values))
 
 

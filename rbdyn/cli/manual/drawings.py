@@ -1,12 +1,11 @@
 """Drawings of the manual, of the bearings that its pages are about; a roller bearing and a ball bearing of the catalogue."""
 
 import tomllib
-from collections import defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.new import OIL, TEMPERATURE_C, scene_text
-from rbdyn.cli.new_options import Typed
+from rbdyn.cli.new import scene_text
+from rbdyn.cli.new_options import OIL, TEMPERATURE_C, Options
 from rbdyn.plots.sketches import Sketch, ball_axes, clearances, roller_axes
 
 if TYPE_CHECKING:
@@ -32,5 +31,5 @@ def drawings(scene: "Scene") -> Mapping[str, Sketch]:
 
 def scene_of(designation: str, options: Mapping[str, str] | None = None) -> dict[str, Any]:
     """The scene that ``rbdyn new`` writes of a designation and options."""
-    texts = {"--oil": OIL, "--temperature": f"{TEMPERATURE_C:g}", **(options or {})}
-    return tomllib.loads(scene_text(designation, Typed(defaultdict(lambda: None, texts))))
+    texts: dict[str, str | None] = {"--oil": OIL, "--temperature": f"{TEMPERATURE_C:g}", **(options or {})}
+    return tomllib.loads(scene_text(designation, Options(texts)))
