@@ -16,6 +16,7 @@ Names are fetched when first used: importing the package loads nothing else but 
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
     from doe.library.answer import Answer
+    from doe.library.scene_runs import RunsAnswer, run, run_answer
     from doe.library.steps import ChainAnswer, DesignAnswer, FitAnswer, FrontAnswer, chain, design, fit, front
     from doe.library.unknown import CalibrationAnswer, UncertaintyAnswer, calibrate, uncertainty
     from doe.library.whole import StudyAnswer, study
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "rbdyn.base.faults": ("InputError", "RunError"),
     "doe.library.answer": ("Answer",),
+    "doe.library.scene_runs": ("RunsAnswer", "run", "run_answer"),
     "doe.library.steps": ("ChainAnswer", "DesignAnswer", "FitAnswer", "FrontAnswer", "chain", "design", "fit", "front"),
     "doe.library.unknown": ("CalibrationAnswer", "UncertaintyAnswer", "calibrate", "uncertainty"),
     "doe.library.whole": ("StudyAnswer", "study"),
@@ -31,7 +33,7 @@ _HOMES = {
 
 __all__ = [
     "Answer", "CalibrationAnswer", "ChainAnswer", "DesignAnswer", "FitAnswer", "FrontAnswer", "InputError", "RunError",
-    "StudyAnswer", "UncertaintyAnswer", "calibrate", "chain", "design", "fit", "front", "study", "uncertainty",
+    "RunsAnswer", "StudyAnswer", "UncertaintyAnswer", "calibrate", "chain", "design", "fit", "front", "run", "run_answer", "study", "uncertainty",
 ]  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from rbdyn.base.loading import Loading
 
 with Loading():
-    from doe.commands.functions import calibrate, chain, design, fit, front, study, uncertainty
+    from doe.commands.functions import calibrate, chain, design, fit, front, run as run_table, study, uncertainty
     from doe.commands.keys import keys
     from doe.commands.new import new
     from doe.commands.status import status
@@ -12,7 +12,7 @@ with Loading():
 
 app = Program()
 
-for command in (new, status, design, fit, chain, uncertainty, calibrate, keys, study, front):
+for command in (new, status, design, fit, chain, uncertainty, calibrate, keys, run_table, study, front):
     app.command()(command)
 
 

@@ -39,6 +39,19 @@ study = command(
     quiet=Quiet,
     verbose=Verbose,
 )
+run = command(
+    "run",
+    "Simulate every row of a table of scenes; a failed row does not end the others. Resumes by itself.",
+    "results",
+    "run_answer",
+    table=Annotated[Path, typer.Argument(metavar="TABLE", help="CSV, xlsx or parquet: a row a run, columns are keys of a scene.")],
+    scene=Annotated[Path | None, valued("SCENE.toml", "Scene of rows without one.", "the column scene", "--scene")],
+    part=Annotated[str | None, valued("K/N", "Run only part K of N, for a queue; without it all parts are gathered.", "all rows")],
+    overrides=Set,
+    out=Annotated[Path | None, folder_option(STORE, "TABLE_results")],
+    **RUNS,
+    quiet=Quiet,
+)
 design = command(
     "design",
     "Print the design: every run, and how well the runs identify the terms of the models.",

@@ -91,12 +91,12 @@ def bars(quiet: bool) -> "Iterator[Callable[[str, int, int], None]]":
         yield progress
 
 
-def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callable[..., None]:
+def command(name: str, about: str, kept: str = "", function: str = "", /, **options: Any) -> Callable[..., None]:
     """The command of the function ``name`` of ``doe``; ``about`` is its help.
 
     ``options``: annotation of each parameter that is an option, in their order, --force and --json apart; ``quiet``, ``verbose``
     and ``as_csv`` say what is printed. ``kept``: results are always in a folder, by default of the file's name and this. The function's own defaults hold for
-    what is not stated.
+    what is not stated. ``function``: its name where it is not that of the command.
     """
 
     def run(*stated: Any, **named: Any) -> None:
@@ -105,14 +105,14 @@ def command(name: str, about: str, kept: str = "", /, **options: Any) -> Callabl
         values = bound.arguments
         as_json, as_csv, *levels = (values.pop(key, False) for key in ("as_json", "as_csv", "quiet", "verbose"))
         if kept and values["out"] is None:
-            values["out"] = Path(f"{values['path'].stem}_{kept}")
+            values["out"] = Path(f"{next(iter(values.values())).stem}_{kept}")
         with guarded(as_json), keeping_runs(values["out"]):
             import doe
 
             with bars(levels[0] or as_json) as progress:
                 follow = {"progress": progress, "notice": notice(levels[0])} if "workers" in values else {}
                 stated_values = {key: value for key, value in values.items() if value is not None}
-                answer = getattr(doe, name)(**stated_values, **follow)
+                answer = getattr(doe, function or name)(**stated_values, **follow)
             if as_csv and not as_json:
                 answer.print_csv()
             else:

@@ -18,7 +18,7 @@ from doe.designs.model import Model
 from doe.designs.remaining import Remaining
 from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
 from doe.study_file.sections import Adaptive, Design, Factor, Front, Robust, StudyChain, Tolerances
-from doe.study_file.table import COUNT, LABELS, table_of
+from doe.study_file.table import COUNT, LABELS, done_rows, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
     Consistent,
@@ -396,7 +396,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     Raises InputError for a name that is no column, a column with only some numbers, a constant factor, and a table that
     cannot be read.
     """
-    sheet = read_sheet(path)
+    sheet = done_rows(read_sheet(path))
     has = f"it has {listed(sheet.places)}"
     refuse(
         f"--{kind} {one_line(name)}: is no column of {path}; {has}"

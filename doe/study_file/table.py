@@ -4,7 +4,7 @@ A table has a column for each factor and response, and optional ones of errors, 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,8 @@ from rbdyn.base.tables.sheet import UNKNOWN, Limits, Sheet, listed, quoted, read
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")
 NUMBERED, COUNTED = Limits(1e9, whole=True), Limits(1e9, sign="not negative", whole=True)
 COUNT, LABELS = "replicates", ("block", "run")
+# Column of a table by ``doe run`` with the outcome of each row, and what it says.
+STATUS, DONE, FAILED = "status", "done", "failed"
 # Most runs of a table: pairwise statistics take seconds and half a gigabyte, and a test of normality is still exact.
 MOST_RUNS = 5000
 
@@ -48,7 +50,23 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     Raises InputError with all faults: a missing file, column or number; a row with more or fewer fields than the header; a
     repeated column; an infinite or impossible number; replicates with different factors; more than `MOST_RUNS` runs.
     """
-    return table_of(read_sheet(path), factors, responses, named_in)
+    return table_of(done_rows(read_sheet(path)), factors, responses, named_in)
+
+
+def done_rows(sheet: Sheet) -> Sheet:
+    """The table without its failed rows, which a note counts; any other table than one by ``doe run`` as it is.
+
+    Raises InputError where no row is done.
+    """
+    texts = sheet.column(STATUS).texts if STATUS in sheet else []
+    if FAILED not in texts or not {DONE, FAILED}.issuperset(texts):
+        return sheet
+    kept = [place for place, text in enumerate(texts) if text == DONE]
+    refuse([] if kept else [f"{sheet.path}: all its {len(texts)} rows failed; run it again, or name another table"])
+    numbers = [sheet.file.numbers[place] for place in kept] if sheet.file.numbers else ()
+    left_out = f"{len(texts) - len(kept)} of {len(texts)} rows failed and are left out"
+    manner = "; ".join(filter(None, (sheet.file.manner, left_out)))
+    return replace(sheet, file=replace(sheet.file, rows=[sheet.rows[place] for place in kept], numbers=numbers, manner=manner))
 
 
 def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: Path) -> Table:

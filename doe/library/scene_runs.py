@@ -1,0 +1,188 @@
+"""A table of scenes from Python: ``run`` returns its rows with their figures as a frame, ``run_answer`` also what failed."""
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from doe.library.answer import Answer, Rows
+from doe.library.effort import optional_path, path_given, registered, texts_given
+from doe.workflow.effort import Effort, Follow
+from rbdyn.base.blocks import Block
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.files import write_json
+from rbdyn.base.folder import output_folder
+from rbdyn.base.pace import Notice
+from rbdyn.base.words import are, counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from doe.workflow.scene_runs import RowRun
+
+RUN_FILES = ("runs.csv", "runs.json")
+# Largest number of parts: each has a folder of its own.
+MOST_PARTS = 10_000
+# Typical wall time [s] of what is no run, and what makes the runs shorter.
+STEPS_S, SHORTER = 1.0, ("numerics.turns", "numerics.replicates")
+
+
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
+class RunsAnswer(Answer):
+    """Rows of a table of scenes with their figures. Tables: "runs" (a row a scene), "failures" (a row a cause).
+
+    ``runs``: every row with its figures or its fault; ``part``: words on the part of the table, empty for the whole.
+    """
+
+    runs: "Sequence[RowRun]" = field(default=())
+    part: str = ""
+    shows_unmet: ClassVar[bool] = True
+
+    @property
+    def unmet(self) -> list[str]:
+        """How many rows failed."""
+        failed = len(self.record["failures"])
+        where = "the table runs" if self.folder is None else "runs.csv"
+        return [f"{failed} of {counted(len(self.runs), 'row')} failed; {where} says which and why"] if failed else []
+
+    def blocks(self) -> list[Block]:
+        from doe.report.sections.scene_runs import scene_run_blocks
+
+        return scene_run_blocks(self.runs, self.part, self.record["notes"])
+
+    def rows(self) -> Mapping[str, Rows]:
+        from doe.report.sections.scene_runs import cause_sheet
+
+        return {"runs": [run.cells for run in self.runs], "failures": cause_sheet(self.runs).records}
+
+    def brief(self) -> str:
+        failed = len(self.record["failures"])
+        return f"{counted(len(self.runs), 'row')}, {failed} failed{f', {self.part}' if self.part else ''}"
+
+
+def run(
+    table: "Path | str | pd.DataFrame",
+    scene: Path | str | None = None,
+    out: Path | str | None = None,
+    part: str | None = None,
+    overrides: Sequence[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+    notice: Notice = None,
+    force: bool = False,
+) -> "pd.DataFrame":
+    """Simulate every row of a table of scenes, as ``doe run``; a frame with its figures, in the order of the table.
+
+    - ``table``: a frame, or a file of text, a workbook or parquet: columns "name", "scene" (a file next to the table),
+      "replicates", "seed", and keys of a scene such as "operation.inner_speed_rpm"; an empty cell leaves a key as it is
+    - ``scene``: SCENE.toml of rows without one; ``overrides`` of its keys in all rows, such as ``["cage.mass_g=50"]``
+    - ``out``: folder of the files and the store of runs; finished rows are found there. ``part``: "K/N" runs every N-th row
+      from the K-th into a store of its own there, which a call without it takes over
+    - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed rows
+    - ``progress(stage, done, total)``: called as rows end; ``notice(sentence)``: called with the number of rows and their time
+    - ``force``: also write over files in ``out`` that no command of ``doe`` made
+
+    A failed row has "failed" as its status and its fault; the others run. Columns are keys and figures with their units, and
+    after each figure the half-width of its 95 % interval. Raises InputError with all faults of the whole table.
+    """
+    return run_answer(table, scene, out, part, overrides, workers, scheduler, retry, progress, notice, force).table()
+
+
+def run_answer(
+    table: "Path | str | pd.DataFrame",
+    scene: Path | str | None = None,
+    out: Path | str | None = None,
+    part: str | None = None,
+    overrides: Sequence[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+    progress: Follow = None,
+    notice: Notice = None,
+    force: bool = False,
+) -> RunsAnswer:
+    """What the command ``doe run`` prints; arguments as those of ``run``."""
+    from doe.running.runner import ANSWER
+    from doe.running.store import STORE, Store
+    from doe.study_file.scene_table import read_scene_table
+    from doe.workflow.scene_runs import (
+        gather,
+        part_folder,
+        refuse_other_parts,
+        rows_of_part,
+        rows_stage,
+        run_rows,
+        table_digest,
+    )
+    from rbdyn.base.identity import identity_of
+    from rbdyn.base.page import REPORT_FILES, write_with_report
+
+    path = table if hasattr(table, "columns") else path_given(table, "table")
+    base, whole = optional_path(scene, "scene"), optional_path(out, "out")
+    assignments, effort = texts_given(overrides, "overrides", '["cage.mass_g=50"]'), Effort(workers, scheduler, retry, progress, notice)
+    share = None if part is None else part_of(part)
+    if share is not None and whole is None:
+        raise InputError([f"--part {part}: needs --out DIR, the folder that all parts share"])
+    folder = None if whole is None else part_folder(whole, share)
+    source = path if isinstance(path, Path) else None
+    with ExitStack() as stack:
+        output = stack.enter_context(output_folder(folder, "doe", (*RUN_FILES, *REPORT_FILES), force=force))
+        scenes = read_scene_table(path, base, assignments)
+        rows, digest = rows_of_part(scenes, share), table_digest(scenes)
+        if not rows:
+            raise InputError([f"--part {part}: has no row, since the table has {len(scenes.rows)}; name fewer parts"])
+        if whole is not None:
+            refuse_other_parts(whole, digest)
+        output.claim(source, *([] if base is None else [base]))
+        stack.enter_context(registered(source, folder) if source is not None else nullcontext())
+        place = stack.enter_context(effort.folder(folder))
+        if share is None and whole is not None:
+            with Store(place / STORE) as store:
+                gather(whole, store)
+        with effort.agenda(place, "doe run", inputs=digest) as agenda:
+            agenda.plan([rows_stage(scenes, rows)], SHORTER, STEPS_S)
+            with effort.simulations(place, scenes.path, agenda) as simulations:
+                runs = list(run_rows(scenes, rows, simulations))
+            words = "" if share is None else f"part {share[0]} of {share[1]}"
+            record = _record(runs, scenes.notes, "" if folder is None else str(folder / "runs.csv"))
+            files = [file for file in (source, base) if file is not None]
+            identity = identity_of("doe run", {}, files)
+            answer = RunsAnswer(record, folder, (), identity=identity, runs=runs, part=words)
+
+            def write(stage: Path) -> list[str]:
+                from rbdyn.base.records import save_table
+
+                save_table([run.cells for run in runs], stage / "runs.csv")
+                write_json(stage / "runs.json", answer.as_dict())
+                return ["runs.csv", "runs.json"]
+
+            written = write_with_report(output, identity, answer.blocks, write)
+            agenda.finish(written)
+    return RunsAnswer(record, folder, tuple(written), identity=identity, runs=runs, part=words)
+
+
+def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[str, Any]:
+    """The JSON of the command."""
+    failures = [run for run in runs if run.figures is None]
+    return {
+        "status": "failed" if failures else "ok",
+        "rows": [run.as_dict() for run in runs],
+        "failures": [{"row": run.row.number, "name": run.row.name, "cause": run.cause} for run in failures],
+        "table": table or None,
+        "notes": list(notes),
+    }
+
+
+def part_of(text: Any) -> tuple[int, int]:
+    """Part and number of parts of "K/N". Raises InputError for anything else."""
+    match = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", text, re.ASCII) if isinstance(text, str) else None
+    part, parts = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not 1 <= part <= parts <= MOST_PARTS:
+        shown = one_line(str(text), LONGEST_NAME)
+        number = f"a part from 1 to {parts}" if match and 1 <= parts <= MOST_PARTS else f"K/N with N up to {MOST_PARTS}"
+        raise InputError([f"--part {shown}: there is no such part; write {number}, such as 3/40"])
+    return part, parts
