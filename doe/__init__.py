@@ -1,6 +1,6 @@
 """Designed experiments: design, response surface, Pareto front, dimension chain, and the study that joins them.
 
-From Python: ``study``, ``uncertainty``, ``calibrate``, ``design``, ``fit``, ``front`` and ``chain`` do what the commands of these
+From Python: ``study``, ``run``, ``uncertainty``, ``calibrate``, ``design``, ``fit``, ``front`` and ``chain`` do what the commands of these
 names do. Each returns an answer that shows, tabulates and saves itself, and prints nothing.
 
 - ``designs``, ``response_surface``, ``pareto``, ``emulator``, ``adaptive``, ``unknown``, ``dimension_chain``: methods that know

@@ -38,6 +38,9 @@ Scheduler = Annotated[
     str | None, valued("ADDRESS", "Run on the dask cluster of this scheduler.", "threads of this machine")
 ]
 Retry = Annotated[bool, flag("--retry", says="Run points again that failed before.")]
+Part = Annotated[
+    str | None, valued("K/N", "Run only part K of N, for a queue; without it all parts are gathered.", "all runs")
+]
 Adaptive = Annotated[
     bool, flag("--adaptive", says="Also search the front in few runs, chosen by emulators; the pick is on it.")
 ]

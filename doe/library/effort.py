@@ -1,5 +1,6 @@
 """Arguments of the functions of ``doe`` checked, their folders registered, and their answers saved."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -14,6 +15,8 @@ from rbdyn.base.page import REPORT_FILES, with_report
 if TYPE_CHECKING:
     from doe.library.answer import Answer
 
+# Largest number of parts: each has a folder of its own.
+MOST_PARTS = 10_000
 # Rows of tables by the name of their CSV file.
 Tables = Mapping[str, Sequence[Mapping[str, Any]]]
 
@@ -41,6 +44,19 @@ def texts_given(argument: Any, name: str, example: str) -> list[str]:
     valid = isinstance(argument, list | tuple) and all(isinstance(text, str) for text in argument)
     refuse([] if valid else [f"{name} = {one_line(repr(argument), LONGEST_NAME)}: {words} a list such as {example}"])
     return list(argument)
+
+
+def part_given(text: Any) -> tuple[int, int] | None:
+    """Part and number of parts of "K/N"; None where nothing is stated. Raises InputError for anything else."""
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", text, re.ASCII) if isinstance(text, str) else None
+    part, parts = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not 1 <= part <= parts <= MOST_PARTS:
+        shown = one_line(str(text), LONGEST_NAME)
+        number = f"a part from 1 to {parts}" if match and 1 <= parts <= MOST_PARTS else f"K/N with N up to {MOST_PARTS}"
+        raise InputError([f"--part {shown}: there is no such part; write {number}, such as 3/40"])
+    return part, parts
 
 
 @contextmanager

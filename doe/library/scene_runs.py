@@ -1,6 +1,5 @@
 """A table of scenes from Python: ``run`` returns its rows with their figures as a frame, ``run_answer`` also what failed."""
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
@@ -8,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, path_given, registered, texts_given
+from doe.library.effort import optional_path, part_given, path_given, registered, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block
-from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.base.faults import InputError
 from rbdyn.base.files import write_json
 from rbdyn.base.folder import output_folder
 from rbdyn.base.pace import Notice
-from rbdyn.base.words import are, counted
+from rbdyn.base.words import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from doe.workflow.scene_runs import RowRun
 
 RUN_FILES = ("runs.csv", "runs.json")
-# Largest number of parts: each has a folder of its own.
-MOST_PARTS = 10_000
 # Typical wall time [s] of what is no run, and what makes the runs shorter.
 STEPS_S, SHORTER = 1.0, ("numerics.turns", "numerics.replicates")
 
@@ -106,33 +103,27 @@ def run_answer(
     force: bool = False,
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
-    from doe.running.runner import ANSWER
-    from doe.running.store import STORE, Store
     from doe.study_file.scene_table import read_scene_table
-    from doe.workflow.scene_runs import (
-        gather,
-        part_folder,
-        refuse_other_parts,
-        rows_of_part,
-        rows_stage,
-        run_rows,
-        table_digest,
-    )
+    from doe.workflow.queue import gather, part_folder, refuse_other_parts, rows_of
+    from doe.workflow.scene_runs import rows_stage, run_rows, table_digest
     from rbdyn.base.identity import identity_of
     from rbdyn.base.page import REPORT_FILES, write_with_report
 
-    path = table if hasattr(table, "columns") else path_given(table, "table")
+    content: Any = table if hasattr(table, "columns") else path_given(table, "table")
     base, whole = optional_path(scene, "scene"), optional_path(out, "out")
-    assignments, effort = texts_given(overrides, "overrides", '["cage.mass_g=50"]'), Effort(workers, scheduler, retry, progress, notice)
-    share = None if part is None else part_of(part)
+    assignments, effort = (
+        texts_given(overrides, "overrides", '["cage.mass_g=50"]'),
+        Effort(workers, scheduler, retry, progress, notice),
+    )
+    share = part_given(part)
     if share is not None and whole is None:
         raise InputError([f"--part {part}: needs --out DIR, the folder that all parts share"])
     folder = None if whole is None else part_folder(whole, share)
-    source = path if isinstance(path, Path) else None
+    source = content if isinstance(content, Path) else None
     with ExitStack() as stack:
         output = stack.enter_context(output_folder(folder, "doe", (*RUN_FILES, *REPORT_FILES), force=force))
-        scenes = read_scene_table(path, base, assignments)
-        rows, digest = rows_of_part(scenes, share), table_digest(scenes)
+        scenes = read_scene_table(content, base, assignments)
+        rows, digest = scenes.rows[rows_of(share)], table_digest(scenes)
         if not rows:
             raise InputError([f"--part {part}: has no row, since the table has {len(scenes.rows)}; name fewer parts"])
         if whole is not None:
@@ -140,9 +131,8 @@ def run_answer(
         output.claim(source, *([] if base is None else [base]))
         stack.enter_context(registered(source, folder) if source is not None else nullcontext())
         place = stack.enter_context(effort.folder(folder))
-        if share is None and whole is not None:
-            with Store(place / STORE) as store:
-                gather(whole, store)
+        if share is None:
+            gather(place)
         with effort.agenda(place, "doe run", inputs=digest) as agenda:
             agenda.plan([rows_stage(scenes, rows)], SHORTER, STEPS_S)
             with effort.simulations(place, scenes.path, agenda) as simulations:
@@ -175,14 +165,3 @@ def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[
         "table": table or None,
         "notes": list(notes),
     }
-
-
-def part_of(text: Any) -> tuple[int, int]:
-    """Part and number of parts of "K/N". Raises InputError for anything else."""
-    match = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", text, re.ASCII) if isinstance(text, str) else None
-    part, parts = (int(match[1]), int(match[2])) if match else (0, 0)
-    if not 1 <= part <= parts <= MOST_PARTS:
-        shown = one_line(str(text), LONGEST_NAME)
-        number = f"a part from 1 to {parts}" if match and 1 <= parts <= MOST_PARTS else f"K/N with N up to {MOST_PARTS}"
-        raise InputError([f"--part {shown}: there is no such part; write {number}, such as 3/40"])
-    return part, parts

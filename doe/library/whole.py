@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, path_given, registered
+from doe.library.effort import optional_path, part_given, path_given, registered
 from doe.workflow.effort import Effort, Follow
-from rbdyn.base.blocks import Block, Section
+from rbdyn.base.blocks import Block, Bullets, Paragraph, Section
 from rbdyn.base.folder import output_folder
 from rbdyn.base.pace import Notice
-from rbdyn.base.words import improvement, quantity
+from rbdyn.base.words import counted, improvement, quantity
 
 if TYPE_CHECKING:
     from doe.report.summary import Summary
@@ -144,9 +144,43 @@ class StudyAnswer(Answer):
         return ", ".join([*changes, *limits])
 
 
+@dataclass(frozen=True, repr=False, eq=False, kw_only=True)
+class PartAnswer(Answer):
+    """Design runs of a part of a study, which a call without ``part`` takes over. Table: "failures"."""
+
+    words: str = ""
+
+    @property
+    def unmet(self) -> list[str]:
+        """How many runs failed."""
+        runs, failed = self.record["runs"], len(self.record["failures"])
+        return [f"{failed} of {counted(runs, 'run')} failed in {self.words}"] if failed else []
+
+    def blocks(self) -> list[Block]:
+        done = self.record["runs"] - len(self.record["failures"])
+        gathers = "the same command without --part gathers all parts and answers"
+        causes = [f"{failure['label']}: {failure['cause']}" for failure in self.record["failures"]]
+        return [
+            Paragraph(f"{self.words}: {done} of {counted(self.record['runs'], 'design run')} done; {gathers}"),
+            Bullets(causes),
+        ]
+
+    @property
+    def closing(self) -> list[str]:
+        """Where its store is."""
+        return [f"kept in {self.folder}"]
+
+    def rows(self) -> Mapping[str, Rows]:
+        return {"failures": self.record["failures"]}
+
+    def brief(self) -> str:
+        return f"{self.words}, {counted(self.record['runs'], 'design run')}"
+
+
 def study(
     path: Path | str,
     out: Path | str | None = None,
+    part: str | None = None,
     adaptive: bool = False,
     robust: bool = False,
     workers: int | None = None,
@@ -155,11 +189,13 @@ def study(
     progress: Follow = None,
     notice: Notice = None,
     force: bool = False,
-) -> StudyAnswer:
+) -> StudyAnswer | PartAnswer:
     """The whole study of a bearing's clearances, as ``doe study``: design, runs, surfaces, front, pick, tolerances, parts.
 
     - ``path``: STUDY.toml; ``out``: folder of the report and the store of runs, by default STUDY_results in the current one.
       A finished answer and finished runs are found there, so an interrupted study goes on where it stopped
+    - ``part``: "K/N" makes only every N-th design run from the K-th, in a store of its own in ``out``; a call without it takes
+      all parts over
     - ``adaptive``: also search the front in few runs, chosen by emulators; the pick is then on it
     - ``robust``: judge the pick over the unknown inputs of the scene; the table robust of a study asks for it too
     - ``workers``: threads, all processors by default; ``scheduler``: address of a dask cluster; ``retry``: repeat failed runs
@@ -171,17 +207,22 @@ def study(
     study, RunError where too many runs fail.
     """
     from doe.workflow.problem import Problem
+    from doe.workflow.queue import gather, refuse_other_parts
     from doe.workflow.status import finished_record, inputs_digest
 
     path = path_given(path, "path")
     folder = optional_path(out, "out") or Path(f"{path.stem}_results")
-    effort = Effort(workers, scheduler, retry, progress, notice)
+    effort, share = Effort(workers, scheduler, retry, progress, notice), part_given(part)
+    if share is not None:
+        return _part(path, folder, share, effort, force)
     with output_folder(folder, "doe", STUDY_FILES, force=force) as output, registered(path, folder):
         loaded = Problem.load(path)
         digest = inputs_digest(loaded, adaptive, robust)
         if not retry and (record := finished_record(folder, digest)):
             return StudyAnswer(record, folder, tuple(record["files"]), finished_before=True)
+        refuse_other_parts(folder, inputs_digest(loaded))
         output.claim(path)
+        gather(folder)
         from doe.report.files import write
         from doe.workflow.whole import run_study, unmet_chains
 
@@ -194,3 +235,24 @@ def study(
             record = output.write(partial(write, outcome), last="summary.json")
             agenda.finish(record["files"])
     return StudyAnswer(record, folder, tuple(record["files"]))
+
+
+def _part(path: Path, whole: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
+    """The design runs of a part. Raises as ``study``."""
+    from doe.running.store import Failure
+    from doe.workflow.problem import Problem
+    from doe.workflow.queue import part_folder, refuse_other_parts, run_part
+    from doe.workflow.status import inputs_digest
+
+    folder = part_folder(whole, share)
+    with output_folder(folder, "doe", (), force=force) as output, registered(path, folder):
+        loaded = Problem.load(path)
+        digest = inputs_digest(loaded)
+        refuse_other_parts(whole, digest)
+        output.claim(path)
+        with effort.agenda(folder, "doe study", inputs=digest) as agenda:
+            results = run_part(loaded, folder, effort, share, agenda)
+            agenda.finish([])
+    failures = [{"label": result.label, "cause": result.cause} for result in results if isinstance(result, Failure)]
+    record = {"status": "failed" if failures else "ok", "part": list(share), "runs": len(results), "failures": failures}
+    return PartAnswer(record, folder, (), words=f"part {share[0]} of {share[1]}")

@@ -377,7 +377,9 @@ class Store(Database):
     def adopt(self, path: Path) -> int:
         """Copy ended runs from the store at ``path`` that this one lacks; their number. Raises as ``Store``."""
         with Store(path, read_only=True) as other, other._faults():
-            columns = "key, status, result, digest, cause, study, label, run, factors, started, ended, seconds, host, pid"
+            columns = (
+                "key, status, result, digest, cause, study, label, run, factors, started, ended, seconds, host, pid"
+            )
             rows = other._connection.execute(f"SELECT {columns} FROM runs WHERE status != 'claimed'")
             with self._transaction(durable=True) as connection:
                 before = connection.total_changes

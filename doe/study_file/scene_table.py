@@ -56,7 +56,11 @@ class SceneTable:
 
     def scene(self, row: SceneRow) -> Scene:
         """The scene of a row. Raises InputError with its faults."""
-        source = f"row {row.number}" if row.name == str(row.number) else f"row {row.number} ({one_line(row.name, LONGEST_NAME)})"
+        source = (
+            f"row {row.number}"
+            if row.name == str(row.number)
+            else f"row {row.number} ({one_line(row.name, LONGEST_NAME)})"
+        )
         refuse(row.faults)
         file = row.file or self.base
         if file is None:
@@ -121,7 +125,9 @@ def _parquet(path: Path) -> "pd.DataFrame":
     try:
         return pd.read_parquet(path)
     except ImportError:
-        raise InputError([f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV"]) from None
+        raise InputError(
+            [f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV"]
+        ) from None
     except OSError as error:
         raise InputError([f"{path}: {error.strerror or 'cannot be read'}; check the path"]) from None
     except Exception as error:
@@ -144,7 +150,7 @@ def _keys(sheet: Sheet, overrides: Sequence[str]) -> dict[str, str]:
         for name, key in keys.items()
         if key in stated
     ]
-    if not {SCENE, *keys} & set(names):
+    if not faults and not {SCENE, *keys} & set(names):
         faults.append(f"{sheet.path}: states neither {SCENE} nor a key of a scene; it has {listed(names)}")
     refuse([*faults, *(sheet.notes if faults else ())])
     return keys
@@ -152,8 +158,8 @@ def _keys(sheet: Sheet, overrides: Sequence[str]) -> dict[str, str]:
 
 def _unknown(name: str) -> str:
     """The fault of a column that is no key, with the nearest one."""
-    known = {NAME: NAME, SCENE: SCENE, **{short: short for short in SHORT}}
-    known |= {key.rpartition(".")[2]: key for key in reversed(dotted_keys())}
+    known = {key.rpartition(".")[2]: key for key in reversed(dotted_keys())}
+    known |= {own: own for own in (NAME, SCENE, *SHORT)}
     near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1)
     fix = f"did you mean {known[near[0]]}?" if near else "rename or remove it"
     return f"column {one_line(name, LONGEST_NAME)}: unknown key; {fix}"
@@ -181,5 +187,3 @@ def _rows(sheet: Sheet, keys: Mapping[str, str]) -> Iterator[SceneRow]:
         yield SceneRow(
             row + 1, texts.get(NAME) or str(row + 1), None if file is None else sheet.path.parent / file, own, bad
         )
-
-

@@ -66,7 +66,9 @@ def done_rows(sheet: Sheet) -> Sheet:
     numbers = [sheet.file.numbers[place] for place in kept] if sheet.file.numbers else ()
     left_out = f"{len(texts) - len(kept)} of {len(texts)} rows failed and are left out"
     manner = "; ".join(filter(None, (sheet.file.manner, left_out)))
-    return replace(sheet, file=replace(sheet.file, rows=[sheet.rows[place] for place in kept], numbers=numbers, manner=manner))
+    return replace(
+        sheet, file=replace(sheet.file, rows=[sheet.rows[place] for place in kept], numbers=numbers, manner=manner)
+    )
 
 
 def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: Path) -> Table:

@@ -4,16 +4,15 @@ Rows are built and simulated in batches, so that memory does not grow with their
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from doe.clearance import Simulations, work_of
-from doe.running.runner import Progress, Stage, agendas_of
-from doe.running.store import STORE, Cause, Failure, Store, grouped
+from doe.running.runner import Progress, Stage
+from doe.running.store import Cause, Failure, grouped
 from doe.study_file.scene_table import SceneRow, SceneTable
 from doe.study_file.table import DONE, FAILED, STATUS
 from rbdyn.base.arrays import Array
@@ -61,7 +60,7 @@ class RowRun:
     @property
     def cells(self) -> dict[str, Any]:
         """The row of a file: its keys, then each figure with the half-width of its 95 % interval."""
-        cells = {"name": self.row.name, STATUS: self.status, "fault": self.cause or None}
+        cells: dict[str, Any] = {"name": self.row.name, STATUS: self.status, "fault": self.cause or None}
         cells |= {} if self.row.file is None else {"scene": str(self.row.file)}
         cells |= self.row.values
         if self.figures is not None:
@@ -95,11 +94,6 @@ def table_digest(table: SceneTable) -> str:
     content = [file.read_bytes() if file.is_file() else b"" for file in files]
     rows = [(row.name, str(row.file), dict(row.values), list(row.faults)) for row in table.rows]
     return digest_of(b"".join((json.dumps([rows, list(table.overrides)], default=str).encode(), *content)))
-
-
-def rows_of_part(table: SceneTable, part: tuple[int, int] | None) -> list[SceneRow]:
-    """Rows of part k of n, every n-th of the table from the k-th; all of them without a part."""
-    return [*table.rows] if part is None else [*table.rows[part[0] - 1 :: part[1]]]
 
 
 def rows_stage(table: SceneTable, rows: Sequence[SceneRow]) -> Stage:
@@ -144,29 +138,3 @@ def _batch(
             yield RowRun(row, figures)
         else:
             yield RowRun(row, None, faults[row.number] if result is None else result.cause)
-
-
-def part_folder(folder: Path, part: tuple[int, int] | None) -> Path:
-    """Folder of the store of a part within that of its table."""
-    return folder if part is None else folder / f"part-{part[0]}-of-{part[1]}"
-
-
-def part_stores(folder: Path) -> list[Path]:
-    """Stores of all parts in the folder of a table or a study."""
-    return sorted(folder.glob(f"part-*-of-*/{STORE}"))
-
-
-def refuse_other_parts(folder: Path, question: str) -> None:
-    """Raises InputError where the folder has a part of another table or study than that of this digest."""
-    for path in part_stores(folder):
-        with Store(path, read_only=True) as store:
-            questions = {agenda.question for agenda, _ in agendas_of(store)}
-        if questions - {question}:
-            raise InputError(
-                [f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"]
-            )
-
-
-def gather(folder: Path, store: Store) -> Mapping[str, int]:
-    """Take over the runs of all parts in a folder; the number of new ones by part."""
-    return {path.parent.name: store.adopt(path) for path in part_stores(folder)}

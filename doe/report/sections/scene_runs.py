@@ -31,7 +31,14 @@ class Span(NamedTuple):
 
 
 SPANS: tuple[Column[Span], ...] = (
-    Column("figure", cell=lambda span: " ".join(filter(None, (quantity(span.figure)[0], f"[{quantity(span.figure)[1]}]" if quantity(span.figure)[1] else "")))),
+    Column(
+        "figure",
+        cell=lambda span: " ".join(
+            filter(
+                None, (quantity(span.figure)[0], f"[{quantity(span.figure)[1]}]" if quantity(span.figure)[1] else "")
+            )
+        ),
+    ),
     Column("low", words="least"),
     Column("low_row", words="in row", text=True),
     Column("median"),
@@ -60,7 +67,7 @@ def span_sheet(runs: Sequence[RowRun]) -> Sheet[Span]:
     spans = []
     done = [(run.row.name, run.figures.of(0)) for run in runs if run.figures is not None]
     for name in (figure.key for figure in FIGURES if figure.key in SHOWN):
-        numbers = [(values[name], row) for row, values in done if values.get(name) is not None]
+        numbers = [(value, row) for row, values in done if (value := values.get(name)) is not None]
         if numbers:
             (low, low_row), (high, high_row) = min(numbers), max(numbers)
             spans.append(Span(name, low, low_row, float(np.median([value for value, _ in numbers])), high, high_row))
