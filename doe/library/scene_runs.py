@@ -103,9 +103,9 @@ def run_answer(
     force: bool = False,
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
-    from doe.study_file.scene_table import read_scene_table
     from doe.workflow.queue import gather, part_folder, refuse_other_parts, rows_of
     from doe.workflow.scene_runs import rows_stage, run_rows, table_digest
+    from doe.workflow.scene_table import read_scene_table
     from rbdyn.base.identity import identity_of
     from rbdyn.base.page import REPORT_FILES, write_with_report
 

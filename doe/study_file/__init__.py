@@ -1,7 +1,7 @@
-"""STUDY.toml, tables of runs and tables of scenes, checked before anything runs.
+"""STUDY.toml and tables of runs, checked before anything runs.
 
 - ``study``: the whole file, and the study of a table alone; ``sections``: its tables; ``duty``: its points of operation
-- ``table``: runs made elsewhere, in tables; ``scene_table``: scenes to be run, a row each
+- ``table``: runs made elsewhere, in tables
 """
 
 from doe.study_file.study import Study, StudyFile

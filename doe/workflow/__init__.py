@@ -10,6 +10,6 @@
 - ``input_sets``: unknown inputs and their runs; ``uncertainty``: ranges of outputs; ``robust``: whether the pick is better over
   them, with ``judgement`` as its record; ``duty``: the answer at every point of a duty
 - ``rig``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
-- ``scene_runs``: rows of a table of scenes; ``queue``: parts of a table or a study for the jobs of a queue
+- ``scene_table``: tables of scenes; ``scene_runs``: the runs of their rows; ``queue``: parts of a table or a study for the jobs of a queue
 - ``status``: stages and status of a command; ``effort``: threads or a cluster; ``whole``: the study
 """

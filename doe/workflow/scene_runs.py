@@ -13,8 +13,8 @@ import numpy as np
 from doe.clearance import Simulations, work_of
 from doe.running.runner import Progress, Stage
 from doe.running.store import Cause, Failure, grouped
-from doe.study_file.scene_table import SceneRow, SceneTable
 from doe.study_file.table import DONE, FAILED, STATUS
+from doe.workflow.scene_table import SceneRow, SceneTable
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import finite
