@@ -5,7 +5,7 @@ names do. Each returns an answer that shows, tabulates and saves itself, and pri
 
 - ``designs``, ``response_surface``, ``pareto``, ``emulator``, ``adaptive``, ``unknown``, ``dimension_chain``: methods that know
   no bearing
-- ``study_file``: STUDY.toml, checked; ``running``: runs and their store; ``threads``: algebra on one thread
+- ``study_file``: STUDY.toml, checked; ``running``: runs and their store
 - ``clearance``: the bearing of a study; the only module that runs bearing simulations
 - ``workflow``: the steps of a study and the whole of it; ``report``: what a person sees; ``library``: the functions above;
   ``commands``: the command ``doe``

@@ -22,8 +22,8 @@ from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcom
 from doe.running.store import STORE, Failure, Point, Store
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.files import code_version, run_key
 from rbdyn.base.notes import verdict
-from rbdyn.base.storage import code_version, run_key
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import SimulationResult, arrays_of
 from rbdyn.scene import Scene

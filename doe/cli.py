@@ -3,11 +3,9 @@
 from rbdyn.base.loading import Loading
 
 with Loading():
-    from doe.commands.functions import calibrate, chain, design, fit, front, study, uncertainty
+    from doe.commands.functions import calibrate, chain, design, fit, front, keys, status, study, uncertainty
     from doe.commands.functions import run as run_table
-    from doe.commands.keys import keys
     from doe.commands.new import new
-    from doe.commands.status import status
     from rbdyn.base import streams
     from rbdyn.base.command import Program, Version
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from doe.running.store import Failure, Point, without_numbers
 from doe.study_file import Study
-from doe.study_file.duty import Aggregate, at_point
+from doe.study_file.sections import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError, key_path

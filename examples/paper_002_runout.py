@@ -23,9 +23,18 @@ from published.common import Table, canvas, save
 from published.homogenisation import homogenisation
 
 from rbdyn.base.words import with_error
-from rbdyn.quasistatic.runout.lots import Bench, Lot, RaceLimits, design, draw_parts, linear_response, readings, runouts
+from rbdyn.quasistatic.runout.lots import (
+    Bench,
+    Lot,
+    RaceLimits,
+    bench_of,
+    design,
+    draw_parts,
+    linear_response,
+    readings,
+    runouts,
+)
 from rbdyn.quasistatic.runout.measures import running_accuracy
-from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.turn import RaceErrors, RingPath, ball_path, follow, perfect, waviness
 from rbdyn.scene.ball import BallScene
 

@@ -16,14 +16,24 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.notes import Level, Note, Notes, merged
-from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, finite, shown, written
 from rbdyn.base.table import Column, Sheet, columns_of, within
-from rbdyn.base.words import Brief, Figure, counted, label, quantity, signed_with_error, value_alone
+from rbdyn.base.words import (
+    Brief,
+    Figure,
+    Notice,
+    counted,
+    label,
+    named,
+    part_of,
+    quantity,
+    signed_with_error,
+    value_alone,
+)
 from rbdyn.base.words import shown as value_text
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, full_status
 from rbdyn.scene import BallScene, Scene, scene_of
-from rbdyn.scene.key_columns import default_of
+from rbdyn.scene.keys import default_of
 
 if TYPE_CHECKING:
     import pandas as pd

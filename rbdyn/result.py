@@ -171,7 +171,7 @@ class SimulationResult(Brief, SavedRecord):
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
     - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
-      (``rbdyn.dynamics.part_figures``)
+      (``rbdyn.dynamics.figures``)
     """
 
     FORMAT = "rbdyn.simulation/5"

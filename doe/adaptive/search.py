@@ -32,8 +32,7 @@ from doe.adaptive.emulators import Emulators, Evaluate, Runs, fit_emulators, sha
 from doe.pareto.front import Samples, SimulatedFront
 from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, hypervolume, spread
-from doe.threads import one_thread
-from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, keyed, outside_json
 from rbdyn.base.words import counted

@@ -1,7 +1,6 @@
 """The commands of ``doe``. They import methods inside their functions, so that help comes at once.
 
-- ``functions``: those that are functions of ``doe.library``; ``status``: where a study stands; ``keys``: the meaning of keys
-- ``new``: a new study with its limits and points of operation; ``new_parts``: tolerances and dimension chains of the parts that
-  make its clearances
+- ``functions``: those that are functions of ``doe.library``, where a study stands, and the meaning of keys
+- ``new``: a new study with its limits, points of operation, and the parts that make its clearances
 - ``options``: options of several commands, with the runs, agenda and record that follow from them
 """

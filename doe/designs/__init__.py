@@ -1,8 +1,8 @@
 """Designs of experiments in coded units, one column a factor.
 
-- ``design``: the record of a design and the classical designs; ``optimal``: D- and I-optimal designs by search
+- ``design``: the record of a design and the classical designs; ``optimal``: D- and I-optimal designs by search, and what remains of a region
+  where runs failed
 - ``model``: terms of a polynomial, and how well a design estimates them before any run
-- ``remaining``: what remains of a region where runs failed
 """
 
 from doe.designs.design import (

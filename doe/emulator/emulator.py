@@ -23,8 +23,7 @@ from scipy import special
 from scipy.linalg import lapack
 
 from doe.designs.model import model_matrix, model_terms, term_powers
-from doe.threads import one_thread
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import MethodError
 
 if TYPE_CHECKING:

@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, part_given, path_given, registered, texts_given
+from doe.library.answer import Answer, Rows, optional_path, part_given, path_given, registered, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block
 from rbdyn.base.faults import InputError
 from rbdyn.base.files import write_json
 from rbdyn.base.folder import output_folder
-from rbdyn.base.pace import Notice
-from rbdyn.base.words import counted
+from rbdyn.base.words import Notice, counted
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,22 +7,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, path_given, registered, saved, step_folder, texts_given
+from doe.library.answer import Answer, Rows, optional_path, path_given, registered, saved, step_folder, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Paragraph, with_notes
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.pace import Notice
 from rbdyn.base.records import plain
-from rbdyn.base.words import counted, quantity, with_error
+from rbdyn.base.words import Notice, counted, quantity, with_error
 
 if TYPE_CHECKING:
     from doe.dimension_chain import ChainResult
     from doe.response_surface.statistics import Fit
     from doe.workflow.design import DesignResult
-    from doe.workflow.problem import Problem
-    from doe.workflow.settings import Asked
+    from doe.workflow.problem import Asked, Problem
     from doe.workflow.surface_front import SurfaceFront
 
 
@@ -294,8 +291,7 @@ def front(
     from doe.report.identity import study_identity
     from doe.report.sections.front import front_sheet
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
-    from doe.workflow.problem import Problem
-    from doe.workflow.settings import Asked
+    from doe.workflow.problem import Asked, Problem
     from doe.workflow.surface_front import StatedPoint, SurfaceFront
     from doe.workflow.surfaces import extrapolation_notes
 

@@ -7,14 +7,12 @@ from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, path_given, registered, texts_given
+from doe.library.answer import Answer, Rows, optional_path, path_given, registered, texts_given
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block
 from rbdyn.base.faults import LONGEST_NAME, no_power_of_two, one_line, refuse
 from rbdyn.base.folder import output_folder
-from rbdyn.base.pace import Notice
-from rbdyn.base.words import counted, quantity, shown
+from rbdyn.base.words import Notice, counted, quantity, shown
 
 if TYPE_CHECKING:
     from doe.workflow.identification import Calibration

@@ -6,13 +6,11 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from doe.library.answer import Answer, Rows
-from doe.library.effort import optional_path, part_given, path_given, registered
+from doe.library.answer import Answer, Rows, optional_path, part_given, path_given, registered
 from doe.workflow.effort import Effort, Follow
 from rbdyn.base.blocks import Block, Bullets, Paragraph, Section
 from rbdyn.base.folder import output_folder
-from rbdyn.base.pace import Notice
-from rbdyn.base.words import counted, improvement, quantity
+from rbdyn.base.words import Notice, counted, improvement, quantity
 
 if TYPE_CHECKING:
     from doe.report.summary import Summary

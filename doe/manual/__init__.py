@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from typer.main import get_command
 
 from doe.cli import app
-from doe.commands.keys import kinds
+from doe.commands.functions import kinds
 from doe.report.files import confirmation_sheet, reference_sheet
 from doe.report.sections.calibration import cell_sheet
 from doe.report.sections.chain import part_sheet
@@ -14,8 +14,7 @@ from doe.report.sections.chain import share_sheet as chain_shares
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import DUTY_POINTS
 from doe.report.sections.fit import ANOVA, RUNS, TERMS
-from doe.report.sections.robust import DECIDERS
-from doe.report.sections.unknown import input_sheet, range_sheet, set_sheet, share_sheet
+from doe.report.sections.unknown import DECIDERS, input_sheet, range_sheet, set_sheet, share_sheet
 from doe.workflow.parts import clearance_parts
 from rbdyn.base.table import Column, Sheet
 from rbdyn.plots.sketches import WIDTH, Canvas, Sketch

@@ -3,5 +3,5 @@
 - ``sections``: what is said of each subject, as JSON and as ``rbdyn.base.blocks``
 - ``page``: all sections as one HTML page, with its scripts and style in ``html``
 - ``summary``: the record of a whole study; ``identity``: whose result it is
-- ``files``: all that a study writes; ``pictures``: its PNG files; ``still``: pictures for pages and files
+- ``files``: all that a study writes; ``still``: pictures for pages and files
 """

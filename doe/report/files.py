@@ -7,6 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from doe import clearance
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
@@ -17,27 +19,27 @@ from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
 from doe.report.sections.front import front_sheet, front_stills, robust_stills
 from doe.report.sections.record import readable
-from doe.report.sections.robust import decider_sheet, robust_input_sheet
 from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences, search_stills
+from doe.report.sections.unknown import decider_sheet, robust_input_sheet
 from doe.report.still import save
 from doe.report.summary import Summary
+from doe.response_surface import Surface
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.duty import DutyAnswer
-from doe.workflow.problem import Problem
+from doe.workflow.problem import Asked, Problem, Settings
 from doe.workflow.runs import Runs, StudyDesign
 from doe.workflow.search_record import SearchResult, predicted_rows
-from doe.workflow.settings import Settings
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Block, Detail, Verdict
-from rbdyn.base.files import versions, write_json
+from rbdyn.base.files import digest_of, sign, versions, write_json
 from rbdyn.base.records import save_table
-from rbdyn.base.storage import digest_of, sign
 from rbdyn.base.table import Column, Sheet
+from rbdyn.base.words import label, quantity
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook
 
@@ -55,7 +57,6 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
 
     summary.json is written last: where it is, all else is whole.
     """
-    from doe.report.pictures import response_surface
 
     study = outcome.study
     result = summary(outcome)
@@ -274,3 +275,51 @@ def confirmation_sheet(
     )
     content = "A row a response of each point that was simulated anew."
     return Sheet("", columns, rows, file="confirmation.csv", content=content)
+
+
+def response_surface(study: Problem, surface: Surface, path: Path) -> None:
+    """Surface over the first factor and each other one, the rest at their centre, with contours below."""
+    from matplotlib import pyplot as plt
+    from matplotlib.ticker import MaxNLocator
+
+    plt.switch_backend("Agg")
+    factors, response = len(study.factors), Asked.of(study).response(surface.name)
+    reach = study.design.reach
+    grid = np.linspace(-reach, reach, 41)
+    figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
+    for panel in range(1, factors):
+        coded = np.zeros((grid.size, grid.size, factors))
+        coded[..., 0], coded[..., panel] = np.meshgrid(grid, grid, indexing="ij")
+        actual = study.actual(coded)
+        values = surface.predict(coded)
+        axis = figure.add_subplot(1, factors - 1, panel, projection="3d")
+        x, y = actual[..., 0], actual[..., panel]
+        axis.plot_surface(x, y, values, cmap="viridis", alpha=0.9, linewidth=0)
+        span = np.ptp(values) or abs(float(values.mean())) or 1.0
+        floor = values.min() - 0.35 * span
+        axis.contour(x, y, values, zdir="z", offset=floor, cmap="viridis", levels=10, linewidths=0.9)
+        top = values.max()
+        for bound in response.bounds:
+            if floor < bound < top + 0.5 * span:
+                corners = [np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)]
+                plane = np.full((2, 2), bound)
+                axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
+                top = max(top, bound)
+            if values.min() < bound < values.max():
+                axis.contour(x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0)
+        axis.set_zlim(floor, top)
+        axis.set_xlabel(label(study.factors[0]), labelpad=8)
+        axis.set_ylabel(label(study.factors[panel]), labelpad=8)
+        axis.set_zlabel(response.label)
+        rest = [place for place in range(1, factors) if place != panel]
+        named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
+        fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
+        notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in response.bounds)]
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
+        axis.tick_params(labelsize=8)
+        for side in (axis.xaxis, axis.yaxis, axis.zaxis):
+            side.set_major_locator(MaxNLocator(4))
+        axis.view_init(elev=24, azim=-128)
+    figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)

@@ -16,13 +16,13 @@ from types import MappingProxyType
 from typing import Any
 
 from doe.clearance import DrawnMotion
-from doe.report.sections import answer, bearing, chain, design, duty, fit, front, robust
+from doe.report.sections import answer, bearing, chain, design, duty, fit, front, unknown
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
 from doe.report.sections.record import readable, record_table
 from doe.report.summary import Summary
-from doe.workflow.settings import Asked, Factor, Response
+from doe.workflow.problem import Asked, Factor, Response
 from doe.workflow.surface_front import EstimatedPoint, Point, RobustPoint
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
@@ -250,7 +250,7 @@ CHAPTERS = (
     fit.diagnostics,
     front.front,
     answer.confirmation,
-    robust.unknown,
+    unknown.robustness,
     chain.chains,
     bearing.power,
     bearing.motion,

@@ -11,9 +11,9 @@ from doe.workflow.judgement import Robust
 from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
+from doe.workflow.problem import Settings
 from doe.workflow.runs import StudyDesign
 from doe.workflow.search_record import SearchResult
-from doe.workflow.settings import Settings
 from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain

@@ -1,8 +1,7 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
 - ``surface``: fit and prediction
-- ``statistics``: what is known of a fit, and sentences on it
-- ``canonical``: stationary point and axes of curvature
+- ``statistics``: what is known of a fit, its stationary point and curvature, and sentences on them
 - ``least_squares``: runs of a response, their checks, the solution, and power transforms of Box and Cox
 - ``adequacy``: analysis of variance, elimination, residual diagnostics, known variances, model error
 - ``comparison``: cross-validation with a Gaussian process

@@ -13,8 +13,7 @@ from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.response_surface.statistics import Comparison, Difference, ProcessScore, Score
 from doe.response_surface.surface import Surface
-from doe.threads import one_thread
-from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import counted
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from doe.designs.design import replicate_groups
 from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
 from doe.response_surface.adequacy import Removal, anova, compare, diagnose, eliminate, goodness, model_error
-from doe.response_surface.canonical import canonical
 from doe.response_surface.least_squares import (
     Data,
     backward,
@@ -26,9 +25,8 @@ from doe.response_surface.least_squares import (
     slope,
     solve,
 )
-from doe.response_surface.statistics import Fit
-from doe.threads import one_thread
-from rbdyn.base.arrays import Array, Rows
+from doe.response_surface.statistics import Fit, canonical
+from rbdyn.base.arrays import Array, Rows, one_thread
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import finite, outside_json
 

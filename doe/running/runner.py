@@ -17,8 +17,7 @@ from pydantic import TypeAdapter
 
 from doe.running.store import Failure, Point, RunResult, Sound, Store
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.pace import NOTABLE_S, Notice, estimate
-from rbdyn.base.words import counted
+from rbdyn.base.words import NOTABLE_S, Notice, counted, estimate
 
 
 @dataclass(frozen=True)

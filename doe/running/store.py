@@ -27,9 +27,8 @@ from typing import Any, NamedTuple, Self, TypeVar
 from rbdyn.base import records
 from rbdyn.base.digests import user_cache
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.files import read_json
-from rbdyn.base.lock import free_lock, is_busy, is_locked, seize_lock
-from rbdyn.base.storage import digest_of
+from rbdyn.base.files import digest_of, read_json
+from rbdyn.base.folder import free_lock, is_busy, is_locked, seize_lock
 from rbdyn.base.streams import Uninterrupted, escaped
 
 T = TypeVar("T")

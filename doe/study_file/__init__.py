@@ -1,6 +1,6 @@
 """STUDY.toml and tables of runs, checked before anything runs.
 
-- ``study``: the whole file, and the study of a table alone; ``sections``: its tables; ``duty``: its points of operation
+- ``study``: the whole file, and the study of a table alone; ``sections``: its tables, points of operation among them
 - ``table``: runs made elsewhere, in tables
 """
 

@@ -15,9 +15,21 @@ from pydantic import Field
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
-from doe.designs.remaining import Remaining
-from doe.study_file.duty import OverDuty, alike, at_point, duty_faults, shares_of
-from doe.study_file.sections import Adaptive, Design, Factor, Front, Robust, StudyChain, Tolerances
+from doe.designs.optimal import Remaining
+from doe.study_file.sections import (
+    Adaptive,
+    Design,
+    Factor,
+    Front,
+    OverDuty,
+    Robust,
+    StudyChain,
+    Tolerances,
+    alike,
+    at_point,
+    duty_faults,
+    shares_of,
+)
 from doe.study_file.table import COUNT, LABELS, done_rows, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (

@@ -24,21 +24,23 @@ import numpy as np
 from scipy import special
 
 from doe.unknown.inputs import nested, spread_out
-from doe.unknown.offsets import STRONG, Unseen, unseen_offsets
 from doe.unknown.posterior import (
     BEYOND,
     BY_ROW,
     PARTICLES,
+    STRONG,
     Cells,
     Errors,
     Joint,
     Level,
     Measured,
     Sampled,
+    Unseen,
     effective,
     fit_cells,
     joint,
     sampled,
+    unseen_offsets,
 )
 from doe.unknown.width import Power, Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole

@@ -41,9 +41,8 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
 from doe.emulator import Emulator, fit_emulator, leave_one_out
-from doe.threads import one_thread
 from doe.unknown.propagation import Share
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.estimate import LEVEL, wilson
 from rbdyn.base.records import Record, keyed
 

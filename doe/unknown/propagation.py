@@ -34,9 +34,8 @@ import numpy as np
 from scipy import stats
 
 from doe.emulator import Emulator, fit_emulator, pooled_variances
-from doe.threads import one_thread
 from doe.unknown.inputs import Joint, nested, strongest
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.records import Record
 
 # An emulator is trusted that predicts this share of what noise leaves to predict.

@@ -1,6 +1,6 @@
 """The steps of a study, and the whole study that joins them.
 
-- ``problem``: a study resolved once, with its goals, region and scenes, for every step; ``settings``: what it asks, as its record says
+- ``problem``: a study resolved once, with its goals, region and scenes, for every step, and what it asks
 - ``region``: where its bearings run; ``design``: its points; ``runs``: its runs; ``first_look``: the limits before them
 - ``surfaces``: fits, predictions, random draws, a published table; ``front``: tolerances, the front on surfaces, back-off from
   limits, with ``surface_front`` as its record; ``adaptive``: the front by emulators, with ``search_record``

@@ -22,13 +22,12 @@ from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervo
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.running.runner import Progress
 from doe.running.store import Failure, grouped
-from doe.threads import one_thread
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import independent_values, standard_errors
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record
 

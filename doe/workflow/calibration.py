@@ -18,7 +18,6 @@ from doe.clearance import Simulations
 from doe.emulator import NoisyValues
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
-from doe.threads import one_thread
 from doe.unknown import inputs as unknown
 from doe.unknown.calibration import TRIED, Batch, Unknowns, matched, sets_a_wave
 from doe.unknown.posterior import Measured
@@ -40,10 +39,10 @@ from doe.workflow.input_sets import (
     work_of_set,
 )
 from doe.workflow.rig import MOST_CONDITIONS, SPEED, Rig, read_rig
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
+from rbdyn.base.files import code_version, digest_of
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.storage import code_version, digest_of
 from rbdyn.base.words import counted
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene

@@ -13,11 +13,10 @@ import numpy as np
 from doe.clearance import Simulations
 from doe.duty import DutyResult, Simulated
 from doe.running.store import Failure
-from doe.threads import one_thread
 from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import gain_verdict
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level

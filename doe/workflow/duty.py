@@ -11,13 +11,12 @@ from typing import Any
 
 from doe.duty import DutyResult, scenes_of
 from doe.study_file.study import PointResponse, Response
-from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed, Gain, SimulatedValue, gains
 from doe.workflow.front import find_front, out_of_reach
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance

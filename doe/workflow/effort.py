@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from doe.running.runner import AgendaKeeper, Progress, agenda_in
 from doe.running.store import STORE, StoppedError, Store
 from rbdyn.base.faults import RunError
-from rbdyn.base.pace import Notice
+from rbdyn.base.words import Notice
 
 if TYPE_CHECKING:
     from doe.clearance import Simulations

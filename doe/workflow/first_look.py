@@ -18,8 +18,7 @@ from doe.workflow.confirmation import Confirmed, Limit, every_limit
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import standard_errors
 from rbdyn.base.arrays import Array
-from rbdyn.base.pace import Notice
-from rbdyn.base.words import counted, quantity, shown, with_error
+from rbdyn.base.words import Notice, counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult
 
 Outcome = SimulationResult | DutyResult | Failure

@@ -28,11 +28,10 @@ from doe.pareto.search import Archive, Doubt, dominates
 from doe.pareto.tolerance import PartCount
 from doe.response_surface import Surface
 from doe.response_surface.adequacy import correlation
-from doe.threads import one_thread
 from doe.workflow.confirmation import Confirmed
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
-from rbdyn.base.arrays import Array, Rows
+from rbdyn.base.arrays import Array, Rows, one_thread
 from rbdyn.base.faults import InputError, MethodError
 
 # Shares of the back-off from limits: the search takes the largest that any point keeps.

@@ -31,13 +31,12 @@ from rbdyn.base.faults import (
     set_key,
     validated,
 )
-from rbdyn.base.files import read_json
+from rbdyn.base.files import digest_of, read_json
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.storage import digest_of
 from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import shown
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.key_columns import key_values, unknown_keys
+from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.uncertain import MARKING, Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put, value_of, with_values
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import special
 
 from doe.clearance import Simulations
-from doe.designs.remaining import Remaining
+from doe.designs.optimal import Remaining
 from doe.pareto import ParetoFront
 from doe.pareto.front import pick_shares
 from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware

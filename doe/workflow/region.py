@@ -1,6 +1,6 @@
 """The region of a study where its bearings run: clearances in operation at every point of the design and of the duty.
 
-A region that reaches below the floor of a clearance (``rbdyn.mounting.cage.RunningClearance.floor``) moves upward, and a sentence
+A region that reaches below the floor of a clearance (``rbdyn.mounting.RunningClearance.floor``) moves upward, and a sentence
 says so. The file of the study stays as it is; its runs, fits and picks have the region that runs.
 
 With stated temperatures nothing is simulated. With a heat balance short runs of the centre give the temperatures of all points. Where
@@ -24,7 +24,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
 from rbdyn.base.words import counted, quantity
-from rbdyn.mounting.cage import NEARLY_K, RunningClearance
+from rbdyn.mounting import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C

@@ -21,7 +21,7 @@ from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read
 from rbdyn.base.words import counted, quantity
 from rbdyn.dynamics.figures import FIGURES, Figure
 from rbdyn.result import TEMPERATURES
-from rbdyn.scene.key_columns import key_values, unknown_keys
+from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 # Outputs of a simulation that can be measured; the others are not positive throughout. Temperatures count in degrees Celsius.

@@ -18,7 +18,6 @@ from doe.emulator import NoisyValues
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.runner import Stage
 from doe.running.store import Failure
-from doe.threads import one_thread
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import DecisiveInputs, InputWorth, decisive_inputs, gain_chances, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
@@ -37,7 +36,7 @@ from doe.workflow.input_sets import (
 )
 from doe.workflow.judgement import ConfirmedGain, Decider, Decision, GainPoint, Pair, Robust, RobustFront, worded
 from doe.workflow.problem import Problem
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import refuse, set_key
 from rbdyn.scene.unknown import Input, UnknownInput, is_number
 

@@ -13,11 +13,11 @@ from doe import clearance
 from doe.designs import Design
 from doe.designs.design import SAME_POINT
 from doe.designs.model import Evaluation, lattice, lost_terms
-from doe.designs.remaining import Remaining, added_points
+from doe.designs.optimal import Remaining, added_points
 from doe.duty import DutyResult
 from doe.running.runner import Progress
 from doe.running.store import Cause, Failure, alike, grouped, sentence
-from doe.study_file.duty import at_point
+from doe.study_file.sections import at_point
 from doe.study_file.table import read_table
 from doe.workflow.design import DesignRun, all_terms, check_runs, design_runs, evaluation, realised, terms_of
 from doe.workflow.problem import Problem, RunPlan

@@ -17,8 +17,8 @@ from doe.study_file.table import DONE, FAILED, STATUS
 from doe.workflow.scene_table import SceneRow, SceneTable
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
+from rbdyn.base.files import digest_of
 from rbdyn.base.records import finite
-from rbdyn.base.storage import digest_of
 from rbdyn.result import SimulationResult, arrays_of
 from rbdyn.scene import Scene
 

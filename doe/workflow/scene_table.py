@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
 from rbdyn.base.notes import Notes
 from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks
-from rbdyn.base.tables.sheet import Sheet, listed, quoted, read_sheet
-from rbdyn.base.tables.table_file import TableFile
+from rbdyn.base.tables.sheet import Sheet, TableFile, listed, quoted, read_sheet
 from rbdyn.scene import BallScene, Scene
-from rbdyn.scene.key_columns import key_values, unknown_keys
+from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
 
 if TYPE_CHECKING:

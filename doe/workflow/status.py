@@ -23,9 +23,8 @@ from doe.workflow.problem import Problem
 from doe.workflow.region import region_in_store
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
-from rbdyn.base.files import read_json, versions
+from rbdyn.base.files import code_version, digest_of, intact, read_json, versions
 from rbdyn.base.records import plain
-from rbdyn.base.storage import code_version, digest_of, intact
 from rbdyn.base.tables.workbook import split_path
 
 # Typical wall time [s] of surfaces, front, pictures and report.

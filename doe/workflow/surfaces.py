@@ -23,10 +23,9 @@ from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file.study import Fitted
 from doe.study_file.table import read_sheet
-from doe.threads import one_thread
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, read_runs
-from rbdyn.base.arrays import Array, Rows, Whole
+from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, keyed, outside_json

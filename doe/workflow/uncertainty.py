@@ -9,7 +9,6 @@ import numpy as np
 from doe.clearance import Simulations, responses_of, work_of
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
-from doe.threads import one_thread
 from doe.unknown.propagation import (
     Emulated,
     Range,
@@ -34,7 +33,7 @@ from doe.workflow.input_sets import (
     shares_outside,
     work_of_set,
 )
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread

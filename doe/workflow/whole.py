@@ -22,7 +22,6 @@ from doe.duty import Duty, scene_at
 from doe.pareto import ParetoFront
 from doe.running.runner import ANSWER, AgendaKeeper
 from doe.running.store import Failure
-from doe.threads import one_thread
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
     EVERYWHERE,
@@ -53,12 +52,12 @@ from doe.workflow.runs import Runs, run_design, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
-from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
+from rbdyn.mounting import REPORTED
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry

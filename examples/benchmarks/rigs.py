@@ -258,7 +258,7 @@ def table(answers: Sequence[Answer]) -> Iterator[str]:
 def answer(what: str, folder: Path, kind: str, number: int) -> Answer:
     """What becomes of a rig, from the folder where the same code has answered before."""
     from doe.clearance import SIMULATION
-    from rbdyn.base.storage import code_version
+    from rbdyn.base.files import code_version
 
     path = folder / f"{what}_{kind}_{number}.json"
     version = code_version(SIMULATION, "doe.workflow.calibration")

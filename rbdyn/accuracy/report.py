@@ -11,9 +11,8 @@ from typing import Any, TypeVar
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.files import versions, write_json
-from rbdyn.base.pace import NOTABLE_S, estimate
 from rbdyn.base.records import save_table
-from rbdyn.base.words import counted
+from rbdyn.base.words import NOTABLE_S, counted, estimate
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import LOOK_S, Reporter
 

@@ -1,10 +1,10 @@
 """Shared parts of both packages, without any bearing: input, records, files, words and commands.
 
-- ``faults``: what a user typed, its number types, and errors that say how to fix them; ``arrays``
-- ``records``: results as JSON, tables and CSV; ``files``: whole JSON files; ``storage``: finished parts on disk; ``digests``: of contents, and of the code they depend on
+- ``faults``: what a user typed, its number types, and errors that say how to fix them; ``arrays``: their types, and algebra on one thread
+- ``records``: results as JSON, tables and CSV; ``files``: whole JSON files, and finished parts on disk; ``digests``: of contents, and of the code they depend on
 - ``tables``: tables of a user, text and workbooks
 - ``estimate``: values with their errors, sums, differences and intervals of them
 - ``words``: how values, errors and counts are written; ``blocks``, ``table``: what is said; ``terminal``, ``html``: its renderings
-- ``page``, ``vector``: a report as one page with its pictures; ``workbook``: its tables; ``identity``, ``notes``: its first lines
-- ``loading``, ``streams``, ``command``: what commands share; ``folder``, ``lock``: where they write; ``pace``: how long runs take
+- ``page``: a report as one page with its pictures; ``workbook``: its tables; ``identity``, ``notes``: its first lines
+- ``loading``, ``streams``, ``command``: what commands share; ``folder``: where they write, and its lock
 """

@@ -13,9 +13,8 @@ from typing import Any
 
 from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.faults import InputError, read_bytes
-from rbdyn.base.files import version_of
+from rbdyn.base.files import digest_of, version_of
 from rbdyn.base.records import Record
-from rbdyn.base.storage import digest_of
 from rbdyn.base.words import quantity
 
 # Digits of a SHA-256 that are shown.

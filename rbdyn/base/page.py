@@ -13,8 +13,8 @@ from pathlib import Path
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Figures, Section, Table, Verdict, has_content
 from rbdyn.base.folder import OutputFolder
+from rbdyn.base.html import vector_copies
 from rbdyn.base.identity import Identity, identity_line, identity_table
-from rbdyn.base.vector import vector_copies
 from rbdyn.base.words import filled_page
 from rbdyn.base.workbook import NAME, write_workbook
 

@@ -21,9 +21,8 @@ from rbdyn.base.words import counted, label, shown, with_error
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import RACES, remarks, ring_columns, row_columns, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
-from rbdyn.quasistatic.runout.lots import Lot, design
+from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
-from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
 from rbdyn.quasistatic.runout.turn import RingPath
 from rbdyn.quasistatic.sweep import SweepResult, notes_by_topic
 from rbdyn.scene import BallScene

@@ -21,7 +21,7 @@ from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 
 if TYPE_CHECKING:
-    from rbdyn.base.pace import Notice
+    from rbdyn.base.words import Notice
     from rbdyn.dynamics.motion import History, Largest, Race, Spectrum
 
 FORMAT = "rbdyn.orbit/2"

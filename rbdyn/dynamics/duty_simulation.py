@@ -12,10 +12,9 @@ from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
-from rbdyn.base.pace import Notice, named, part_of
 from rbdyn.base.records import Record, derived, finite, keyed
 from rbdyn.base.table import Column, Sheet
-from rbdyn.base.words import counted
+from rbdyn.base.words import Notice, counted, named, part_of
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
@@ -28,6 +27,7 @@ from rbdyn.scene.thermal import simulated_scene
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 # By figure, how much worse a larger value is; none of figures of which neither end is bad.
 BADNESS: dict[str, Callable[[float], float]] = {"largest": float, "least": lambda value: -value, "farthest from 0": abs}

@@ -16,8 +16,7 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
-from rbdyn.base.pace import NOTABLE_S, Notice, estimate
-from rbdyn.base.words import counted
+from rbdyn.base.words import NOTABLE_S, Notice, counted, estimate
 
 if TYPE_CHECKING:
     from rbdyn.scene import Scene

@@ -13,7 +13,6 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
-from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
@@ -26,6 +25,7 @@ from rbdyn.losses import (
     POWER_TERMS,
     SHAFT,
 )
+from rbdyn.mounting import REPORTED
 from rbdyn.result import TEMPERATURES
 
 if TYPE_CHECKING:

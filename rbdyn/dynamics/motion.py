@@ -18,9 +18,8 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
-from rbdyn.base.pace import Notice
 from rbdyn.base.table import Column, Sheet, frame_of
-from rbdyn.base.words import Brief, Figure
+from rbdyn.base.words import Brief, Figure, Notice
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.ensemble import Pace, Stop, log
 from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.pace import Notice
+from rbdyn.base.words import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X

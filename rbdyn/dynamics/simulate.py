@@ -10,7 +10,7 @@ import numpy as np
 
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, status_of
-from rbdyn.base.pace import Notice
+from rbdyn.base.words import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
 from rbdyn.dynamics.figures import BEARING, DAMAGE
@@ -34,7 +34,7 @@ from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.extremes import return_force_notes
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
-from rbdyn.mounting.cage import OperatingClearance
+from rbdyn.mounting import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
 

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
-from rbdyn.base.files import versions
+from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
-from rbdyn.base.pace import Notice
 from rbdyn.base.records import Record, derived, keyed, spread
-from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.table import Column, Sheet
-from rbdyn.base.words import counted
+from rbdyn.base.words import Notice, counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS

@@ -19,8 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.notes import Note
-from rbdyn.base.pace import Notice
-from rbdyn.base.words import counted
+from rbdyn.base.words import Notice, counted
 from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing

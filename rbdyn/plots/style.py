@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.vector import add_copy, is_copying
+from rbdyn.base.html import add_copy, is_copying
 
 matplotlib.use("Agg")
 

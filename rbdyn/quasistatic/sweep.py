@@ -24,10 +24,9 @@ from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, number_list, refuse, validated
-from rbdyn.base.files import read_record, versions, write_json
+from rbdyn.base.files import Checkpoint, code_version, read_record, run_key, versions, write_json
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import finite, plain, save_table
-from rbdyn.base.storage import Checkpoint, code_version, run_key
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium

@@ -3,31 +3,284 @@
 The map from temperatures to those that balance their heat is exact to round-off, so a search whose slopes are central differences
 finds the fixed point to ``TOLERANCE`` (``rbdyn.thermal.fixed_point``). These slopes also give the gain of the loop, and the
 ranges of the temperatures over the documented inputs of the balance follow from full solutions.
+
+The heat is that of SKF's friction model. The loads of the friction are those of the equilibrium at the temperatures of the nodes: a ring that warms changes clearance,
+contact angle and, where it is fixed axially, its preload. A ball's own losses are not computed; SKF's rolling and sliding moment
+are split over the nodes as those of rollers are (``rbdyn.thermal.heat``), half of each to either race.
+
+SKF's model is for normal clearance. In a deep groove bearing the ball loads beyond those that carry the load count as preload;
+angular contact bearings relieve a radial growth by their axial load, which the model has.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError
 from rbdyn.base.notes import Note, Notes
-from rbdyn.life.balls import FASTEST
-from rbdyn.life.friction import ANGULAR_GEOMETRY, DEEP_GROOVE_GEOMETRY, starvation_factor
-from rbdyn.quasistatic.heat import Heat, at_temperatures, balance, term_shares
-from rbdyn.quasistatic.result import BallResult
-from rbdyn.quasistatic.row.model import clearance_of, row_of
+from rbdyn.contact import point_contact
+from rbdyn.contact.point_contact import PointContact
+from rbdyn.life.balls import FASTEST, static_capacity
+from rbdyn.life.friction import (
+    ANGULAR_GEOMETRY,
+    DEEP_GROOVE,
+    DEEP_GROOVE_GEOMETRY,
+    MINERAL_FILM,
+    SYNTHETIC_FILM,
+    FrictionMoments,
+    angular_contact_moments,
+    deep_groove_angle,
+    deep_groove_moments,
+    starvation_factor,
+)
+from rbdyn.properties.catalogue import diameter_series
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus
+from rbdyn.quasistatic.result import BallResult, Rating, overloads, reference_capacities
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
+from rbdyn.quasistatic.row.model import RowModel, cage_speed, clearance_of, constraint_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.fits import race_film_temperature
 from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling
+from rbdyn.scene.operation import raceway_radii
+from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, part_temperatures
+from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
-from rbdyn.thermal.losses import HeatModel, gain, log_viscosity
-from rbdyn.thermal.network import NODES, carried_off
+from rbdyn.thermal.heat import TERMS, Effusivities, shares
+from rbdyn.thermal.losses import HeatModel, Losses, gain, log_viscosity, no_rest
+from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, carried_off, temperatures
+
+# Series of SKF's table 3a by the diameter series of ISO 15.
+SERIES = {"8": "618", "9": "619", "0": "60", "2": "62", "3": "63", "4": "64"}
+# Sum of the ball loads over the radial load of a half load zone: J_a/J_r of Sjövall for point contacts.
+HALF_ZONE = 0.2782 / 0.2288
+# Integral of (1 - x^2)^(1/4) over 0 to 1: what an ellipse conducts over a rectangle of its axes, since strips at its ends are short.
+ELLIPSE = 0.8740
+MINERAL = ("mineral", "naphthenic")
+# Exponent of the viscosity in SKF's rolling moment.
+ROLLING_POWER = 0.6
+
+
+def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> SingleRowScene:
+    """The scene with stated temperatures in place of its heat balance.
+
+    It is a copy without validation: temperatures are numbers of the balance, and an impossible bearing shows in its equilibrium.
+    """
+    thermal, lubricant, mounting = scene.thermal, scene.lubricant, scene.mounting
+    assert thermal is not None and lubricant is not None and mounting is not None
+    oil: dict[str, Any] = {"temperature_C": temperatures.oil, "film_temperature": "parts"}
+    if lubricant.viscosity_mPas is not None:
+        oil["viscosity_mPas"] = 1e3 * lubricant.at(temperatures.oil).viscosity
+    parts = part_temperatures(thermal, temperatures, cage=False)
+    tables = {
+        "thermal": None,
+        "lubricant": lubricant.model_copy(update=oil),
+        "mounting": mounting.model_copy(update=parts),
+    }
+    return scene.model_copy(update=tables)
+
+
+class Loads(NamedTuple):
+    """Loads of the friction model [N]: radial, axial, and the sum of the ball loads of a radial preload."""
+
+    radial: float
+    axial: float
+    preload: float
+
+
+class Heat(NamedTuple):
+    """A row at temperatures: its equilibrium, loads, friction moments [N m], the losses of each term [W], (terms,), the share of each
+    node in these, (terms, 4), and its network."""
+
+    scene: SingleRowScene
+    model: RowModel
+    solution: Solution
+    loads: Loads
+    moments: FrictionMoments
+    powers: Array
+    shares: Array
+    conductances: Conductances
+    boundaries: Boundaries
+
+    @property
+    def heat(self) -> Array:
+        """Heat of each node [W], (4,)."""
+        return np.asarray(self.powers @ self.shares)
+
+
+def static_capacity_of(scene: SingleRowScene, model: RowModel) -> float:
+    """C_0 of the row [N], from the catalogue or else by ISO 76."""
+    stated = scene.bearing.static_capacity_N
+    if stated is not None:
+        return stated
+    return static_capacity(scene.bearing.balls, scene.bearing.contact_angle, (model.inner_contact, model.outer_contact))
+
+
+def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Loads:
+    """Loads of the friction model from an equilibrium.
+
+    The preload of a deep groove bearing is what the ball loads sum to beyond 1.22 F_r + F_a/sin alpha_F: no load zone without
+    preload has more, if its clearance is normal.
+    """
+    x, y, z = np.abs(solution.reaction[:3]).tolist()
+    radial = math.hypot(x, y)
+    if scene.bearing.kind != "deep_groove_ball":
+        return Loads(radial, z, 0.0)
+    carries = HALF_ZONE * radial
+    if z > 0.0:
+        carries += z / math.sin(min(deep_groove_angle(z, static_capacity_of(scene, model)), 0.5 * math.pi))
+    return Loads(radial, z, max(float(solution.inner_load.sum()) - carries, 0.0))
+
+
+def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> FrictionMoments:
+    """SKF's moments [N m] of a row at the temperature of its oil."""
+    lubricant, mounting = scene.lubricant, scene.mounting
+    assert lubricant is not None and mounting is not None
+    oil, (inner, outer) = lubricant.in_service, scene.operation.speeds
+    sizes = mounting.bore, mounting.outside_diameter
+    at = *sizes, inner - outer, oil.viscosity / oil.density
+    film = MINERAL_FILM if lubricant.base_oil_name in MINERAL else SYNTHETIC_FILM
+    if scene.bearing.kind == "deep_groove_ball":
+        series = SERIES[diameter_series(*(1e3 * size for size in sizes))]
+        assert series in DEEP_GROOVE
+        capacity = static_capacity_of(scene, model)
+        return deep_groove_moments(
+            series,
+            *at,
+            loads.radial,
+            loads.axial,
+            capacity,
+            preload=loads.preload,
+            film_friction=film,
+            supply=lubricant.supply,
+        )
+    ratio = scene.material("ball").density / MATERIALS["bearing_steel"].density
+    return angular_contact_moments(
+        *at, loads.radial, loads.axial, density_ratio=ratio, film_friction=film, supply=lubricant.supply
+    )
+
+
+def powers_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
+    """Losses in the order of ``heat.TERMS`` [W], (terms,): half of each moment's power at either race."""
+    inner, outer = scene.operation.speeds
+    rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
+    by_kind = {"race_traction": sliding, "rolling_resistance": rolling}
+    return np.array([by_kind.get(term.partition("_")[2], 0.0) for term in TERMS])
+
+
+def term_shares(scene: SingleRowScene, film_to_oil: float) -> Array:
+    """Share of each node in the losses, (terms, 4), split like those of rollers; ``film_to_oil`` of the heat of films is the oil's."""
+    ball, rows = scene.material("ball").effusivity, np.zeros((len(TERMS), len(NODES)))
+    for race in ("outer", "inner"):
+        ring = scene.material(f"{race}_ring").effusivity
+        of_race = [place for place, term in enumerate(TERMS) if term.startswith(race)]
+        rows[of_race] = shares(Effusivities(ring, ball, ring), "roller", film_to_oil)[of_race]
+    return rows
+
+
+def contact_conductance(scene: SingleRowScene, contact: PointContact, race: str, loads: Array) -> float:
+    """Conductance of all balls to a race [W/K]: of each 1/G = h/(pi a b k_oil) + 1/G of two half-spaces that meet over an ellipse.
+
+    The film h is that of pure rolling at the temperature of its surfaces, reduced by inlet heating; the oil in it conducts as
+    at ambient pressure.
+    """
+    drawing, lubricant = scene.bearing, scene.lubricant
+    assert lubricant is not None
+    oil = lubricant.at(race_film_temperature(scene, race))
+    ball, ring = scene.material("ball"), scene.material(f"{race}_ring")
+    gamma = drawing.gamma if race == "inner" else -drawing.gamma
+    speed = point_contact.entrainment_speed(drawing.pitch_diameter, drawing.gamma, *scene.operation.speeds)
+    loaded = loads[loads > 0.0]
+    if loaded.size == 0:
+        return 0.0
+    radius = point_contact.rolling_radius(drawing.ball_diameter, gamma)
+    rolling = point_contact.RollingBall(contact, radius, equivalent_modulus(ball, ring), speed)
+    film = point_contact.central_film(rolling, oil, loaded) * point_contact.thermal_factor(rolling, oil, loaded)
+    across, along = contact.semi_major * np.cbrt(loaded), contact.semi_minor * np.cbrt(loaded)
+    bodies = half_space_contact(along, 2.0 * ELLIPSE * across, speed, ring.effusivity, ball.effusivity)
+    resistance = film / (math.pi * across * along * oil.conductivity) + 1.0 / bodies
+    return float((1.0 / resistance).sum())
+
+
+def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, solution: Solution) -> Conductances:
+    """Network of a row at temperatures. Its surfaces are the cylinders of the raceways over the width, and the balls; no cage."""
+    lubricant, mounting, drawing = scene.lubricant, scene.mounting, scene.bearing
+    assert lubricant is not None and mounting is not None and mounting.width is not None
+    oil, width = lubricant.in_service, mounting.width
+    inner, outer = raceway_radii(drawing)
+    cage = cage_speed(drawing, *scene.operation.speeds)
+    transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
+    flow = lubricant.oil_flow
+    housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
+    return Conductances(
+        flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
+        oil_outer=transfer * 2.0 * math.pi * outer * width,
+        oil_inner=transfer * 2.0 * math.pi * inner * width,
+        oil_rollers=transfer * drawing.balls * math.pi * drawing.ball_diameter**2,
+        outer_rollers=thermal.contact_factor
+        * contact_conductance(scene, model.outer_contact, "outer", solution.outer_load),
+        inner_rollers=thermal.contact_factor
+        * contact_conductance(scene, model.inner_contact, "inner", solution.inner_load),
+        outer_ambient=thermal.housing_factor * housing,
+        inner_ambient=thermal.shaft_factor * shaft,
+        sump=thermal.sump_factor * sump(mounting.outside_diameter, width) if lubricant.supply == "bath" else 0.0,
+    )
+
+
+def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
+    """The row of a scene with [thermal] at temperatures of its nodes (4,) [C].
+
+    Raises InputError where it has no equilibrium or is overloaded there.
+    """
+    thermal = scene.thermal
+    assert thermal is not None and scene.lubricant is not None
+    hot = at_temperatures(scene, Temperatures(*nodes.tolist()))
+    model = row_of(hot)
+    solution = solve(model.row, model.control, load_of(hot), constraint_of(hot))
+    status = solution.status
+    if solution.is_equilibrium:
+        rating = Rating(hot.bearing, model, reference_capacities(hot.bearing), hot.operation.speeds)
+        status = overloads(solution.figures[np.newaxis], [rating]).get(0, status)
+    if status != solution.status or not solution.is_equilibrium:
+        places = ", ".join(f"{node} {value:.4g}" for node, value in zip(NODES, nodes, strict=True))
+        raise InputError([f"the bearing at {places} C: {status}"])
+    loads = loads_of(hot, model, solution)
+    moments = friction_of(hot, model, loads)
+    boundaries = Boundaries(inlet_temperature(thermal, scene.lubricant), thermal.ambient_C)
+    return Heat(
+        hot,
+        model,
+        solution,
+        loads,
+        moments,
+        powers_of(hot, moments),
+        term_shares(hot, thermal.film_share_to_oil),
+        conductances_of(hot, thermal, model, solution),
+        boundaries,
+    )
+
+
+def balance(scene: SingleRowScene, nodes: Array, viscosity: Array | None = None) -> State:
+    """The map of the fixed point: temperatures [C], and those at which the network carries off their heat.
+
+    ``viscosity``: ``log_viscosity`` of the oil, which takes longer than all else and may be known. Raises InputError as ``heat_at``.
+    """
+    assert scene.lubricant is not None
+    found = heat_at(scene, nodes)
+    films = np.zeros((len(TERMS), len(NODES)))
+    films[:, OIL] = 1.0
+    exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
+    viscosity = log_viscosity(scene.lubricant.at) if viscosity is None else viscosity
+    losses = Losses(nodes, found.powers, exponents, films, viscosity)
+    model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_rest())
+    image = temperatures(found.conductances, found.boundaries, found.heat)
+    return State(nodes, image, np.zeros(len(NODES)), model, found)
+
 
 # Deviation from the balance that counts as none [K]; half of the difference of temperatures that gives slopes [K].
 TOLERANCE, DIFFERENCE = 1e-9, 0.01

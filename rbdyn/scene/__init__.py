@@ -8,8 +8,8 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
 - ``thermal``: heat balance; ``input_ranges``: what the unknown inputs of the balance leave open
 - ``geometry``: radii, masses and speeds; ``fits``: rings, clearances and grooves as mounted; ``notes``: suspicious values
-- ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys
-- ``key_columns``: columns of tables named by keys; ``duty``: points of operation
+- ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys,
+  and columns of tables named by them; ``duty``: points of operation
 """
 
 import math
@@ -52,8 +52,7 @@ from rbdyn.scene.thermal import FilmTemperatures, Thermal, film_temperatures, th
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 
 if TYPE_CHECKING:
-    from rbdyn.mounting.cage import CageClearances, OperatingClearance, RunningClearance
-    from rbdyn.mounting.rings import MountedClearance
+    from rbdyn.mounting import CageClearances, MountedClearance, OperatingClearance, RunningClearance
     from rbdyn.scene.geometry import Geometry
 
 # Slices where a profile or a tilt needs them (ISO/TS 16281 asks for at least 30).
@@ -246,7 +245,7 @@ class Scene(SceneFile):
         By name: "radial", "guide", "pocket", and under guidance by the rollers "lip": what the lips allow less what the circle of
         pockets grows. Those between parts that the model's laws leave out are none.
         """
-        from rbdyn.mounting.cage import OperatingClearance, RunningClearance
+        from rbdyn.mounting import OperatingClearance, RunningClearance
 
         bearing, laws, cage = self.bearing, self.model, self._cage_clearances(mounting)
         radial, pitch = self._mounted_clearance(mounting), bearing.pitch_diameter
@@ -362,7 +361,7 @@ class Scene(SceneFile):
     def clearances(self) -> "dict[str, OperatingClearance | None]":
         """Diametral clearances [m] "radial", "guide" (None where the rollers guide the cage) and "pocket", on the drawing and in
         operation."""
-        from rbdyn.mounting.cage import OperatingClearance
+        from rbdyn.mounting import OperatingClearance
 
         radial, cage = self.mounted_clearance, self.cage_clearances
         if radial is None or cage is None:

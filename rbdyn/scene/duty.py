@@ -24,7 +24,7 @@ from rbdyn.base.faults import (
 from rbdyn.base.tables.sheet import Limits, Sheet, listed, read_sheet
 from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
-from rbdyn.scene.key_columns import key_values, unknown_keys
+from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 

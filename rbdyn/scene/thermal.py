@@ -15,7 +15,7 @@ from rbdyn.scene.lubricant import HOTTEST_C, Lubricant, OilCelsius
 from rbdyn.scene.operation import Mounting
 
 if TYPE_CHECKING:
-    from rbdyn.mounting.rings import MountedRings
+    from rbdyn.mounting import MountedRings
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 

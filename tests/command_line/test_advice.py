@@ -13,8 +13,7 @@ from doe_command import doe
 import doe as library
 from doe.dimension_chain import Chain, solve
 from doe.dimension_chain.reading import chain_from
-from doe.library.answer import Answer
-from doe.library.effort import texts_given
+from doe.library.answer import Answer, texts_given
 from doe.library.unknown import _points_faults
 from doe.workflow.problem import Problem
 from rbdyn.base.command import plain_number

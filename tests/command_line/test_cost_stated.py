@@ -15,7 +15,7 @@ from short_studies import run_design, short_study, silent
 from test_study_status import Killed, killed_in, study_command
 
 from doe import clearance
-from doe.commands.status import status_blocks
+from doe.commands.functions import status_blocks
 from doe.running import runner
 from doe.running.runner import Ledger, RunOutcome, Stage, agenda_in
 from doe.running.store import STORE, Point

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import rbdyn
 from doe.cli import app as doe_app
-from doe.commands.keys import files as study_kinds
+from doe.commands.functions import files as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
 from doe.workflow import rig

@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 from in_process import in_process
 
+from rbdyn.base.html import inline
 from rbdyn.base.identity import Identity
-from rbdyn.base.vector import inline
 from rbdyn.base.workbook import MOST_CELLS, sheet_name, write_workbook
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

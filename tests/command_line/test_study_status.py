@@ -21,14 +21,14 @@ from typer.testing import CliRunner
 
 from doe import clearance
 from doe.cli import app
-from doe.commands.status import status_blocks
+from doe.commands.functions import status_blocks
 from doe.running.runner import Stage, agenda_in
 from doe.running.store import STALE_S, STORE, Point, Store, at_work
 from doe.workflow.problem import Problem
 from doe.workflow.status import content_digest, inputs_digest, scene_status, status_of, study_stages, study_status
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import read_toml
-from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.files import digest_of, sign
 from rbdyn.base.terminal import show
 from rbdyn.dynamics import simulate as module
 

@@ -22,7 +22,7 @@ from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
 from rbdyn.base.digests import code_behind
 from rbdyn.base.faults import InputError
-from rbdyn.base.storage import digest_of
+from rbdyn.base.files import digest_of
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 

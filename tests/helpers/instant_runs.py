@@ -104,7 +104,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
 
     from doe.commands.functions import study as doe_study
     from doe.commands.options import keeping_runs
-    from doe.library.effort import registered
+    from doe.library.answer import registered
     from doe.workflow.problem import Problem
     from rbdyn.base.command import guarded, print_json
     from rbdyn.base.folder import output_folder

@@ -17,14 +17,15 @@ from rbdyn.quasistatic.runout.lots import (
     RACES,
     Lot,
     bearing_errors,
+    bench_of,
     design,
     draw_parts,
+    follow_ring,
     full_runouts,
     linear_response,
     readings,
     runouts,
 )
-from rbdyn.quasistatic.runout.model import bench_of, follow_ring
 from rbdyn.quasistatic.runout.turn import ball_path, follow, perfect, waviness
 from rbdyn.scene.ball import BallScene
 

@@ -24,12 +24,12 @@ from doe.unknown.calibration import (
     objections,
     reweighed,
 )
-from doe.unknown.offsets import STRONG, unseen_offsets
 from doe.unknown.posterior import (
     BEYOND,
     BY_ROW,
     INSIDE,
     SHARE,
+    STRONG,
     WIDER,
     Errors,
     Joint,
@@ -41,6 +41,7 @@ from doe.unknown.posterior import (
     joint,
     learnt,
     sampled,
+    unseen_offsets,
 )
 from doe.unknown.width import Scores, power_of, scores_of, width
 from rbdyn.base.arrays import Array

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, pocket_chain, summary
 
+from doe.report.files import response_surface
 from doe.report.page import LETTERS, SCRIPTS, html_report, packed
-from doe.report.pictures import response_surface
 from doe.report.sections.answer import MEANINGS
 from doe.report.sections.chain import yield_words
 from doe.report.sections.fit import _coefficient

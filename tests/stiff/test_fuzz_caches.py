@@ -17,7 +17,7 @@ from conftest import ROOT
 
 from doe.running.store import Point, Store, at_work, folders_of
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.storage import Checkpoint
+from rbdyn.base.files import Checkpoint
 from rbdyn.quasistatic import sweep as sweeps
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import BallScene

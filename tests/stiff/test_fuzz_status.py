@@ -13,13 +13,13 @@ from instant_runs import instant_result
 from short_studies import short_study
 
 from doe.clearance import points_of
-from doe.commands.status import status_blocks
+from doe.commands.functions import status_blocks
 from doe.running.runner import NOTE, agenda_in
 from doe.running.store import STORE, Store
 from doe.workflow.problem import Problem
 from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.faults import InputError
-from rbdyn.base.storage import digest_of, sign
+from rbdyn.base.files import digest_of, sign
 from rbdyn.base.terminal import show
 
 OPTIONS = ({}, {"adaptive": True}, {"robust": True})

@@ -182,7 +182,7 @@ def test_point_that_kills_its_workers_is_told_as_lost_and_the_others_are_kept(tm
 @pytest.mark.slow
 def test_worker_with_other_sources_is_refused(tmp_path, monkeypatch):
     study = Problem.load(short_study(tmp_path))
-    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.files.source_digest", lambda *roots: "edited")
     with started(tmp_path, 1) as there, pytest.raises(InputError, match="runs another version of rbdyn"):
         run_design(study, tmp_path, None, silent, there.address)
     with Store(tmp_path / STORE, read_only=True) as store:

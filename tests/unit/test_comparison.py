@@ -16,7 +16,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.comparison import comparison, differences, different_inputs
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.key_columns import default_of
+from rbdyn.scene.keys import default_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROLLERS, BALLS = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "angular_contact_ball.toml"

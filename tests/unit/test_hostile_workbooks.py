@@ -14,7 +14,7 @@ from raw_workbook import BOOK, HEADER, MAIN, SHEET, STRINGS, STYLES, book, row, 
 
 from doe.study_file.table import read_table
 from rbdyn.base.faults import InputError
-from rbdyn.base.tables import workbook, workbook_parts
+from rbdyn.base.tables import workbook
 from rbdyn.base.tables.sheet import read_sheet
 
 
@@ -138,7 +138,7 @@ def test_rows_and_seconds_have_bounds_too(tmp_path, monkeypatch):
     path = write(tmp_path / "t.xlsx", {SHEET: sheet(*(row(n) for n in range(2, 5000)))})
     monkeypatch.setattr(workbook, "MOST_ROWS", 1000)
     assert "has more than 1000 rows" in end_of(path)
-    monkeypatch.setattr(workbook_parts, "LONGEST_S", 0.0)
+    monkeypatch.setattr(workbook, "LONGEST_S", 0.0)
     assert "takes longer than 0 s to read" in end_of(path)
 
 

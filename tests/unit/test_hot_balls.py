@@ -14,10 +14,9 @@ from in_process import in_process
 
 import rbdyn
 from rbdyn.base.faults import InputError
-from rbdyn.quasistatic.heat import at_temperatures, balance, heat_at
 from rbdyn.quasistatic.row.model import row_of
 from rbdyn.quasistatic.sweep import sweep
-from rbdyn.quasistatic.temperatures import slopes_at, steady_temperatures
+from rbdyn.quasistatic.temperatures import at_temperatures, balance, heat_at, slopes_at, steady_temperatures
 from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import QUANTILES, SETS, input_sets
 from rbdyn.scene.thermal import Temperatures

@@ -138,7 +138,7 @@ def test_unit_map_of_another_scene_or_code_runs_again(make_scene, tmp_path, monk
     assert "step budget" in first.failed[0].status
     slip_map(make_scene(*budget, "numerics.seed=2"), *place)
     assert len(ran) == 4
-    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.files.source_digest", lambda *roots: "edited")
     slip_map(make_scene(*budget), *place)
     assert len(ran) == 6
 

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 import rbdyn
-from rbdyn.base import pace
 from rbdyn.base.command import progress_bar
+from rbdyn.base.words import duration, estimate
 from rbdyn.dynamics import ensemble
 from rbdyn.dynamics.ensemble import Pace, in_turn, keys_of, plan_of
 from rbdyn.dynamics.simulate import simulate
@@ -32,15 +32,15 @@ def watched(looks, turns=1200.0, first=120.0, threads=2, keys=("numerics.turns",
 )
 def test_unit_a_duration_has_two_digits_and_the_unit_that_suits_it(seconds, words):
     """Unit: seconds, minutes, hours and days."""
-    assert pace.duration(seconds) == words
+    assert duration(seconds) == words
 
 
 def test_unit_only_a_plan_above_ten_minutes_says_how_to_make_it_smaller():
     """Unit: the keys follow from 600 s on."""
     keys = ("adaptive.budget", "numerics.turns", "numerics.replicates")
-    assert pace.estimate(599.0, keys) == "the rest takes about 10 min"
+    assert estimate(599.0, keys) == "the rest takes about 10 min"
     longer = "the rest takes about 10 min; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
-    assert pace.estimate(601.0, keys) == longer
+    assert estimate(601.0, keys) == longer
 
 
 def test_unit_the_rest_is_estimated_from_the_first_run():

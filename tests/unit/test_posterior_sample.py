@@ -11,7 +11,7 @@ from doe.report.sections.calibration import write_sample
 from doe.unknown.inputs import values_of
 from doe.workflow.input_sets import read_case, read_sample
 from rbdyn.base.faults import InputError
-from rbdyn.base.storage import digest_of
+from rbdyn.base.files import digest_of
 from rbdyn.scene.uncertain import Law
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"

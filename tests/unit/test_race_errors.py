@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbdyn.base.faults import InputError, validated
-from rbdyn.quasistatic.runout.model import errors_of
+from rbdyn.quasistatic.runout.lots import errors_of
 from rbdyn.quasistatic.runout.turn import ball_path, perfect, random_waviness, rolling, waviness
 from rbdyn.scene.ball import FormErrors, misfits
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.designs import central_composite
 from doe.designs.model import lost_terms, model_terms
-from doe.designs.remaining import Remaining, added_points
+from doe.designs.optimal import Remaining, added_points
 from doe.running.store import Failure
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
@@ -26,7 +26,7 @@ from doe.workflow.runs import with_remaining
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulation
-from rbdyn.mounting.cage import NEARLY_K, OperatingClearance, RunningClearance
+from rbdyn.mounting import NEARLY_K, OperatingClearance, RunningClearance
 from rbdyn.result import Quantity
 from rbdyn.scene import DrawnScene, Scene
 

@@ -7,7 +7,7 @@ import pytest
 
 from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text
-from rbdyn.cli.ball_output import blocks
+from rbdyn.cli.ball import blocks
 from rbdyn.quasistatic.bearing import equilibrium, row_of
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import BallScene, Scene

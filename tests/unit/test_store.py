@@ -16,8 +16,8 @@ import pytest
 
 from doe.running.store import Failure, Point, Store, grouped
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.lock import is_locked
-from rbdyn.base.storage import digest_of
+from rbdyn.base.files import digest_of
+from rbdyn.base.folder import is_locked
 
 POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
 
@@ -269,7 +269,7 @@ def working(path: Path) -> subprocess.Popen:
 
 def test_second_process_is_refused_in_one_sentence_while_the_first_lives(path, monkeypatch):
     """Who it is and what to do; a reader sees what it does; once it is killed nothing of it is left."""
-    monkeypatch.setattr("rbdyn.base.lock.PATIENCE_S", 0.1)
+    monkeypatch.setattr("rbdyn.base.folder.PATIENCE_S", 0.1)
     process = working(path)
     with pytest.raises(InputError) as refused:
         Store(path)

@@ -27,7 +27,7 @@ from doe.workflow.status import inputs_digest
 from doe.workflow.surface_front import SurfaceFront
 from doe.workflow.surfaces import fit_surfaces, reference_runs
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.storage import run_key
+from rbdyn.base.files import run_key
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -29,7 +29,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.status import study_status
 from doe.workflow.surfaces import reference_runs
 from rbdyn.base.faults import RunError
-from rbdyn.base.storage import digest_of
+from rbdyn.base.files import digest_of
 
 CENTRES = range(15, 21)
 
@@ -150,7 +150,7 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
-    monkeypatch.setattr("rbdyn.base.storage.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.base.files.source_digest", lambda *roots: "edited")
     ran = instantly(monkeypatch.setattr)
     assert not run_design(study, tmp_path, 2, silent).failures
     assert sorted(ran) == list(range(1, 21))

@@ -9,12 +9,12 @@ from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
 from doe.response_surface.statistics import fits_of
-from doe.threads import _controller, one_thread
 from doe.unknown.posterior import sampled
 from doe.unknown.propagation import Runs, emulated, range_of, sobol
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces, with_rivals
+from rbdyn.base.arrays import _controller, one_thread
 
 THREADS = (1, 2)
 

@@ -4,5 +4,5 @@
 - ``answer``: what an engineer acts on; what was asked, what was confirmed
 - ``design``, ``fit``, ``front`` with ``front_pictures``, ``search``, ``chain``, ``bearing``: the steps in the order of a report
 - ``duty``: every point of a duty; ``scene_runs``: every row of a table of scenes
-- ``unknown``, ``robust``, ``calibration``: what unknown inputs do, and what measurements say about them
+- ``unknown``, ``calibration``: what unknown inputs do, and what measurements say about them
 """

@@ -16,13 +16,13 @@ from doe.unknown.propagation import Share
 from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
-from doe.workflow.settings import Factor, Response
+from doe.workflow.problem import Factor, Response
 from doe.workflow.tolerances import FactorTolerance
 from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table
 from rbdyn.base.identity import identity_line
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
-from rbdyn.clearances import CLEARANCES, other_ranges
+from rbdyn.mounting import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
 # Meaning of a clearance of the scene, by its key.

@@ -10,8 +10,8 @@ from doe.report.still import GUIDE, Point, Still
 from doe.report.summary import Summary
 from doe.running.store import Cause
 from doe.workflow.design import DesignResult, DesignRun, StandardRun
+from doe.workflow.problem import Asked
 from doe.workflow.runs import StudyDesign, StudyRun
-from doe.workflow.settings import Asked
 from rbdyn.base.blocks import Block, Detail, Figures, Paragraph, Section, Table
 from rbdyn.base.records import quoted_cell
 from rbdyn.base.table import Column, Sheet

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from doe.report.sections.record import LIMITS, SIGNS_NOTE, change, signed
 from doe.report.still import COLOURS, GUIDE, Still, name_marks
 from doe.report.summary import Summary
-from doe.study_file.duty import at_point
+from doe.study_file.sections import at_point
 from doe.workflow.confirmation import ORDER, Gain, PickLimit, SimulatedValue
 from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty
-from doe.workflow.settings import Factor
+from doe.workflow.problem import Factor
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Detail, Figures, Paragraph, Section, Table
 from rbdyn.base.faults import one_line

@@ -12,7 +12,7 @@ from doe.report.still import GUIDE, Point, Still, name_marks
 from doe.report.summary import Summary
 from doe.response_surface.adequacy import AnovaRow, RunDiagnostics
 from doe.response_surface.statistics import Fit, Term
-from doe.workflow.settings import Factor
+from doe.workflow.problem import Factor
 from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
 from rbdyn.base.records import plain
 from rbdyn.base.table import Column, Sheet

@@ -11,7 +11,7 @@ from doe.report.still import Still
 from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint
 from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
-from doe.workflow.settings import Asked
+from doe.workflow.problem import Asked
 from doe.workflow.surface_front import (
     WITHOUT,
     EstimatedPoint,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
 from doe.workflow.confirmation import ConfirmedPoint
-from doe.workflow.settings import Factor
+from doe.workflow.problem import Factor
 from doe.workflow.surface_front import Point as FrontPoint
 from rbdyn.base.words import label, quantity, shown
 

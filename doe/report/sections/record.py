@@ -11,7 +11,7 @@ from typing import Any
 
 from doe.pareto.manufacture import Interval, percent
 from doe.workflow.confirmation import Gain
-from doe.workflow.settings import Asked
+from doe.workflow.problem import Asked
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.notes import Note
