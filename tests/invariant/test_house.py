@@ -4,6 +4,7 @@ import ast
 import functools
 import re
 import subprocess
+import tomllib
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -20,6 +21,7 @@ TOP = {
     ".ci",
     ".gitignore",
     "CHANGELOG.md",
+    "CITATION.cff",
     "LICENSE",
     "README.md",
     "doe",
@@ -300,3 +302,10 @@ def test_invariant_messages_are_short_sentences():
             name = path.relative_to(ROOT).as_posix()
             long += [f"{name}:{line}: {' '.join(sentence.split())}" for sentence in _long_sentences(text)]
     assert read > 10_000 and not long, "\n".join(long)
+
+
+def test_invariant_the_citation_is_of_this_version():
+    """Invariant: CITATION.cff states version and licence of pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert {f"version: {project['version']}", f"license: {project['license']}"} <= set(lines)
