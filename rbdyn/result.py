@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Notes
-from rbdyn.base.records import Record, derived, shown, spread, written
+from rbdyn.base.records import Record, derived, nullable, shown, spread, written
 from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
+from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -170,6 +171,7 @@ class SimulationResult(Brief, SavedRecord):
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
+    - ``verdict``: class of the cage by its orbit, None where the scene leaves it out
     - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
       (``rbdyn.dynamics.figures``)
     """
@@ -199,6 +201,7 @@ class SimulationResult(Brief, SavedRecord):
     thermal: dict[str, Any] | None = None
     part_figures: dict[str, Quantity] | None = None
     damage: dict[str, Quantity] | None = None
+    verdict: CageVerdict | None = nullable(default=None)
 
     impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
     power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815

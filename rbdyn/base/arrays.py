@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]

@@ -1,7 +1,7 @@
 """Records: frozen dataclasses whose fields, listed once, are the keys of their JSON form, in this order.
 
 The key of a field is its name, unless it is ``keyed`` otherwise, ``spread`` or ``outside_json``. ``derived`` fields follow from
-the others. A field whose default is None is left out where it is None.
+the others. A field whose default is None is left out where it is None, unless it is ``nullable``.
 
 Cells of CSV files are written so that no program takes them for formulas and numbers keep their digits.
 """
@@ -57,13 +57,18 @@ def written(meaning: str, **options: Any) -> Any:
     return shown("", screen=False, meaning=meaning, **options)
 
 
+def nullable(**options: Any) -> Any:
+    """A field of default None that JSON states as null."""
+    return field(metadata={"null": True}, **options)
+
+
 def outside_json(**options: Any) -> Any:
     """A field that JSON leaves out."""
     return field(metadata={"path": None}, **options)
 
 
 @dataclass_transform(
-    frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, written, outside_json)
+    frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, written, nullable, outside_json)
 )
 @dataclass(frozen=True)
 class Record:
@@ -85,7 +90,7 @@ class Record:
         record: dict[str, Any] = {}
         for item, path in json_fields(self):
             value = plain(getattr(self, item.name))
-            if value is None and item.default is None:
+            if value is None and item.default is None and not item.metadata.get("null"):
                 continue
             table = record
             for key in path[:-1]:

@@ -30,6 +30,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
     samples = [(words, f"{figure.effective_samples:.0f}") for words, figure in figures.items()]
     return [
         Verdict(result.notes),
+        *([] if result.verdict is None else [Paragraph(result.verdict.words)]),
         figure_sheet(figures).block,
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),

@@ -5,7 +5,7 @@
 - ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result;
   ``temperatures``: those that the friction of a bearing keeps up
 - ``figures``: one list of them, which studies, maps, rigs and the manual follow; ``statistics``: their errors
-- ``part_figures``: those of parts; ``duty_simulation``: runs over a duty
+- ``part_figures``: those of parts; ``cage_verdict``: class of the cage by its orbit; ``duty_simulation``: runs over a duty
 - ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
 - ``motion``: every motion and contact over time, on request; ``duty``: life over a duty by static loads, without a run
 

@@ -27,11 +27,10 @@ from rbdyn.losses import (
 )
 from rbdyn.mounting import REPORTED
 from rbdyn.result import TEMPERATURES
+from rbdyn.scene.laws import SLOWEST_CAGE
 
 if TYPE_CHECKING:
     from rbdyn.scene import Scene
-
-SLOWEST_CAGE = 1e-6  # [rad/s]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.words import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
@@ -30,7 +30,7 @@ from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.metrics import Companions, filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
-from rbdyn.scene.laws import MOST_OF_A_RUN
+from rbdyn.scene.laws import MOST_OF_A_RUN, MOST_SAMPLES
 
 # Columns of the whirl of a tally that become ``whirl`` and ``orbit`` of a replicate.
 SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)
@@ -81,8 +81,14 @@ def batches_of(scene: Scene) -> Batches:
 class Recording:
     """A run under way and its record, batch by batch; it can always go on."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, traced: bool = False) -> None:
         self.run, self.batches = run, batches_of(run.scene)
+        # Places of the cage's centre about its guide, x and y in turn, and the counts of a trace in each batch.
+        self._path, self._traced = array("f"), list[Whole]()
+        self._most = 2 * int(MOST_SAMPLES / run.scene.numerics.replicates)
+        if traced and (spacing := run.scene.cage_sample_s) is not None:
+            longest = max(np.diff(self.batches.ends(self.batches.window), prepend=0.0)) * run.scene.turn_s
+            run.trace(spacing, math.ceil(longest / spacing) + 2)
         self._begin = run.clock_angles()
         # Whirl, work and largest loads of each batch in turn, as plain numbers: an array for each would take twice the memory.
         self._ends, self._booked = [0.0], array("d")
@@ -104,10 +110,22 @@ class Recording:
             for sums in (tally.whirl, tally.work, tally.largest):
                 self._booked.frombytes(sums.tobytes())
                 sums[:] = 0.0
+            if run.carry.trace.components.size:
+                self._take_trace()
             self._ends.append(float(end))
             self._looks.append(self._look())
         self._cpu_s += time.thread_time() - started
         return self.replicate
+
+    def _take_trace(self) -> None:
+        """Take the samples of a batch from the trace; those that memory does not hold are the oldest."""
+        trace = self.run.carry.trace
+        places = trace.samples[: trace.counts[0]]
+        about = places[:, :2] - places[:, 2:] if places.shape[1] > 2 else places
+        self._path.frombytes(about.astype(np.float32).tobytes())
+        del self._path[: max(len(self._path) - self._most, 0)]
+        self._traced.append(trace.counts.copy())
+        trace.counts[:] = 0
 
     @property
     def _batches(self) -> int:
@@ -142,6 +160,8 @@ class Recording:
             method=run.method,
             stiffness=run.carry.stiffness.copy(),
             group=group_of(run.scene, run.replicate),
+            cage_path=np.array(self._path, dtype=float).view(complex),
+            traced=np.array(self._traced),
         )
 
     def _go(self, end: float) -> None:
@@ -176,7 +196,7 @@ def recording_of(
     scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
 ) -> Recording:
     """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated."""
-    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop))
+    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop), companions is None)
 
 
 def _run_of(
@@ -205,7 +225,7 @@ def run_one(
     pace: Pace | None = None,
 ) -> Replicate:
     """Run a replicate, or a companion of it, from the start on. Raises RunError or CancelledError."""
-    return record(_run_of(scene, bearing, pace, replicate, companions, stop))
+    return recording_of(scene, bearing, pace, replicate, companions, stop).to(scene.numerics.turns)
 
 
 def run_replicate(

@@ -17,7 +17,7 @@ from rbdyn.base.faults import MethodError, RunError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Pace, Stop
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
-from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
+from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
 from rbdyn.dynamics.integrators.advance import (
     ACCEPTED,
     DERIVATIVES,
@@ -31,6 +31,7 @@ from rbdyn.dynamics.integrators.advance import (
     STEP_BUDGET,
     STIFFNESS,
     TESTED,
+    TRACED,
     WORST,
     Carry,
     Control,
@@ -39,6 +40,7 @@ from rbdyn.dynamics.integrators.advance import (
     advance,
     carry_from,
     empty_tally,
+    trace_of,
 )
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
@@ -84,6 +86,20 @@ class Run:
         self.tally = empty_tally()
         self.sample_step = scene.turn_s / numerics.samples_per_turn
         self.control = self._control_by(first_method)
+
+    def trace(self, spacing: float, room: int) -> None:
+        """From now on trace the centre of the cage, x and y, and of the ring that moves and guides it, so many seconds apart.
+
+        The reader of ``carry.trace`` empties it before so many samples have filled its ``room``.
+        """
+        bodies = [self.layout.first_body + CAGE_X]
+        if self.scene.cage.guidance == "inner":
+            bodies.append(self.layout.first_body + RING_X)
+        elif self.layout.support is not None:
+            bodies.append(self.layout.support)
+        components = [place for body in bodies for place in (body, body + 1)]
+        self.carry = self.carry._replace(trace=trace_of(components, spacing, room))
+        self.carry.clock[TRACED] = self.carry.clock[NOW]
 
     def choose_method(self) -> None:
         """Replace "auto" by the cheaper method in a trial from where the run is; the run itself does not change."""
@@ -237,6 +253,7 @@ def cheaper_method(
     trial_s = TRIAL_TURNS * scene.turn_s
     short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
     run, book = _copy(carry), Tally(*(sums.copy() for sums in tally))
+    run.clock[TRACED] = math.inf
     status = advance(bearing, short, run, book, trial_s, sample_step)
     start = _copy(run)
     derivatives = int(run.counts[DERIVATIVES])

@@ -12,6 +12,7 @@ from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.words import Notice
 from rbdyn.compiled.kernel import COMPILING
+from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
 from rbdyn.dynamics.figures import BEARING, DAMAGE
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -186,6 +187,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         scene=scene.model_dump(mode="json"),
         part_figures=part_figures(scene, runs, figures),
         damage={figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures},
+        verdict=verdict_of(scene, runs),
     )
 
 

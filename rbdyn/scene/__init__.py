@@ -36,7 +36,16 @@ from rbdyn.scene.bearing import (
     section_of,
     with_bar_stiffness_of_section,
 )
-from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Damage, Laws, Numerics, with_bar_stiffness_of_cage
+from rbdyn.scene.laws import (
+    MOST_SAMPLES,
+    SAMPLES_A_PERIOD,
+    SLOWEST_CAGE,
+    Damage,
+    Laws,
+    Numerics,
+    Verdict,
+    with_bar_stiffness_of_cage,
+)
 from rbdyn.scene.lubricant import (
     RHEOLOGY_OILS,
     Lubricant,
@@ -50,6 +59,7 @@ from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
 from rbdyn.scene.thermal import FilmTemperatures, Thermal, film_temperatures, thermal_faults, with_first_guess
 from rbdyn.scene.uncertain import Calibrate, Uncertain
+from rbdyn.verdict.orbits import SAMPLES_A_TURN
 
 if TYPE_CHECKING:
     from rbdyn.mounting import CageClearances, MountedClearance, OperatingClearance, RunningClearance
@@ -70,10 +80,10 @@ class Scene(SceneFile):
 
     bearing, cage, lubricant, operation : drawings, oil, speeds and loads; required.
     mounting, support, thermal : fits and temperatures, a flexible housing, a heat balance; optional.
-    materials, traction, model, damage, numerics : with defaults.
+    materials, traction, model, damage, verdict, numerics : with defaults.
     """
 
-    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None, "damage": {}}
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None, "damage": {}, "verdict": {}}
 
     bearing: Bearing
     """The drawing of the bearing."""
@@ -99,6 +109,8 @@ class Scene(SceneFile):
     """The laws of each interaction."""
     damage: Damage = Damage()
     """Inputs of figures of damage."""
+    verdict: Verdict = Verdict()
+    """Limits between the classes of a cage by its orbit."""
     numerics: Numerics = Numerics()
     """Tolerance, length and replication of a run."""
     uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
@@ -435,6 +447,21 @@ class Scene(SceneFile):
         if self.guide_clearance_m is None:
             return None if lips is None else 0.5 * lips
         return self.guide_clearance_m
+
+    @property
+    def orbit_play_m(self) -> float:
+        """Radial play [m] of the cage in its land, or in the pockets of the rollers that guide it."""
+        return 0.5 * self.pocket_clearance_m if self.guide_clearance_m is None else self.guide_clearance_m
+
+    @property
+    def cage_sample_s(self) -> float | None:
+        """Time between two samples of the cage's orbit [s]; None where the scene leaves them out: by its [verdict], by a schedule, and
+        without anything that guides the cage or turns it."""
+        speed = abs(self.geometry.motion.cage_speed)
+        guided = self.guide_clearance_m is not None or self.model.pocket != "off"
+        if not (self.verdict.trace and guided and self.operation.schedule is None and self.orbit_play_m > 0.0):
+            return None
+        return 2.0 * math.pi / (SAMPLES_A_TURN * speed) if speed > SLOWEST_CAGE else None
 
     @property
     def guide_play_m(self) -> float | None:

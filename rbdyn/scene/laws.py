@@ -8,12 +8,15 @@ from pydantic import Field
 
 from rbdyn.base.faults import SI, Consistent, NonNegative, NotVanishing, Positive, Share, Sparse
 from rbdyn.properties.materials import MATERIALS, SOFTEST_METAL
+from rbdyn.verdict.orbits import Thresholds
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 METAL_BAR_STIFFNESS, POLYMER_BAR_STIFFNESS = 5e7, 2.5e6  # [N/m]
 AUTO_WARM_UP_TURNS = 20.0
 # Most batches of a turn in memory (0.65 kB each): over all replicates, and in one run, which then has longer batches.
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
+# Slower, a cage has no speed that slip or orbit could be measured in [rad/s].
+SLOWEST_CAGE = 1e-6
 # Samples in a period of the whirl's cutoff: fewer make the velocity inaccurate and alias faster motion.
 SAMPLES_A_PERIOD = 10
 # Most samples of filtered whirl over all replicates, before any extension.
@@ -142,6 +145,41 @@ class Damage(Sparse):
 
     stress_concentration: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
     """Stress at the corner of a pocket over that of a smooth bar, for bar_stress_MPa."""
+
+
+class Verdict(Sparse):
+    """Limits between the classes of a cage by its orbit; no motion depends on them. Radii count over the radial play of what guides
+    the cage, rates over its speed."""
+
+    trace: bool = True
+    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out."""
+    still_radius: Share = Thresholds.still_radius
+    """Rms radius of the orbit below which the cage is held. A cage is also held where the centre of its orbit is farther from that of
+    its guide than this radius."""
+    moving_radius: Share = Thresholds.moving_radius
+    """Rms radius of the orbit from which a cage circles or is in fast whirl."""
+    concentration: Share = Thresholds.concentration
+    """Share of the spectrum of the orbit in its main line from which a cage circles or is in fast whirl."""
+    lowest_rate: Annotated[float, Field(ge=-1e3, le=0.0)] = Thresholds.lowest_rate
+    """Rate of the orbit, over the speed of the cage, below which a cage is in fast whirl; negative against its rotation."""
+    highest_rate: Annotated[float, Field(ge=0.0, le=1e3)] = Thresholds.highest_rate
+    """Rate of the orbit, over the speed of the cage, above which a cage is in fast whirl. A film on a ring that turns drives cages
+    up to half the sum of both speeds, which counts where it is more."""
+    forced_band: Share = Thresholds.forced_band
+    """Relative distance from the order of a force (an imbalance, a ring) within which the orbit is forced, and the cage circles."""
+    rattling_turnover: Positive | None = Thresholds.rattling_turnover
+    """Work of friction and damping in a cage turn, over the energy of its rotation, above which a cage rattles. Below it wanders. No
+    value is known: without one a cage that neither holds still nor goes round is not judged."""
+    least_share: Annotated[float, Field(gt=0.5, lt=1.0)] = Thresholds.least_share
+    """Share of bearings alike that a class must have, by its replicates, for the verdict to name it. Six replicates alike bear 0.85."""
+
+    def unsaved(self) -> Mapping[str, Any]:
+        return {key: field.default for key, field in type(self).model_fields.items()}
+
+    @property
+    def limits(self) -> Thresholds:
+        """The limits between the classes."""
+        return Thresholds(**{key: value for key, value in self if key != "trace"})
 
 
 class Numerics(Consistent):

@@ -4,12 +4,17 @@ An orbit is the complex position x + iy of the cage's centre, sampled evenly ove
 radial play of what guides the cage, rates in the speed of the cage.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from dataclasses import astuple, dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rbdyn.base.arrays import Complex
+
+SAMPLES_A_TURN = 64
+# Cage turns of a block, whose orbit has measures of its own.
+BLOCK_TURNS = 10
 
 CageClass = Literal["held", "circling", "fast whirl", "rattling", "wandering", "not judged"]
 
@@ -39,7 +44,7 @@ class Orbit:
     rate: float
 
 
-def orbit_measures(orbit: NDArray[np.complex128], play: float, samples_per_turn: int = 64) -> Orbit:
+def orbit_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLES_A_TURN) -> Orbit:
     """Measures of an ``orbit`` (m, evenly sampled) in a radial ``play`` (m).
 
     The rate is the turn of the phase from the first sample to the last, over cage turns. The main line has all that lies
@@ -51,7 +56,7 @@ def orbit_measures(orbit: NDArray[np.complex128], play: float, samples_per_turn:
         raise ValueError(f"The radial play of the cage is {play} m; the verdict needs a play above 0.")
     if len(orbit) < samples_per_turn:
         raise ValueError(
-            f"The orbit has {len(orbit)} samples; the verdict needs at least a cage turn of {samples_per_turn}."
+            f"The orbit has {len(orbit)} samples; the verdict needs at least a cage turn of {samples_per_turn:g}."
         )
     centre = orbit.mean()
     motion = orbit - centre
@@ -70,16 +75,46 @@ def orbit_measures(orbit: NDArray[np.complex128], play: float, samples_per_turn:
     )
 
 
-def orbit_class(
-    orbit: Orbit, limits: Thresholds, forced_orders: Sequence[float] = (1.0,), turnover: float | None = None
-) -> CageClass:
-    """Class of an ``orbit``; ``forced_orders`` over the cage's speed, ``turnover`` of its energy by friction and damping."""
+def mean_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLES_A_TURN) -> Orbit:
+    """Measures of a long ``orbit``: the mean over blocks of ten cage turns, which overlap by half and cover it.
+
+    Blocks of one length make the measures of a longer orbit those of a shorter one. The radius is a root mean square.
+
+    Raises ValueError as ``orbit_measures``, and for an orbit shorter than a block.
+    """
+    length = round(BLOCK_TURNS * samples_per_turn)
+    if len(orbit) < length:
+        raise ValueError(
+            f"The orbit has {len(orbit) / samples_per_turn:.3g} cage turns; the verdict needs at least {BLOCK_TURNS}."
+        )
+    spare = len(orbit) - length
+    starts = np.linspace(0, spare, round(2 * spare / length) + 1).astype(int)
+    blocks = [orbit_measures(orbit[start : start + length], play, samples_per_turn) for start in starts]
+    offset, _, concentration, rate = np.mean([astuple(block) for block in blocks], axis=0).tolist()
+    return Orbit(offset, math.sqrt(sum(block.radius**2 for block in blocks) / len(blocks)), concentration, rate)
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """What else decides on the class of an orbit.
+
+    ``orders``: of forces, over the speed of the cage, 1 for its imbalance; ``film_rate``: fastest rate, over that speed, at which a
+    film drives an orbit; ``turnover``: work of friction and damping a cage turn over the energy of its rotation, None where unknown.
+    """
+
+    orders: tuple[float, ...] = (1.0,)
+    film_rate: float = 0.5
+    turnover: float | None = None
+
+
+def orbit_class(orbit: Orbit, forcing: Forcing, limits: Thresholds) -> CageClass:
+    """Class of an ``orbit`` under its ``forcing``."""
     if orbit.radius < limits.still_radius or orbit.offset > orbit.radius:
         return "held"
     if orbit.radius >= limits.moving_radius and orbit.concentration >= limits.concentration:
-        slow = limits.lowest_rate <= orbit.rate <= limits.highest_rate
-        forced = any(abs(orbit.rate - order) <= limits.forced_band * abs(order) for order in forced_orders)
+        slow = limits.lowest_rate <= orbit.rate <= max(limits.highest_rate, forcing.film_rate)
+        forced = any(abs(orbit.rate - order) <= limits.forced_band * abs(order) for order in forcing.orders)
         return "circling" if slow or forced else "fast whirl"
-    if limits.rattling_turnover is None or turnover is None:
+    if limits.rattling_turnover is None or forcing.turnover is None:
         return "not judged"
-    return "rattling" if turnover > limits.rattling_turnover else "wandering"
+    return "rattling" if forcing.turnover > limits.rattling_turnover else "wandering"

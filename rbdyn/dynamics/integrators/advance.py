@@ -29,6 +29,7 @@ from rbdyn.dynamics.forces.state import (
     CAGE_VY,
     CAGE_X,
     CAGE_Y,
+    INNER_LOAD,
     LOADS,
     POCKET_CONTACT_LOAD,
     POCKET_LOAD,
@@ -37,8 +38,8 @@ from rbdyn.dynamics.forces.state import (
 from rbdyn.losses import POWERS
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
-# frame [rad/s].
-NOW, STEP, ERROR, SAMPLE, FRAME, CLOCK = range(6)
+# frame [rad/s], next time of the trace [s].
+NOW, STEP, ERROR, SAMPLE, FRAME, TRACED, CLOCK = range(7)
 # In ``Carry.counts``: steps, right-hand sides, and the component that made the last step impossible.
 ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
 # In ``Carry.stiffness``: steps tested, those that stability limits, sum of their |eigenvalue| [1/s].
@@ -78,6 +79,25 @@ class Control(NamedTuple):
     step_budget: int
 
 
+class Trace(NamedTuple):
+    """Record of some ``components`` of the state at times ``spacing`` [s] apart, which its reader empties.
+
+    ``samples``: (room, components). ``counts``: samples, and those whose step ends with a loaded contact of the inner race.
+    """
+
+    components: NDArray[np.int64]
+    spacing: float
+    samples: NDArray[np.float64]
+    counts: NDArray[np.int64]
+
+
+def trace_of(components: list[int], spacing: float, room: int) -> Trace:
+    """An empty trace with room for so many samples."""
+    return Trace(
+        np.array(components, dtype=np.int64), spacing, np.empty((room, len(components))), np.zeros(2, dtype=np.int64)
+    )
+
+
 class Carry(NamedTuple):
     """Memory from one call to the next. Arrays, changed in place."""
 
@@ -91,6 +111,7 @@ class Carry(NamedTuple):
     counts: NDArray[np.int64]
     stiffness: NDArray[np.float64]
     method: Any  # the implicit one with its work space
+    trace: Trace  # begins at the time in the clock, infinite for never
 
 
 class Tally(NamedTuple):
@@ -105,10 +126,11 @@ class Tally(NamedTuple):
 def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: Any) -> Carry:
     """Memory of an integration from the state ``y`` on, which tries ``first_step`` [s] first."""
     clock = np.zeros(CLOCK)
-    clock[STEP], clock[ERROR] = first_step, PI_START_ERROR
+    clock[STEP], clock[ERROR], clock[TRACED] = first_step, PI_START_ERROR, math.inf
     k, power, loads = (np.zeros((ROWS, columns)) for columns in (y.size, POWERS, LOADS))
     counts = np.zeros(COUNTS, dtype=np.int64)
-    return Carry(y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, np.zeros(STIFFNESS), method)
+    stiffness, trace = np.zeros(STIFFNESS), trace_of([], math.inf, 0)
+    return Carry(y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, stiffness, method, trace)
 
 
 def empty_tally() -> Tally:
@@ -223,6 +245,22 @@ def refine_peak(bearing, carry, h, tally):
     book_peaks(values, carry.clock[NOW], h, tally)
 
 
+@routine
+def book_trace(carry, h):
+    """Book the samples of the trace within a step of ``h`` [s], as far as there is room."""
+    trace, clock, method = carry.trace, carry.clock, carry.method
+    while clock[TRACED] <= clock[NOW] + h:
+        row = trace.counts[0]
+        if row < trace.samples.shape[0]:
+            theta = (clock[TRACED] - clock[NOW]) / h
+            for c in range(trace.components.size):
+                i = trace.components[c]
+                trace.samples[row, c] = interpolate(method, carry.y, carry.stage, carry.k, h, theta, i)
+            trace.counts[0] += 1
+            trace.counts[1] += carry.loads[method.last, INNER_LOAD] > 0.0
+        clock[TRACED] += trace.spacing
+
+
 @kernel
 def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
     """Book an accepted step: work, largest loads, samples; the cage's coordinates begin at ``body``.
@@ -298,6 +336,8 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 sample_step,
             ):
                 refine_peak(bearing, carry, h, tally)
+            if clock[TRACED] <= clock[NOW] + h:
+                book_trace(carry, h)
             counts[ACCEPTED] += 1
             clock[NOW] = t_end if cut else clock[NOW] + h
             for i in range(y.size):

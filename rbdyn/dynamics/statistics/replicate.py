@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Complex
 from rbdyn.losses import INNER_ROLLING, LOAD, POWER_TERMS, SHAFT
 
 
@@ -25,6 +25,8 @@ class Replicate:
     - ``energy_scale``: load of a contact times its approach
     - ``stiffness``: as in ``advance.Carry``
     - ``group``: of its start, as in ``parameters.state``
+    - ``cage_path``: of the cage's centre about its guide [m], complex, evenly in time; empty where it was not traced
+    - ``traced``: samples of it in each batch, and those with a loaded contact of the inner race
     """
 
     first: int
@@ -45,6 +47,8 @@ class Replicate:
     stiffness: Array = field(default_factory=lambda: np.zeros(3))
     orbit: Array = field(default_factory=lambda: np.zeros((0, 4)))
     group: int = 0
+    cage_path: Complex = field(default_factory=lambda: np.zeros(0, complex))
+    traced: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
