@@ -246,14 +246,18 @@ def test_command_refuses_a_file_for_a_folder(tmp_path, command):
 
 
 def test_readme_is_short_and_leads_somewhere():
-    """Report: at most 120 lines; one command each to run and to test; every link and every room of its map is there."""
+    """Report: at most 100 lines, short outside tables and code; one command each to run and to test; links and map are true."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 120
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert len(text.splitlines()) <= 100 and all(len(line) <= 100 for line in prose.splitlines() if line[:1] != "|")
+    rows = re.findall(r"^\|(.*)\|$", text.split("## Measured")[1], re.MULTILINE)
+    assert all(len(cell) <= 110 and ";" not in cell for row in rows for cell in row.split("|"))
     for title in ("Run", "Test"):
         section = text.split(f"\n## {title}\n")[1].split("\n## ")[0]
         assert len(re.findall(r"^```sh\n[^\n]+\n```$", section, re.MULTILINE)) == section.count("```") / 2 == 1
     links = re.findall(r"\]\(([^)]+)\)", text)
-    rooms = re.findall("`([a-z_/.]+)`", text.split("## Map of the house")[1].split("\n## ")[0])
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rooms = re.findall("`([a-z_/.]+)`", guide.split("## Source map")[1].split("\n## ")[0])
     for place in [*links, *(room for room in rooms if "/" in room)]:
         assert (ROOT / place).exists(), place
     for room in (room for room in rooms if "/" not in room):
@@ -261,3 +265,18 @@ def test_readme_is_short_and_leads_somewhere():
     parts_named = re.findall(r"\| `([a-z]+)` \|$", text, re.MULTILINE)
     page_parts = (ROOT / "examples" / "measured.md").read_text(encoding="utf-8")
     assert len(parts_named) > 5 and all(f"<!-- {name} -->" in page_parts for name in parts_named)
+
+
+def test_numbers_of_the_readme_are_those_of_their_part():
+    """Report: each number of a measured row of the README is one of its part of measured.md, to the digits that are stated."""
+    table = (ROOT / "README.md").read_text(encoding="utf-8").split("## Measured")[1]
+    page = (ROOT / "examples" / "measured.md").read_text(encoding="utf-8")
+    number, checked = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]\d+)?(?![\w.]*\d)"), 0
+    for result, name in re.findall(r"\| ([^|]+) \| `([a-z]+)` \|$", table, re.MULTILINE):
+        part = page.split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+        measured = [float(text) for text in number.findall(part)]
+        for text in number.findall(result):
+            decimals = len(text.partition(".")[2])
+            assert any(abs(value - float(text)) <= 0.51 * 10.0**-decimals for value in measured), (name, text)
+            checked += 1
+    assert checked > 12
