@@ -3,9 +3,8 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,11 +14,13 @@ from rbdyn.base.command import (
     Force,
     Json,
     alarm,
+    as_command,
     checkpoint_message,
     flag,
     folder_option,
     guarded,
     notice,
+    option_of,
     print_json,
     progress_bar,
     valued,
@@ -125,22 +126,7 @@ def command(name: str, about: str, kept: str = "", function: str = "", /, **opti
     kinds = dict[str, Any]()
     for key, kind in options.items():
         kinds |= dict(before.get(key, ())) | {key: kind} | ({"force": Force} if key == "out" else {})
-    parameters = [
-        Parameter(key, Parameter.POSITIONAL_OR_KEYWORD, default=_default(kind), annotation=kind)
-        for key, kind in kinds.items()
-    ]
-    first = [parameter for parameter in parameters if parameter.default is Parameter.empty]
-    rest = [parameter for parameter in parameters if parameter.default is not Parameter.empty]
-    run.__signature__ = Signature([*first, *rest])  # type: ignore[attr-defined]
-    run.__name__, run.__doc__ = name, about
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
-
-
-def _default(annotation: Any) -> Any:
-    """False of a flag, None of what may be left out, none of what must be stated."""
-    kind = get_args(annotation)[0]
-    return False if kind is bool else None if type(None) in get_args(kind) else Parameter.empty
+    return as_command(run, name, about, list(map(option_of, kinds, kinds.values())))
 
 
 def _hand_over(answer: "Answer", as_json: bool, detail: Detail) -> None:

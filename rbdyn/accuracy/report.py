@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Detail, Paragraph, Table
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.records import save_table
 from rbdyn.base.words import NOTABLE_S, counted, estimate
@@ -34,6 +34,13 @@ class Report:
     sheets: Mapping[str, Sequence[Mapping[str, Any]]]
     pictures: Mapping[str, Callable[[Path], None]] = field(default_factory=dict)
     failed: bool = False
+
+    @property
+    def blocks(self) -> list[Block]:
+        """Tables, conclusions and the machine; in full detail also the versions."""
+        used = ", ".join(f"{name} {text}" for name, text in self.record["versions"].items())
+        sentences = map(Paragraph, (*self.sentences, self.record["machine"]))
+        return [*self.tables, *sentences, Paragraph(used, detail=Detail.ALL)]
 
 
 class Progress:
@@ -119,10 +126,8 @@ def write(report: Report, folder: Path) -> list[str]:
 
 
 def show(report: Report, verbose: bool = False) -> None:
-    """Print tables, conclusions and the machine."""
-    used = ", ".join(f"{name} {text}" for name, text in report.record["versions"].items())
-    sentences = map(Paragraph, (*report.sentences, report.record["machine"]))
-    terminal.show([*report.tables, *sentences, Paragraph(used, detail=Detail.ALL)], Detail.of(False, verbose))
+    """Print the blocks of a report."""
+    terminal.show(report.blocks, Detail.of(False, verbose))
 
 
 def processor() -> str:

@@ -10,11 +10,12 @@ import string
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import reduce
+from inspect import Parameter, Signature, signature
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn, cast, get_args
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,7 +23,7 @@ from typer.main import get_command
 
 from rbdyn.base.blocks import Block, Detail, Table
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
-from rbdyn.base.folder import OutputFolder
+from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.loading import INTERRUPTED
 from rbdyn.base.notes import DANGER, Note, condensed, of_level
@@ -133,18 +134,87 @@ def hand_over(
         print(f"written to {folder}: {', '.join(files)}")
 
 
-def deliver(
-    folder: OutputFolder,
-    identity: Identity,
-    record: Callable[[], dict[str, Any]],
-    blocks: Callable[[], Sequence[Block]],
-    write: Callable[[Path], Sequence[str]],
-    as_json: bool,
-    detail: Detail = Detail.USUAL,
-) -> None:
-    """Write the files of a result with their report, then print the result: what every command with a result ends with."""
-    files = write_with_report(folder, identity, blocks, write)
-    hand_over(record, as_json, lambda: show([identity_line(identity), *blocks()], detail), folder.path, files)
+class Delivery(NamedTuple):
+    """What a command ends with: identity of the result, its JSON form, its blocks, what writes its files, and whether it failed.
+
+    Without an identity there is no report. ``closing`` prints what follows the result.
+    """
+
+    identity: Identity | None
+    record: Callable[[], dict[str, Any]]
+    blocks: Callable[[], Sequence[Block]]
+    write: Callable[[Path], Sequence[str]]
+    failed: bool = False
+    closing: Callable[[], object] = lambda: None
+
+
+class Console(NamedTuple):
+    """The console of a command: where its files go, and what it says meanwhile."""
+
+    folder: OutputFolder
+    as_json: bool
+    quiet: bool
+
+    def progress(self, title: str) -> AbstractContextManager[Callable[[int, int], None]]:
+        """The bar of progress."""
+        return progress_bar(title, self.quiet or self.as_json)
+
+    @property
+    def notice(self) -> Callable[[str], None] | None:
+        """Function that prints a note at once; None for a quiet command."""
+        return notice(self.quiet)
+
+    def deliver(self, delivery: Delivery, detail: Detail) -> None:
+        """Write the files of a result with their report, then print the result."""
+        identity, blocks, folder = delivery.identity, delivery.blocks, self.folder
+        files = write_with_report(folder, identity, blocks, delivery.write)
+        head = [] if identity is None else [identity_line(identity)]
+        hand_over(delivery.record, self.as_json, lambda: show([*head, *blocks()], detail), folder.path, files)
+        delivery.closing()
+
+
+def result_command(
+    title: str, files: Sequence[str], out: str, verbose: str = "", keeps: Sequence[str] = ()
+) -> Callable[[Callable[..., Delivery]], Callable[..., None]]:
+    """A command from a function of a console and of its own options; with --out, --force, --json, --quiet and, if it has a help, --verbose.
+
+    title : name of the command in its folder, where it writes ``files`` and ``keeps`` some from run to run
+    out, verbose : help of these options
+    """
+    more = {"out": Annotated[Path | None, folder_option(out)], "force": Force, "as_json": Json, "quiet": Quiet}
+    more |= {"verbose": Annotated[bool, verbose_flag(verbose)]} if verbose else {}
+
+    def made(run: Callable[..., Delivery]) -> Callable[..., None]:
+        def command(
+            out: Path | None, force: bool, as_json: bool, quiet: bool, verbose: bool = False, **own: Any
+        ) -> None:
+            with guarded(as_json), output_folder(out, title, files, keeps, force) as folder:
+                console = Console(folder, as_json, quiet)
+                notice(quiet)
+                delivery = run(console, **own)
+                console.deliver(delivery, Detail.of(quiet, verbose))
+            if delivery.failed:
+                raise typer.Exit(FAILED)
+
+        _, *own = signature(run).parameters.values()
+        return as_command(command, run.__name__, run.__doc__, [*own, *map(option_of, more, more.values())])
+
+    return made
+
+
+def as_command(function: Any, name: str, about: str | None, parameters: Sequence[Parameter]) -> Callable[..., None]:
+    """The function with the name, the help and the parameters of a command, those that must be stated first."""
+    stated = sorted(parameters, key=lambda parameter: parameter.default is not Parameter.empty)
+    function.__signature__, function.__name__, function.__doc__ = Signature(stated), name, about
+    function.__annotations__ = {parameter.name: parameter.annotation for parameter in stated}
+    return cast(Callable[..., None], function)
+
+
+def option_of(key: str, annotation: Any) -> Parameter:
+    """The parameter of an annotation: by default False of a flag, None of what may be left out, nothing of what must be stated."""
+    kind = get_args(annotation)[0]
+    default = False if kind is bool else None if type(None) in get_args(kind) else Parameter.empty
+    return Parameter(key, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation)
 
 
 def alarm(notes: Iterable[Note | Mapping[str, Any]]) -> None:
@@ -256,12 +326,12 @@ class Program(typer.Typer):
 
 
 def folder_option(says: str, default: str = "nothing is written") -> Any:
-    """``--out`` of a command whose files differ from those of ``Out``."""
+    """``--out`` of a command that writes a folder."""
     return valued("DIR", says, default, "--out")
 
 
 def verbose_flag(says: str) -> Any:
-    """``--verbose`` of a command whose details differ from those of ``Verbose``."""
+    """``--verbose`` of a command."""
     return flag("--verbose", "-v", says=says)
 
 
@@ -282,13 +352,11 @@ Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.tu
 Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
 Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
 Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
-Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
 OutFile = Annotated[Path | None, valued("FILE", "Write it to this file.", "standard output", "--out")]
 ForceFile = Annotated[bool, flag("--force", says="Write over the file of --out.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes but dangers.")]
-Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]
 
 
 # Column in which the comment on a key starts.

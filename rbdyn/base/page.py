@@ -27,14 +27,16 @@ LONG = 40
 
 def write_with_report(
     folder: OutputFolder,
-    identity: Identity,
+    identity: Identity | None,
     blocks: Callable[[], Sequence[Block]],
     write: Callable[[Path], Sequence[str]],
 ) -> list[str]:
-    """Write ``with_report`` into the folder of a command; names of the files, none without a folder. Raises OSError."""
+    """Write ``with_report`` into the folder of a command, without an identity the files alone; names of the files, none without
+    a folder. Raises OSError.
+    """
     if folder.path is None:
         return []
-    return folder.write(lambda stage: with_report(stage, identity, blocks, write))
+    return folder.write(lambda stage: with_report(stage, identity, blocks, write) if identity else [*write(stage)])
 
 
 def with_report(

@@ -2,7 +2,7 @@
 
 - ``app``: simulate, map, accuracy and show; ``simulation_output``, ``show``: what simulate and show print and write
 - ``compare``: two bearings; ``duty``: points of a duty, printed and on a map
-- ``ball``: the command of ball bearings, and an equilibrium; ``ball_studies``: its studies and sweeps
+- ``ball``: the command of ball bearings; ``ball_studies``: its equilibria, studies and sweeps
 - ``manual``: keys of a scene, and the manual as one page: keys, commands, equations and the prose between them
 - ``new``: the command; ``new_options``: the table of its options; ``new_drawing``: a bearing of one's own
 - ``new_scene``: a scene of a catalogue bearing or of one's own, from a template

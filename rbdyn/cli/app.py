@@ -10,7 +10,9 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
-from rbdyn.base.folder import OutputFolder, output_folder
+from rbdyn.base.command import Console, Delivery, result_command
+from rbdyn.base.faults import InputError, axis_values
+from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_of
 from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.terminal import show as show_blocks
@@ -19,11 +21,12 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.compare import compare
 from rbdyn.cli.manual import describe_keys, manual
 from rbdyn.cli.new import new
+from rbdyn.scene import Scene, rollers_only
+from rbdyn.scene.duty import AXES
 
 if TYPE_CHECKING:
     from rbdyn.cli.duty import MapDuty
     from rbdyn.dynamics.slip_map import SlipMap
-    from rbdyn.scene import Scene
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
 SIMULATION_FILES = (
@@ -61,7 +64,14 @@ def main(version: command.Version = False) -> None:
 
 
 @app.command()
+@result_command(
+    "rbdyn simulate",
+    (*SIMULATION_FILES, *DUTY_FILES, *REPORT_FILES),
+    "Write result.json, history.csv and pictures here.",
+    "Also print power terms and cost.",
+)
 def simulate(
+    console: Console,
     scene: command.SceneFile,
     assignments: command.Set = None,
     turns: command.Turns = None,
@@ -82,74 +92,58 @@ def simulate(
             "FILE", "Each point of a duty: CSV with name, share or hours, and keys; or TOML.", "one point", "--duty"
         ),
     ] = None,
-    out: command.Out = None,
-    force: command.Force = False,
-    as_json: command.Json = False,
-    quiet: command.Quiet = False,
-    verbose: command.Verbose = False,
-) -> None:
+) -> Delivery:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss; at one point or over a duty."""
-    files = (*SIMULATION_FILES, *DUTY_FILES, *REPORT_FILES)
-    with command.guarded(as_json), output_folder(out, "rbdyn simulate", files, force=force) as folder:
-        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
-        aim = None if target is None else _aim(target, turns, replicates)
-        if duty is not None:
-            raise typer.Exit(
-                _over_duty(loaded, (scene, duty), aim, workers, folder, as_json, Detail.of(quiet, verbose))
-            )
-        folder.claim(scene)
-        from rbdyn.dynamics.ensemble import plan_of, threads_of
-        from rbdyn.dynamics.simulate import simulate as run_scene
+    loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
+    aim = None if target is None else _aim(target, turns, replicates)
+    if duty is not None:
+        return _over_duty(console, loaded, (scene, duty), aim, workers)
+    console.folder.claim(scene)
+    from rbdyn.dynamics.ensemble import plan_of, threads_of
+    from rbdyn.dynamics.simulate import simulate as run_scene
 
-        if (say := command.notice(quiet)) is not None and aim is None:
-            say(plan_of(loaded, threads_of(workers)))
-        with command.progress_bar("simulating", quiet or as_json) as progress:
-            result = run_scene(loaded, workers, progress, target=aim, notice=say)
-        from rbdyn.cli import simulation_output
-        from rbdyn.scene.thermal import simulated_scene
+    if (say := console.notice) is not None and aim is None:
+        say(plan_of(loaded, threads_of(workers)))
+    with console.progress("simulating") as progress:
+        result = run_scene(loaded, workers, progress, target=aim, notice=say)
+    from rbdyn.cli import simulation_output
+    from rbdyn.scene.thermal import simulated_scene
 
-        loaded = simulated_scene(result)
-
-        identity = identity_of("rbdyn simulate", result.scene, [scene])
-        blocks = partial(simulation_output.blocks, result, out)
-        write = partial(simulation_output.write, loaded, result)
-        command.deliver(folder, identity, result.as_dict, blocks, write, as_json, Detail.of(quiet, verbose))
-    if result.status != "ok":
-        if not as_json:
-            command.alarm(result.notes)
-        raise typer.Exit(command.FAILED)
+    failed = result.status != "ok"
+    return Delivery(
+        identity_of("rbdyn simulate", result.scene, [scene]),
+        result.as_dict,
+        partial(simulation_output.blocks, result, console.folder.path),
+        partial(simulation_output.write, simulated_scene(result), result),
+        failed,
+        lambda: command.alarm(result.notes if failed and not console.as_json else ()),
+    )
 
 
 def _over_duty(
-    scene: "Scene",
-    files: tuple[Path, Path],
-    aim: float | None,
-    workers: int | None,
-    folder: OutputFolder,
-    as_json: bool,
-    detail: Detail,
-) -> int:
-    """Simulate every point of a duty, of the ``files`` of scene and duty; returns the exit code. Raises InputError before anything runs."""
+    console: Console, scene: Scene, files: tuple[Path, Path], aim: float | None, workers: int | None
+) -> Delivery:
+    """Simulate every point of a duty, of the ``files`` of scene and duty. Raises InputError before anything runs."""
     from rbdyn.scene.duty import duty_scenes, read_duty
 
-    points, quiet = read_duty(files[1]), detail == Detail.LEAST
+    points = read_duty(files[1])
     duty_scenes(scene, points, str(files[1]))
-    folder.claim(*files)
+    console.folder.claim(*files)
     from rbdyn.cli.duty import simulated_blocks, write_simulated
     from rbdyn.dynamics.duty_simulation import simulate_duty
 
-    with command.progress_bar("simulating", quiet or as_json) as progress:
-        found = simulate_duty(scene, points, workers, progress, aim, command.notice(quiet))
+    with console.progress("simulating") as progress:
+        found = simulate_duty(scene, points, workers, progress, aim, console.notice)
     places = zip(*((point.inner_speed_rpm, point.radial_load_N) for point in found.points), strict=True)
-    swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), places, strict=True))
-    identity = identity_of("rbdyn simulate --duty", found.scene, files, swept=swept)
+    identity = identity_of("rbdyn simulate --duty", found.scene, files, swept=dict(zip(AXES, places, strict=True)))
     answer, write = partial(simulated_blocks, found), partial(write_simulated, found)
-    command.deliver(folder, identity, found.as_dict, answer, write, as_json, detail)
-    return command.FAILED if found.failed else 0
+    return Delivery(identity, found.as_dict, answer, write, bool(found.failed))
 
 
 @app.command()
+@result_command("rbdyn accuracy", ACCURACY_FILES, "Write the study as JSON, CSV and pictures here.", "Also versions.")
 def accuracy(
+    console: Console,
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
     study: Annotated[
         str | None,
@@ -161,27 +155,16 @@ def accuracy(
         ),
     ] = None,
     assignments: command.Set = None,
-    out: Annotated[Path | None, command.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
-    force: command.Force = False,
-    as_json: command.Json = False,
-    quiet: command.Quiet = False,
-    verbose: Annotated[bool, command.verbose_flag("Also versions.")] = False,
-) -> None:
+) -> Delivery:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, its solver."""
-    with command.guarded(as_json), output_folder(out, "rbdyn accuracy", ACCURACY_FILES, force=force) as folder:
-        from rbdyn import accuracy as studies
-        from rbdyn.scene import Scene
+    from rbdyn import accuracy as studies
 
-        loaded = Scene.load(scene, assignments or [])
-        name = studies.study_name(study, loaded)
-        folder.claim(scene)
-        command.notice(quiet)
-        with command.progress_bar(name, quiet or as_json) as progress:
-            report = studies.study(name, loaded, progress)
-        files = folder.write(partial(studies.write, report)) if out else []
-        command.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), out, files)
-    if report.failed:
-        raise typer.Exit(command.FAILED)
+    loaded = Scene.load(scene, assignments or [])
+    name = studies.study_name(study, loaded)
+    console.folder.claim(scene)
+    with console.progress(name) as progress:
+        report = studies.study(name, loaded, progress)
+    return Delivery(None, lambda: report.record, lambda: report.blocks, partial(studies.write, report), report.failed)
 
 
 def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
@@ -217,7 +200,14 @@ def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
 
 
 @app.command("map")
+@result_command(
+    "rbdyn map",
+    (*MAP_FILES, *REPORT_FILES),
+    "Write map.json, map.csv and map.png here, and keep finished points.",
+    keeps=(MAP_POINTS,),
+)
 def slip_map(
+    console: Console,
     scene: command.SceneFile,
     speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
@@ -230,39 +220,36 @@ def slip_map(
     replicates: command.Replicates = None,
     seed: command.Seed = None,
     workers: command.Workers = None,
-    out: Annotated[
-        Path | None, command.folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
-    ] = None,
-    force: command.Force = False,
-    as_json: command.Json = False,
-    quiet: command.Quiet = False,
-) -> None:
+) -> Delivery:
     """Map cage slip, power loss, impact and whirl over speed and load."""
-    files = (*MAP_FILES, *REPORT_FILES)
-    with command.guarded(as_json), output_folder(out, "rbdyn map", files, (MAP_POINTS,), force) as folder:
-        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
-        from rbdyn.base.faults import axis_values
-        from rbdyn.dynamics.slip_map import slip_map as run_map
+    loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
+    from rbdyn.dynamics.slip_map import slip_map as run_map
 
-        axes = axis_values(speed, "--speed"), axis_values(load, "--load")
-        marked = _map_duty(loaded, duty, *axes)
-        folder.claim(scene)
-        points = out / MAP_POINTS if out else None
-        with command.checkpoint_message(points), command.progress_bar("mapping", quiet or as_json) as progress:
-            mapped = run_map(loaded, *axes, workers, progress, points, command.notice(quiet))
-        swept = dict(zip(("operation.inner_speed_rpm", "operation.radial_load_N"), axes, strict=True))
-        inputs = [scene] if duty is None else [scene, duty]
-        identity = identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept)
-        record, blocks = partial(_map_record, mapped, marked), partial(map_blocks, mapped, marked)
-        command.deliver(folder, identity, record, blocks, partial(_write_map, mapped, marked), as_json)
-        for point in mapped.failed:
-            print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
-    if mapped.failed:
-        raise typer.Exit(command.FAILED)
+    axes = axis_values(speed, "--speed"), axis_values(load, "--load")
+    marked = _map_duty(loaded, duty, *axes)
+    console.folder.claim(scene)
+    points = console.folder.path / MAP_POINTS if console.folder.path else None
+    with command.checkpoint_message(points), console.progress("mapping") as progress:
+        mapped = run_map(loaded, *axes, workers, progress, points, console.notice)
+    inputs = [scene] if duty is None else [scene, duty]
+    swept = dict(zip(AXES, axes, strict=True))
+    return Delivery(
+        identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept),
+        partial(_map_record, mapped, marked),
+        partial(map_blocks, mapped, marked),
+        partial(_write_map, mapped, marked),
+        bool(mapped.failed),
+        lambda: _print_failed(mapped),
+    )
+
+
+def _print_failed(mapped: "SlipMap") -> None:
+    for point in mapped.failed:
+        print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
 
 
 def _map_duty(
-    scene: "Scene",
+    scene: Scene,
     path: Path | None,
     speeds_rpm: Sequence[float],
     loads_N: Sequence[float],  # noqa: N803
@@ -275,17 +262,14 @@ def _map_duty(
     return map_duty(scene, path, speeds_rpm, loads_N)
 
 
-def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":
+def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
     """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
-    from rbdyn.scene import Scene, rollers_only
-
     numerics = (f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)
     return rollers_only(Scene.load(path, [*(assignments or []), *numerics]))
 
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     """Relative error that ``--target`` asks for. Raises InputError."""
-    from rbdyn.base.faults import InputError
     from rbdyn.dynamics.target import target_of
 
     if turns is not None or replicates is not None:

@@ -1,32 +1,46 @@
-"""Studies of ``rbdyn ball``: sweeps over keys, runout, preload, clearance, wear, race limits; their tables and files."""
+"""What ``rbdyn ball`` prints and writes: equilibria, sweeps over keys, runout, preload, clearance, wear, race limits."""
 
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
-from rbdyn.base.command import FAILED, checkpoint_message, deliver, progress_bar
+from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_notes
+from rbdyn.base.command import Console, Delivery, checkpoint_message
 from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.files import write_json
-from rbdyn.base.folder import OutputFolder
 from rbdyn.base.identity import identity_of
-from rbdyn.base.records import plain
+from rbdyn.base.notes import status_notes
+from rbdyn.base.records import plain, save_table
 from rbdyn.base.table import Column, Sheet
-from rbdyn.base.words import counted, label, shown, with_error
+from rbdyn.base.words import counted, label, range_ends, shown, with_error
+from rbdyn.mounting import other_ranges
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
-from rbdyn.quasistatic.result import RACES, remarks, ring_columns, row_columns, tipping
+from rbdyn.quasistatic.result import (
+    RACES,
+    BallResult,
+    DoubleDeckerReport,
+    RowReport,
+    ball_sheet,
+    remarks,
+    ring_columns,
+    row_columns,
+    tipping,
+)
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.turn import RingPath
-from rbdyn.quasistatic.sweep import SweepResult, notes_by_topic
+from rbdyn.quasistatic.sweep import SweepResult, keys_of_texts, notes_by_topic, sweep
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Points of a long table in the output from its start, and from its end.
 SHOWN = 8
@@ -44,35 +58,36 @@ HEADER = {
 }
 
 
-def run_sweep(
-    scene: "BallScene", texts: Sequence[str], folder: OutputFolder, source: Path, as_json: bool, quiet: bool
-) -> int:
-    """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
-    from rbdyn.quasistatic.sweep import keys_of_texts
-
+def run_sweep(console: Console, scene: BallScene, texts: Sequence[str], source: Path) -> Delivery:
+    """Sweep the scene of the file ``source`` as ``--sweep`` asks for. Raises InputError."""
     keys = keys_of_texts(texts)
-    folder.claim(source)
-    from rbdyn.quasistatic.sweep import sweep
-
-    kept_in = folder.path / "sweep.part" if folder.path else None
-    with checkpoint_message(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
+    console.folder.claim(source)
+    kept_in = console.folder.path / "sweep.part" if console.folder.path else None
+    with checkpoint_message(kept_in), console.progress("sweeping") as progress:
         result = sweep(scene, keys, progress, kept_in)
-    identity = identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys)
-    answer, write = partial(sweep_blocks, result), partial(write_sweep, result)
-    deliver(folder, identity, result.as_dict, answer, write, as_json, Detail.of(quiet))
+    return Delivery(
+        identity_of("rbdyn ball --sweep", result.scene, [source], swept=result.keys),
+        result.as_dict,
+        partial(sweep_blocks, result),
+        partial(write_sweep, result),
+        bool(result.failures),
+        lambda: _print_failures(result),
+    )
+
+
+def _print_failures(result: SweepResult) -> None:
     for places in result.failures.values():
         print(f"{result.where(places)}: {result.statuses[places[0]]}", file=sys.stderr)
-    return FAILED if result.failures else 0
 
 
-def sweep_blocks(result: "SweepResult") -> list[Block]:
+def sweep_blocks(result: SweepResult) -> list[Block]:
     """The points, what they cost and the notes."""
     points = counted(len(result.statuses), "point")
     spent = f"{points} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
     return with_notes(result.placed_notes, [points_table(result), Paragraph(spent)])
 
 
-def points_table(result: "SweepResult") -> Table:
+def points_table(result: SweepResult) -> Table:
     """The points, of a long sweep the first and the last ones."""
     count = len(result.statuses)
     ends = (*range(SHOWN), *range(count - SHOWN, count)) if count > 2 * SHOWN else range(count)
@@ -83,7 +98,7 @@ def points_table(result: "SweepResult") -> Table:
     return Table("", [*units, *HEADER], rows)
 
 
-def write_sweep(result: "SweepResult", folder: Path) -> list[str]:
+def write_sweep(result: SweepResult, folder: Path) -> list[str]:
     """Write sweep.json, sweep.csv and pictures; returns the names of the files."""
     from rbdyn.plots.ball import sweep_pictures
 
@@ -92,14 +107,14 @@ def write_sweep(result: "SweepResult", folder: Path) -> list[str]:
     return ["sweep.json", "sweep.csv", *sweep_pictures(result, folder)]
 
 
-def _row(result: "SweepResult", place: int) -> list[str]:
+def _row(result: SweepResult, place: int) -> list[str]:
     keys = [f"{value:.6g}" for value in result.key_values(place).values()]
     if result.statuses[place] != "ok":
         return keys + ["failed"] * len(HEADER)
     return keys + [_cell(result, names, place) for names in HEADER.values()]
 
 
-def _cell(result: "SweepResult", names: Sequence[str], place: int) -> str:
+def _cell(result: SweepResult, names: Sequence[str], place: int) -> str:
     columns: dict[str, Any] = result.columns
     rows = ("",) if names[0] in columns else ("inner_row_", "outer_row_")
     values = [max(float(columns[f"{row}{name}"][place]) for name in names) for row in rows]
@@ -222,29 +237,19 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
 
 
 def run(
-    scene: BallScene,
-    name: str,
-    value: str,
-    target_yield: float,
-    seed: int,
-    folder: OutputFolder,
-    source: Path,
-    as_json: bool,
-    quiet: bool,
-) -> int:
-    """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
-    folder.claim(source)
+    console: Console, scene: BallScene, name: str, value: str, target_yield: float, seed: int, source: Path
+) -> Delivery:
+    """Carry out the study ``name`` over ``value``. Raises InputError."""
+    console.folder.claim(source)
     table: SweepResult | None = None
     if name == "race_limits":
         record = race_limits(scene, value, target_yield, seed)
     else:
         record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
-    command = f"rbdyn ball --{name.replace('_', '-')}"
-    swept = table.keys if table else {}
+    command, swept = f"rbdyn ball --{name.replace('_', '-')}", table.keys if table else {}
     identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
     answer, write = partial(blocks, record, table), partial(write_study, name, record, table)
-    deliver(folder, identity, lambda: record, answer, write, as_json, Detail.of(quiet))
-    return 0
+    return Delivery(identity, lambda: record, answer, write)
 
 
 def write_study(name: str, record: dict[str, Any], table: SweepResult | None, folder: Path) -> list[str]:
@@ -295,3 +300,161 @@ def _limits(record: dict[str, Any]) -> list[Block]:
         replace(limit_sheet(record).block, caption=title),
         Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
     ]
+
+
+def equilibrium_blocks(result: BallResult) -> list[Block]:
+    """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; without an equilibrium nothing but the
+    temperatures of the search for steady ones."""
+    if not result.is_equilibrium:
+        thermal = result.thermal or {}
+        return with_notes(status_notes(result.status), [_search_table(thermal)] if "path_heat_W" in thermal else [])
+    titles = {name: f"{name} row" if name else "" for name in result.row_reports}
+    rows: list[Block] = []
+    for name, row in result.row_reports.items():
+        rows += [Heading(titles[name]), *map(Paragraph, _row_sentences(row))]
+    tables = [block for name, row in result.row_reports.items() for block in _row_tables(titles[name], row)]
+    sentences = []
+    report = result.reached
+    if isinstance(report, DoubleDeckerReport):
+        sentences += _middle_ring(report)
+    moment = report.reaction["moment_Nm"] if report.reaction else {}
+    if any(moment.values()):
+        sentences.append(
+            "moment on the inner ring: " + ", ".join(f"about {axis} {moment[axis]:.4g} N m" for axis in "xy")
+        )
+    if result.fits is not None:
+        sentences.append(_fits(result.fits))
+    if result.temperatures_C is not None and result.thermal is not None:
+        sentences += _temperatures(result.temperatures_C, result.thermal)
+    if result.runout is not None:
+        sentences.append(_runout(result.runout))
+    from rbdyn.compiled.kernel import compiler_notes
+
+    whole = Heading("whole bearing" if sentences and any(titles.values()) else "")
+    answer = [*rows, whole, *map(Paragraph, sentences), *tables]
+    return with_notes((*(result.notes or ()), *compiler_notes()), answer)
+
+
+def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
+    """The result with the runout of its ring, and the path of that, where the scene has form errors."""
+    if scene.errors is None or not result.is_equilibrium:
+        return result, None
+    record, followed = runout_record(scene)
+    return replace(result, runout=record), followed.table()
+
+
+def write_equilibrium(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list[str]:
+    """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
+    result.save(folder / "result.json")
+    if not result.is_equilibrium:
+        return ["result.json"]
+    from rbdyn.plots.ball import pictures
+
+    files = ["result.json", ball_sheet(result.row_reports).save(folder, "%.8g"), *pictures(result, folder)]
+    if path is not None:
+        save_table(path, folder / "runout.csv", "%.8g")
+        files.append("runout.csv")
+    return files
+
+
+def _row_tables(title: str, row: RowReport) -> list[Block]:
+    """The balls; in full detail also the stiffness matrix and the cost of the search."""
+    names = ("x", "y", "z", "tilt x", "tilt y")
+    matrix = [
+        (name, *(f"{value:.4g}" for value in values))
+        for name, values in zip(names, row.stiffness["matrix_SI"], strict=True)
+    ]
+    searches = "" if row.searches is None else f"{row.searches} searches, "
+    spent = f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over"
+    return [
+        replace(ball_sheet({"": row}).block, caption=title),
+        Table("Stiffness [N/m, N, N m]", ("", *names), matrix, detail=Detail.ALL),
+        Paragraph(spent, detail=Detail.ALL),
+    ]
+
+
+def _row_sentences(row: RowReport) -> list[str]:
+    tilts = ", ".join(f"tilt {axis} {row.tilt_mrad[axis]:.4g} mrad" for axis in "xy")
+    sentences = [f"ring (x along the radial load, z along the axis): {_place(row.displacement_mm)}, {tilts}"]
+    for race, contact in row.contacts.items():
+        film = ""
+        if "central_film_um" in contact:
+            film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
+        axes = " x ".join(shown(1e3 * contact[f"semi_{axis}_mm"], 3) for axis in ("major", "minor"))
+        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
+        sentences.append(f"{race} race: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
+    life = row.life
+    if life["L10_Mrev"] is not None:
+        hours = f", {shown(life['L10_h'], 3)} h" if life["L10_h"] is not None else ""
+        sentences.append(f"life L10r: {shown(life['L10_Mrev'], 3)} million turns{hours} ({life['method']})")
+    return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
+
+
+def _edge(contact: dict[str, float]) -> str:
+    """How near the ellipse comes to the shoulder; empty without a contact."""
+    if "edge_angle_deg" not in contact:
+        return ""
+    return f", its edge at {contact['edge_angle_deg']:.3g} deg (shoulder at {contact['shoulder_angle_deg']:.3g})"
+
+
+def _place(place: dict[str, float]) -> str:
+    return ", ".join(f"{axis} {1e3 * place[axis]:.4g} µm" for axis in "xyz")
+
+
+def _diagonal(stiffness: dict[str, Any]) -> str:
+    return ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/µm" for axis in "xyz")
+
+
+def _middle_ring(report: DoubleDeckerReport) -> list[str]:
+    middle = report.middle_ring
+    share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
+    return [
+        f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})",
+        f"both rows: {_place(report.displacement_mm)}; stiffness {_diagonal(report.stiffness)}",
+    ]
+
+
+def _fits(fits: dict[str, Any]) -> str:
+    loosens = fits["inner_ring_loosens_rpm"]
+    state = "loose" if fits["inner_ring_loose"] else "tight"
+    when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
+    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
+    return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
+
+
+NODE_NAMES = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": "balls"}
+
+
+def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]:
+    """Steady temperatures with their ranges, heat and its ways out, clearance and contact angle in operation."""
+    spans = thermal["ranges"]
+    parts = ", ".join(f"{part} {nodes[node]:.1f} ({range_ends(spans[node])})" for node, part in NODE_NAMES.items())
+    friction = thermal["friction_W"]
+    ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
+    clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
+    return [
+        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; gain of the loop {thermal['gain']:.2g}",
+        f"heat by SKF's friction model: {sum(friction.values()):.4g} W, rolling {friction['rolling']:.4g} and sliding "
+        f"{friction['sliding']:.4g}; carried off by {ways}",
+        f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "
+        f"{angle['operating']:.4g} deg of {angle['drawn']:.4g}",
+        other_ranges(spans),
+    ]
+
+
+def _search_table(thermal: dict[str, Any]) -> Table:
+    """Temperatures, heat and clearance of the states visited."""
+    header = (*(f"{part} [°C]" for part in NODE_NAMES.values()), "heat [W]", "clearance [µm]")
+    states = zip(thermal["path_C"], thermal["path_heat_W"], thermal["path_clearance_um"], strict=True)
+    rows = [
+        [*(f"{state[node]:.1f}" for node in NODE_NAMES), f"{heat:.4g}", f"{clearance:.4g}"]
+        for state, heat, clearance in states
+    ]
+    return Table("search for steady temperatures", header, rows)
+
+
+def _runout(runout: dict[str, Any]) -> str:
+    radial = f"{runout['indicator_um']:.3g} µm by an indicator, {runout['minimum_zone_um']:.3g} µm between circles"
+    axial = f"axial {runout['axial_um']:.3g} µm, face {runout['face_um']:.3g} µm"
+    asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} µm"
+    return f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}"

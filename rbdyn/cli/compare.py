@@ -10,7 +10,7 @@ import typer
 
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
-from rbdyn.base.folder import output_folder
+from rbdyn.base.command import Console, Delivery, result_command
 from rbdyn.base.identity import Identity, identity_of
 from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.words import counted, improvement, quantity
@@ -23,7 +23,14 @@ FILES = ("comparison.json", "inputs.csv", "differences.csv")
 ABSOLUTE = ("°C", "µm", "mrad", "deg")
 
 
+@result_command(
+    "rbdyn compare",
+    (*FILES, *REPORT_FILES),
+    "Write comparison.json, inputs.csv and differences.csv here.",
+    "Also losses, clearances and contacts one by one.",
+)
 def compare(
+    console: Console,
     a: Annotated[Path, typer.Argument(metavar="A", help="A scene, a saved result, or a folder that holds one.")],
     b: Annotated[
         Path | None, typer.Argument(metavar="B", help="Another of the same kind.", show_default="A with --set")
@@ -41,31 +48,18 @@ def compare(
     replicates: command.Replicates = None,
     seed: command.Seed = None,
     workers: command.Workers = None,
-    out: Annotated[
-        Path | None, command.folder_option("Write comparison.json, inputs.csv and differences.csv here.")
-    ] = None,
-    force: command.Force = False,
-    as_json: command.Json = False,
-    quiet: command.Quiet = False,
-    verbose: Annotated[bool, command.verbose_flag("Also losses, clearances and contacts one by one.")] = False,
-) -> None:
+) -> Delivery:
     """Compare two bearings: inputs that differ, figures, and which of the differences are significant."""
-    files = (*FILES, *REPORT_FILES)
-    with command.guarded(as_json), output_folder(out, "rbdyn compare", files, force=force) as folder:
-        folder.claim(a, *([] if b is None else [b]))
-        from rbdyn.comparison import compare as run
-        from rbdyn.comparison import file_of
+    console.folder.claim(a, *([] if b is None else [b]))
+    from rbdyn.comparison import compare as run
+    from rbdyn.comparison import file_of
 
-        shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
-        both = [f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None]
-        with command.progress_bar("comparing", quiet or as_json) as progress:
-            found = run(a, b, assignments or [], both, workers, progress, command.notice(quiet))
-        inputs = [file_of(path) for path in (a, b) if path is not None]
-        identity = _identity(found, inputs)
-        answer, write = partial(blocks, found), partial(_write, found)
-        command.deliver(folder, identity, found.as_dict, answer, write, as_json, Detail.of(quiet, verbose))
-    if found.failed:
-        raise typer.Exit(command.FAILED)
+    shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
+    both = [f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None]
+    with console.progress("comparing") as progress:
+        found = run(a, b, assignments or [], both, workers, progress, console.notice)
+    identity = _identity(found, [file_of(path) for path in (a, b) if path is not None])
+    return Delivery(identity, found.as_dict, partial(blocks, found), partial(_write, found), found.failed)
 
 
 def _identity(found: "Comparison", files: Sequence[Path]) -> Identity:

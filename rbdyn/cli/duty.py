@@ -16,7 +16,7 @@ from rbdyn.base.words import quantity, shown, with_error
 from rbdyn.dynamics.figures import BEARING, of_kind
 from rbdyn.life.duty import PointLife, life_notes, life_sheet
 from rbdyn.scene import Scene
-from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
+from rbdyn.scene.duty import AXES, DutyPoint, duty_scenes, read_duty, shares_of_time
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.duty_simulation import DutySimulation, SimulatedPoint, Worst
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 # Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
 SHOWN = {figure.panel[1]: (figure.key, figure.percent) for figure in BEARING if figure.panel}
 CLEARANCES = {figure.source[0]: (figure.key, 1.0) for figure in of_kind("clearance")}
-# Keys of the axes of a map.
-AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 
 
 class MapDuty(Record):

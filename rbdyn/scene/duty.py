@@ -29,6 +29,8 @@ from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 
 MOST_POINTS = 12
+# Keys of speed and load, the axes of a map.
+AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
 # Columns of a table of points besides the keys of the scene: the name, and the share of the time, or hours in its place.
 NAME, TIMES = "name", {"share": Limits(1.0, sign="not negative"), "hours": Limits(1e9, sign="not negative")}
 # Keys that a point may not set, with the reasons.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,9 +10,11 @@ import pytest
 from conftest import ROOT, lacking
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 from rbdyn import equilibrium
 from rbdyn.base.faults import InputError
+from rbdyn.cli.app import app
 from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.quasistatic import sweep as sweeps
@@ -298,17 +299,18 @@ def test_command_line_sweeps(command, tmp_path):
 
 def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     """Command line: a long table is cut; failures are grouped on standard error and the exit code is 1."""
-    from rbdyn.base.folder import OutputFolder
-    from rbdyn.cli import ball_studies as sweep_command
+    from rbdyn.cli import ball_studies
 
-    folder = OutputFolder(None, "rbdyn ball", ())
-    monkeypatch.setattr(sweeps, "sweep", lambda *rest: broken)
-    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], folder, Path("scene.toml"), False, True) == 1
-    shown = capsys.readouterr()
-    assert "failed" in shown.out and shown.err.startswith(f"2 points, the first at {SPEED} = 10000: no equilibrium")
-    monkeypatch.setattr(sweeps, "sweep", lambda *rest: grid)
-    assert sweep_command.run_sweep(scene_with(), [f"{SPEED}=1,2"], folder, Path("scene.toml"), False, True) == 0
-    assert "12 points" in capsys.readouterr().out
+    def swept(result):
+        monkeypatch.setattr(ball_studies, "sweep", lambda *rest: result)
+        ran = CliRunner().invoke(app, ["ball", str(EXAMPLE), "--sweep", f"{SPEED}=1,2"])
+        return ran.exit_code, ran.stdout, ran.stderr
+
+    code, out, error = swept(broken)
+    assert code == 1 and "failed" in out
+    assert error.startswith(f"2 points, the first at {SPEED} = 10000: no equilibrium")
+    code, out, _ = swept(grid)
+    assert code == 0 and "12 points" in out
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text
-from rbdyn.cli.ball import blocks
+from rbdyn.cli.ball_studies import equilibrium_blocks
 from rbdyn.quasistatic.bearing import equilibrium, row_of
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.scene import BallScene, Scene
@@ -56,7 +56,7 @@ def test_the_note_says_by_how_much_an_ellipse_is_beyond_the_shoulder(race: str) 
                 f"climbs 1 deg over the stated {race} shoulder of {height:.3g} mm; make it higher, or reduce"
                 in notes[0]
             )
-    assert f"its edge at {edge:.3g} deg (shoulder at" in text(blocks(result))
+    assert f"its edge at {edge:.3g} deg (shoulder at" in text(equilibrium_blocks(result))
 
 
 def test_the_default_shoulder_is_a_fifth_of_the_ball_or_beyond_a_steep_angle() -> None:
@@ -83,7 +83,7 @@ def test_a_shoulder_is_lower_than_its_groove_radius() -> None:
 
 
 def test_semi_axes_have_three_digits_and_no_exponent() -> None:
-    shown = text(blocks(equilibrium(thrust(30_000.0))))
+    shown = text(equilibrium_blocks(equilibrium(thrust(30_000.0))))
     contact = equilibrium(thrust(30_000.0)).row_reports[""].contacts["inner"]
     assert 1.0 < contact["semi_major_mm"] < 10.0 and "e+" not in shown
     major, minor = (float(f"{1e3 * contact[f'semi_{axis}_mm']:.3g}") for axis in ("major", "minor"))
