@@ -172,8 +172,9 @@ class SimulationResult(Brief, SavedRecord):
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
     - ``verdict``: class of the cage by its orbit, None where the scene leaves it out
-    - ``part_figures``: power terms, operating clearances, contact pressures and films by name, each with its errors
-      (``rbdyn.dynamics.figures``)
+    - ``part_figures``: power terms, operating clearances, contact pressures and films, life and stiffness by name, each with its
+      errors (``rbdyn.dynamics.figures``)
+    - ``stiffness_N_um``: "xx" along the load, "yy" across it, of the static loads by ISO/TS 16281; None where no roller carries load
     """
 
     FORMAT = "rbdyn.simulation/5"
@@ -202,6 +203,7 @@ class SimulationResult(Brief, SavedRecord):
     part_figures: dict[str, Quantity] | None = None
     damage: dict[str, Quantity] | None = None
     verdict: CageVerdict | None = nullable(default=None)
+    stiffness_N_um: dict[str, float] | None = derived(lambda self: self._stiffness())  # noqa: N815
 
     impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
     power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815
@@ -215,6 +217,11 @@ class SimulationResult(Brief, SavedRecord):
             if isinstance(figure, FigureOf) and name not in result.figures:
                 raise KeyError(name)
         return result
+
+    def _stiffness(self) -> dict[str, float] | None:
+        parts = self.part_figures or {}
+        keys = {axis: f"stiffness_{axis}_N_um" for axis in ("xx", "yy")}
+        return {axis: parts[key].value for axis, key in keys.items()} if keys["xx"] in parts else None
 
     @property
     def cage_orbit_radius_share(self) -> Quantity | None:

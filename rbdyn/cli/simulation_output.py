@@ -38,6 +38,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
         *_clearances(result),
         Paragraph(_life_sentence(result)),
+        Paragraph(_stiffness_sentence(result)),
         *([] if result.friction_check is None else [Paragraph(_friction_sentence(result.friction_check))]),
         *_losses(result),
         Remarks((*result.notes, *compiler_notes())),
@@ -170,6 +171,21 @@ def _life_sentence(result: SimulationResult) -> str:
     if life["L10_h"] is None:
         return ""
     return f"life L10r: {shown(life['L10_h'], 2)} h, {shown(life['L10_Mrev'], 2)} million turns (ISO/TS 16281, static loads)"
+
+
+def _stiffness_sentence(result: SimulationResult) -> str:
+    """Stiffness by static loads in a line; empty where no roller carries load, or the bearing had no steady temperatures."""
+    if result.status != "ok" or result.stiffness_N_um is None:
+        return ""
+    parts = result.part_figures or {}
+    along, across, travel = (
+        with_error(figure.value, figure.stated_error) if figure.stated_error else shown(figure.value, 3)
+        for figure in (parts[figure.key] for figure in of_kind("stiffness"))
+    )
+    return (
+        f"stiffness: {along} N/µm along the load, {across} N/µm across it; the shaft's centre moves by {travel} µm while the "
+        "rollers pass a pitch (ISO/TS 16281, static loads)"
+    )
 
 
 # Tables of a scene that a drawing, a machine and its oil give.

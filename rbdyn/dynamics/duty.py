@@ -1,6 +1,7 @@
-"""Life of a roller bearing over a duty, from the static loads of ISO/TS 16281 at each point; nothing is simulated for it."""
+"""Life of a roller bearing, also over a duty, and its stiffness, from static loads by ISO/TS 16281; nothing is simulated for them."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from rbdyn.contact.hertz_line import iso_16281, slice_centres
 from rbdyn.dynamics.parameters.model import roller_relief
 from rbdyn.life import turning_rings
 from rbdyn.life.duty import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life
-from rbdyn.life.rollers import ReferenceLife, RollerContacts, reference_life, static_loads
+from rbdyn.life.rollers import ReferenceLife, RollerContacts, Stiffness, reference_life, static_loads, static_stiffness
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 
@@ -21,12 +22,13 @@ def static_life(scene: Scene) -> ReferenceLife:
     are left out. Edge stresses count where the roller has a profile, as in ``motion.rating_life``.
     """
     drawing, geometry = scene.bearing, scene.geometry
-    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    contacts = RollerContacts(
-        iso_16281(modulus, drawing.effective_length).stiffness, (_relief(scene, "inner"), _relief(scene, "outer"))
-    )
+    angle = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
     inner, outer = static_loads(
-        contacts, drawing.rollers, scene.operation.largest_load_N, geometry.clearance, geometry.centrifugal_force
+        static_contacts(scene, angle),
+        drawing.rollers,
+        scene.operation.largest_load_N,
+        geometry.clearance,
+        geometry.centrifugal_force,
     )
     return reference_life(
         inner,
@@ -38,14 +40,35 @@ def static_life(scene: Scene) -> ReferenceLife:
     )
 
 
-def _relief(scene: Scene, race: str) -> Array:
-    """Profile drop less the rise by tilt at the slice centres [m], (1, slices), or (rollers, slices) with a tilt."""
+def row_stiffness(scene: Scene, clearance: float | None = None) -> Stiffness:
+    """Stiffness of the row, mean over a pitch, by the loads, contacts and omissions of ``static_life``.
+
+    ``clearance``: diametral [m], by default the operating one. Raises MethodError where no roller carries load.
+    """
+    geometry = scene.geometry
+    return static_stiffness(
+        partial(static_contacts, scene),
+        scene.bearing.rollers,
+        scene.operation.largest_load_N,
+        geometry.clearance if clearance is None else clearance,
+        geometry.centrifugal_force,
+    )
+
+
+def static_contacts(scene: Scene, angle: Array) -> RollerContacts:
+    """Contacts of rollers at these azimuths (n,) from the load [rad]."""
+    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
+    line = iso_16281(modulus, scene.bearing.effective_length).stiffness
+    return RollerContacts(line, (_relief(scene, "inner", angle), _relief(scene, "outer", angle)))
+
+
+def _relief(scene: Scene, race: str, angle: Array) -> Array:
+    """Profile drop less the rise by tilt at the slice centres [m], (1, slices), or (n, slices) with a tilt."""
     drawing, slices = scene.bearing, scene.slices
     drop = roller_relief(scene, slices)[None]
     if drawing.tilt == 0.0:
         return drop
     share = drawing.inner_tilt_share if race == "inner" else 1.0 - drawing.inner_tilt_share
-    angle = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
     tilt = drawing.tilt * share * np.cos(angle - drawing.tilt_direction)
     return np.asarray(drop - tilt[:, None] * slice_centres(slices, drawing.effective_length))
 

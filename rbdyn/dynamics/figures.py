@@ -58,7 +58,7 @@ class Figure:
     meaning: str
     statistic: Statistic | None = None
     scale: "float | Callable[[Scene], float | None]" = 1.0
-    kind: Literal["bearing", "damage", "temperature", "power", "clearance", "life", "contact"] = "bearing"
+    kind: Literal["bearing", "damage", "temperature", "power", "clearance", "life", "stiffness", "contact"] = "bearing"
     source: tuple[str, ...] = ()
     tested: bool = False
     slow: bool = True
@@ -270,7 +270,10 @@ DAMAGE = (
 
 
 def why_missing(scene: "Scene", key: str) -> str | None:
-    """Why a scene has no such figure of damage, with the fix; None where it has."""
+    """Why a scene has no such figure of damage or stiffness, with the fix; None where it has."""
+    stiff = key in {figure.key for figure in of_kind("stiffness")}
+    if stiff and scene.thermal is None and scene.operation.largest_load_N == 0.0 and scene.geometry.clearance >= 0.0:
+        return "the scene has no load and no preload; raise operation.radial_load_N or choose another figure"
     figure = next((figure for figure in DAMAGE if figure.key == key), None)
     if figure is None:
         return None
@@ -316,6 +319,24 @@ PARTS = (
     ),
     # 1/L is damage an hour (Palmgren and Miner).
     Figure("life_h", "life L10r by static loads (ISO/TS 16281)", kind="life", harmonic=True, worst="least"),
+    # x is along the load, y across it.
+    Figure(
+        "stiffness_xx_N_um",
+        "stiffness along the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
+        kind="stiffness",
+        worst="least",
+    ),
+    Figure(
+        "stiffness_yy_N_um",
+        "stiffness across the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
+        kind="stiffness",
+        worst="least",
+    ),
+    Figure(
+        "variable_compliance_um",
+        "travel of the shaft's centre while the rollers pass a pitch, peak to peak, along or across the load, whichever is larger",
+        kind="stiffness",
+    ),
     *(
         Figure(
             f"{race}_{key}",

@@ -1,4 +1,4 @@
-"""Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, life, each with its errors.
+"""Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, life, stiffness, with their errors.
 
 Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figures``.
 """
@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rbdyn.base.faults import InputError
-from rbdyn.dynamics.duty import static_life
+from rbdyn.base.faults import InputError, MethodError
+from rbdyn.dynamics.duty import row_stiffness, static_life
 from rbdyn.dynamics.figures import PARTS, of_kind
 from rbdyn.dynamics.forces.state import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.validity import race_report
@@ -22,7 +22,8 @@ from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
 CLEARANCES, CONTACTS, (LIFE,) = of_kind("clearance"), of_kind("contact"), of_kind("life")
-EXACT = [figure.key for figure in (*CLEARANCES, LIFE)]
+STIFFNESS = [figure.key for figure in of_kind("stiffness")]
+EXACT = [*(figure.key for figure in (*CLEARANCES, LIFE)), *STIFFNESS]
 
 
 def races_of(scene: Scene, runs: Runs) -> dict[str, dict[str, float]]:
@@ -33,7 +34,7 @@ def races_of(scene: Scene, runs: Runs) -> dict[str, dict[str, float]]:
 def part_figures(scene: Scene, runs: Runs, figures: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """Every figure of parts that the scene has, by its key; ``figures``: those that follow from batches.
 
-    A clearance is exact for its scene, and so is the life; there is none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
+    A clearance is exact for its scene, and so are life and stiffness, of which there are none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
     """
     exact = {name: Quantity(value, 0.0, 0.0, float(len(runs))) for name, value in _exact(scene).items()}
     races, reports = races_of(scene, runs), [races_of(scene, [run]) for run in runs]
@@ -50,7 +51,7 @@ def part_figures(scene: Scene, runs: Runs, figures: Mapping[str, Quantity]) -> d
 def at_temperatures_with_errors(
     scene: Scene, figures: Mapping[str, Quantity], temperatures: Mapping[str, Quantity]
 ) -> dict[str, Quantity]:
-    """The figures of a scene with a heat balance, whose clearances and life have the errors of its ``temperatures`` by node.
+    """The figures of a scene with a heat balance, whose clearances, life and stiffness have the errors of its ``temperatures`` by node.
 
     These errors have one cause, the friction, so that their effects add; unknown where a temperature within them is impossible.
     """
@@ -67,7 +68,12 @@ def at_temperatures_with_errors(
                 _exact(at_temperatures(scene, Temperatures(**{**nodes, node: nodes[node] + shift})))
                 for node, shift in shifts.items()
             ]
-            errors[kind] = {name: math.fsum(abs(other[name] - value) for other in moved) for name, value in at.items()}
+            errors[kind] = {
+                name: math.fsum(abs(other[name] - value) for other in moved)
+                if all(name in other for other in moved)
+                else None
+                for name, value in at.items()
+            }
     freedom = min((one.degrees_of_freedom for one in temperatures.values() if one.degrees_of_freedom), default=None)
     return {
         name: replace(
@@ -83,11 +89,20 @@ def at_temperatures_with_errors(
 
 
 def _exact(scene: Scene) -> dict[str, float]:
-    """Operating clearances [um] of a scene and its life [h], by the key of their figure."""
+    """Operating clearances [um] of a scene, its life [h] and stiffness [N/um], by the key of their figure."""
     gaps = scene.clearances
     figures = {figure.key: 1e6 * gap.operating for figure in CLEARANCES if (gap := gaps[figure.source[0]]) is not None}
     hours = static_life(scene).hours(*scene.operation.speeds)
-    return figures | ({LIFE.key: hours} if math.isfinite(hours) else {})
+    return figures | ({LIFE.key: hours} if math.isfinite(hours) else {}) | _stiffness(scene)
+
+
+def _stiffness(scene: Scene) -> dict[str, float]:
+    """Stiffness along and across the load [N/um] and travel over a pitch [um]; empty where no roller carries load."""
+    try:
+        found = row_stiffness(scene)
+    except MethodError:
+        return {}
+    return dict(zip(STIFFNESS, (1e-6 * found.along, 1e-6 * found.across, 1e6 * max(found.travel)), strict=True))
 
 
 def _extreme(value: float, values: list[float]) -> Quantity:

@@ -371,58 +371,133 @@ def _heat_of_seat(seat: float) -> float:
 
 
 class Stiffness(NamedTuple):
-    """Stiffness of a row of rollers under a static radial load, means over a pitch of its rollers.
+    """Stiffness of a row of rollers under a static radial load, x along the load and y across it.
 
-    ``along``, ``across`` the load [N/m]; ``compliance``: how far the shaft's centre moves over a pitch along and across the load [m].
+    ``matrix``: dF/dx (2, 2) [N/m], mean over a pitch of the rollers; ``travel``: how far the shaft's centre moves over a pitch along
+    and across the load, peak to peak [m].
     """
 
-    along: float
-    across: float
-    compliance: tuple[float, float]
+    matrix: Array
+    travel: tuple[float, float]
+
+    @property
+    def along(self) -> float:
+        """K_xx [N/m]."""
+        return float(self.matrix[0, 0])
+
+    @property
+    def across(self) -> float:
+        """K_yy [N/m]."""
+        return float(self.matrix[1, 1])
+
+    def turned(self, angle: float) -> Array:
+        """The matrix (2, 2) [N/m] in axes of which the first one sees the load at ``angle`` [rad]."""
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turn = np.array([[cosine, -sine], [sine, cosine]])
+        return np.asarray(turn @ self.matrix @ turn.T)
+
+
+# Relative errors of the forces on a roller and on the ring; the most steps to a contact and halvings of a step of the ring; the
+# spring that holds a ring in a step, as a share of the stiffness at first.
+CONTACT_ERROR, PLACE_ERROR, CONTACT_STEPS, HALVINGS, LEAST_SPRING = 1e-11, 1e-9, 60, 60, 1e-9
+# Place of the rollers, as a share of their pitch, next to the one where one roller alone is under the load: on both sides of it
+# the shaft is farthest from the line of the load.
+FARTHEST_PLACE = 1e-3
 
 
 def static_stiffness(
-    contacts: RollerContacts, rollers: int, load: float, clearance: float, centrifugal: float = 0.0, places: int = 64
+    contacts_at: Callable[[Array], RollerContacts],
+    rollers: int,
+    load: float,
+    clearance: float,
+    centrifugal: float = 0.0,
+    places: int = 64,
 ) -> Stiffness:
-    """dF/dx of the static loads of ISO/TS 16281, mean over ``places`` of the rollers within a pitch; arguments as ``static_loads``.
+    """dF/dx of the static loads of ISO/TS 16281, mean over ``places`` of the rollers within a pitch.
 
-    The terms that couple both directions have the mean 0 by symmetry. Raises MethodError where no balance is found.
+    ``contacts_at``: contacts of rollers at these azimuths (n,) from the load [rad]; others as of ``static_loads``. Without tilt the
+    terms that couple both directions have the mean 0 by symmetry. Raises MethodError where no roller carries load, and where no
+    balance is found.
     """
-    matrices, centres = [], []
-    for place in (np.arange(places) + 0.5) / places:
-        angle = 2.0 * math.pi * (np.arange(rollers) + place) / rollers
-        centre, matrix = _balanced(contacts, np.stack((np.cos(angle), np.sin(angle))), load, clearance, centrifugal)
-        centres.append(centre)
-        matrices.append(matrix)
-    mean, moved = np.mean(matrices, axis=0), np.ptp(centres, axis=0)
-    return Stiffness(float(mean[0, 0]), float(mean[1, 1]), (float(moved[0]), float(moved[1])))
+    place = np.concatenate(((np.arange(places) + 0.5) / places, (FARTHEST_PLACE, 1.0 - FARTHEST_PLACE)))
+    angle = 2.0 * math.pi * (np.arange(rollers) + place[:, None]) / rollers
+    contacts, normals = contacts_at(angle.ravel()), np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    centres, matrices = _balanced(contacts, normals, load, clearance, centrifugal)
+    moved = np.ptp(centres, axis=0)
+    return Stiffness(np.mean(matrices[:places], axis=0), (float(moved[0]), float(moved[1])))
 
 
 def _balanced(
     contacts: RollerContacts, normals: Array, load: float, clearance: float, centrifugal: float
 ) -> tuple[Array, Array]:
-    """Centre of the inner ring (2,) [m] that bears the load along x, and dF/dx there (2, 2) [N/m]: Newton, shortened steps."""
+    """Centres of the inner ring (places, 2) [m] that bear the load along x, and dF/dx there (places, 2, 2) [N/m].
+
+    Newton's method with shortened steps; ``normals`` (places, 2, rollers).
+    """
+
+    def response(centres: Array) -> tuple[Array, Array, Array]:
+        approach = np.einsum("pi,pij->pj", centres, normals) - 0.5 * clearance
+        loads, slopes = (each.reshape(approach.shape) for each in _pressed(contacts, approach.ravel(), centrifugal))
+        missing = np.array([load, 0.0]) - np.einsum("pij,pj->pi", normals, loads)
+        return missing, np.einsum("pij,pj,pkj->pik", normals, slopes, normals), loads.sum(axis=1)
+
     most = max(float(np.max(relief)) for relief in contacts.relief)
-    lamina = contacts.stiffness / contacts.relief[0].shape[1]
-    target = np.array([load, 0.0])
-
-    def response(centre: Array) -> tuple[Array, Array, float]:
-        races = _race_loads(contacts, centre @ normals - 0.5 * clearance, centrifugal)
-        inner, outer = ((LINE_EXPONENT * lamina**0.9 * loads**0.1).sum(axis=1) for loads in races)
-        # Contacts in series; a roller without load inside bears nothing of a displacement.
-        series = np.divide(inner * outer, inner + outer, out=np.zeros(inner.shape), where=inner > 0.0)
-        roller_loads = races[0].sum(axis=1)
-        return target - normals @ roller_loads, (normals * series) @ normals.T, float(roller_loads.sum())
-
-    reach = max(clearance, 0.0) / math.cos(math.pi / normals.shape[1])
-    centre = np.array([0.5 * reach + 2.0 * (most + (load / contacts.stiffness) ** (1.0 / LINE_EXPONENT)), 0.0])
+    reach = max(clearance, 0.0) / math.cos(math.pi / normals.shape[2])
+    solid = sum((force / contacts.stiffness) ** (1.0 / LINE_EXPONENT) for force in (load, centrifugal))
+    start = 0.5 * reach + 2.0 * (most + solid)
+    centres = np.tile((start, 0.0), (len(normals), 1))
+    missing, matrix, carried = response(centres)
+    # Nothing holds a ring sideways that a single roller bears: a slight spring does in each step.
+    spring = LEAST_SPRING * np.trace(matrix, axis1=1, axis2=2).max() * np.eye(2)
     for _ in range(BALANCE_STEPS):
-        missing, matrix, carried = response(centre)
         # Under a preload the loads of the rollers cancel, and their own errors remain.
-        if np.linalg.norm(missing) <= 10.0 * BALANCE_ERROR * max(load, carried):
-            return centre, matrix
-        step = np.linalg.lstsq(matrix, missing, rcond=1e-12)[0]
-        while np.linalg.norm(step) > 0.0 and np.linalg.norm(response(centre + step)[0]) >= np.linalg.norm(missing):
-            step = 0.5 * step
-        centre = centre + step
+        unbalanced = np.linalg.norm(missing, axis=1) > PLACE_ERROR * np.maximum(load, carried)
+        if not unbalanced.any():
+            if not np.all(carried > 0.0):
+                raise MethodError("no roller carries load, so no stiffness is defined; give a load or an interference")
+            return centres, matrix
+        step = np.linalg.solve(matrix + spring, missing[:, :, None])[:, :, 0] * unbalanced[:, None]
+        ahead = np.einsum("pi,pi->p", missing, step)
+        for _ in range(HALVINGS):
+            tried = response(centres + step)
+            # The energy is convex: a step is too long where its force turns back.
+            beyond = unbalanced & (np.einsum("pi,pi->p", tried[0], step) < -0.5 * ahead)
+            if not beyond.any():
+                break
+            step[beyond] *= 0.5
+            ahead[beyond] *= 0.5
+        centres, (missing, matrix, carried) = centres + step, tried
     raise MethodError(f"no static balance was found for a load of {load:g} N; give a load or an interference")
+
+
+def _pressed(contacts: RollerContacts, approach: Array, centrifugal: float) -> tuple[Array, Array]:
+    """Loads on the inner race [N] and their slopes by the ``approach`` of the races [N/m], each (n,); both 0 of a roller off it."""
+    inner_relief, outer_relief = (
+        np.broadcast_to(relief, (len(approach), relief.shape[1])) for relief in contacts.relief
+    )
+    lamina = contacts.stiffness / inner_relief.shape[1]
+    loads, slopes = np.zeros((2, len(approach)))
+
+    def race(gap: Array, relief: Array) -> tuple[Array, Array]:
+        """Load and slope of a contact."""
+        depth = np.clip(gap[:, None] - relief, 0.0, None)
+        root = lamina * depth ** (LINE_EXPONENT - 1.0)
+        return (root * depth).sum(axis=1), LINE_EXPONENT * root.sum(axis=1)
+
+    # Where the inner race only just touches, the outer one bears the centrifugal force or more.
+    end = approach - inner_relief.min(axis=1)
+    pressed = np.flatnonzero(race(end, outer_relief)[0] > centrifugal)
+    approach, inner_relief, outer_relief = approach[pressed], inner_relief[pressed], outer_relief[pressed]
+    low, high = outer_relief.min(axis=1), end[pressed]
+    outside = 0.5 * (low + high)
+    for _ in range(CONTACT_STEPS):
+        outer, outer_slope = race(outside, outer_relief)
+        inner, inner_slope = race(approach - outside, inner_relief)
+        excess = outer - inner - centrifugal
+        if np.all(np.abs(excess) <= CONTACT_ERROR * (outer + centrifugal)):
+            break
+        low, high = np.where(excess < 0.0, outside, low), np.where(excess < 0.0, high, outside)
+        newton = outside - excess / (outer_slope + inner_slope)
+        outside = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+    loads[pressed], slopes[pressed] = inner, inner_slope * outer_slope / (inner_slope + outer_slope)
+    return loads, slopes

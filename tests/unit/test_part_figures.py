@@ -19,8 +19,8 @@ from doe.duty import Rule
 from doe.workflow.problem import Problem
 from rbdyn.base.estimate import Estimate
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.duty import static_life
-from rbdyn.dynamics.figures import PARTS, of_kind
+from rbdyn.dynamics.duty import row_stiffness, static_life
+from rbdyn.dynamics.figures import PARTS, of_kind, why_missing
 from rbdyn.dynamics.slip_map import slip_map
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -32,6 +32,8 @@ ONE_OF_EACH = (
     "outer_max_pressure_MPa",
     "inner_minimum_film_um",
     "life_h",
+    "stiffness_yy_N_um",
+    "variable_compliance_um",
 )
 
 
@@ -61,7 +63,21 @@ def test_the_figures_of_parts_are_those_of_the_report_with_errors():
     assert (
         figures["life_h"].value == static_life(scene).hours(*scene.operation.speeds) and figures["life_h"].error == 0.0
     )
+    stiffness = row_stiffness(scene)
+    assert run.stiffness_N_um == {"xx": 1e-6 * stiffness.along, "yy": 1e-6 * stiffness.across}
+    assert run.as_dict()["stiffness_N_um"]["yy"] == figures["stiffness_yy_N_um"].value
     assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).part_figures == figures
+
+
+def test_without_load_and_preload_there_is_no_stiffness(tmp_path):
+    """JSON has null, and a study that names a stiffness is refused before anything runs; a preload alone has one."""
+    free = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", ["operation.radial_load_N=0", *SHORT])
+    run = rbdyn.simulate(free, notice=None)
+    assert run.stiffness_N_um is None and "stiffness_xx_N_um" not in run.responses
+    assert "raise operation.radial_load_N" in why_missing(free, "variable_compliance_um")
+    preloaded = free.overridden(["bearing.radial_clearance_mm=-0.004"])
+    assert why_missing(preloaded, "stiffness_xx_N_um") is None
+    assert row_stiffness(preloaded).across == pytest.approx(row_stiffness(preloaded).along, rel=1e-6)
 
 
 def test_a_life_over_a_duty_is_that_of_palmgren_and_miner():
