@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-import numpy as np
-
 from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_notes
 from rbdyn.base.command import Console, Delivery, checkpoint_message
 from rbdyn.base.faults import InputError, MethodError, axis_values
@@ -27,15 +25,14 @@ from rbdyn.quasistatic.result import (
     RowReport,
     ball_sheet,
     remarks,
-    ring_columns,
-    row_columns,
+    ring_figures,
+    row_figures,
     tipping,
 )
-from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.turn import RingPath
-from rbdyn.quasistatic.sweep import SweepResult, keys_of_texts, notes_by_topic, sweep
+from rbdyn.quasistatic.sweep import PointRecord, SweepResult, keys_of_texts, result_of, sweep
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
 
@@ -168,17 +165,17 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
 
 def _table(scene: BallScene, key: str, values: Sequence[float], scan: Scan) -> SweepResult:
     """Figures, balls and notes of the points scanned."""
-    points, places = scan.points, np.arange(len(values))
-    solutions, ratings = [point.solution for point in points], [point.rating for point in points]
-    names = ("figures", "displacement", "reaction", "stiffness")
-    balls, displacement, reaction, stiffness = (np.array([getattr(s, name) for s in solutions]) for name in names)
-    statuses = tuple(solution.status for solution in solutions)
-    columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
-    for column in columns.values():
-        column[[status != OK for status in statuses]] = np.nan
-    placed = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
-    notes, rows = notes_by_topic(placed, places, statuses), {"row": [(places, balls)]}
-    return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
+    points = []
+    for point in scan.points:
+        solution, rating = point.solution, point.rating
+        record = PointRecord(solution.status, {}, {"row": solution.figures}, [], (), cold=False)
+        if solution.is_equilibrium:
+            ring = ring_figures(solution.displacement, solution.reaction, solution.stiffness)
+            figures = ring | row_figures(solution, rating)
+            found = [*remarks(solution, rating), *tipping(solution.displacement, scene)]
+            record = record._replace(figures=figures, remarks=found)
+        points.append(record)
+    return result_of({key: tuple(values)}, points, 0.0, scene.model_dump(mode="json"))
 
 
 def _best(scan: Scan, which: str, si: float) -> dict[str, float]:

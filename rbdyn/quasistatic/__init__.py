@@ -1,6 +1,6 @@
 """Ball bearings in equilibrium, after Jones and Harris: contact angles, loads, stiffness, runout, preload and life.
 
-- ``bearing``: ``equilibrium`` of a scene, with its solvers by name; ``result``: reports with life, remarks, columns
+- ``bearing``: ``equilibrium`` of a scene, with its solvers by name; ``result``: reports with life, remarks, figures
 - ``row``: one row of balls, its forces and its convex solver; ``double_decker``: two rows with a floating ring between
 - ``full_system``: all equations at once; ``finite_search``: the search of Hu et al. 2021
 - ``sweep``: equilibria over keys of a scene; ``preload``: preload for least stress and for longest life

@@ -29,8 +29,7 @@ from rbdyn.quasistatic.result import (
     ball_records,
     displacement_record,
     film_record,
-    notes_of,
-    overloads,
+    overload,
     reference_capacities,
     remarks,
     row_report,
@@ -92,14 +91,13 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     if not solution.is_equilibrium:
         return base
     rating = Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
-    table = solution.figures[np.newaxis]
-    if why := overloads(table, [rating]):
-        return replace(base, status=why[0])
+    if why := overload(solution, rating):
+        return replace(base, status=why)
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
     notes = [*_limit_notes(scene, model), *(() if scene.lubricant is None else scene.lubricant.estimates)]
-    notes += notes_of([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
+    notes += [remark.note for remark in (*remarks(solution, rating), *tipping(solution.displacement, scene))]
     others = _other_roots(scene, model, solution)
     if others:
         sentence = (
@@ -162,11 +160,11 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
     layers: dict[str, RowReport] = {}
     notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
-        if why := overloads(row.figures[np.newaxis], [rating]):
-            return replace(base, status=f"{name} row {why[0]}")
+        if why := overload(row, rating):
+            return replace(base, status=f"{name} row {why}")
         layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
-        notes += notes_of(remarks(row.figures[np.newaxis], [rating], name))
-    notes += notes_of([tipping(solution.displacement[np.newaxis, 3:], scene)])
+        notes += [remark.note for remark in remarks(row, rating, name)]
+    notes += [remark.note for remark in tipping(solution.displacement, scene)]
     races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
     grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(

@@ -18,7 +18,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, validated
 from rbdyn.base.notes import Note, Notes
 from rbdyn.life import turning_rings
-from rbdyn.quasistatic.result import Rating, overloads, pressures, reference_capacities, solution_life
+from rbdyn.quasistatic.result import Rating, overload, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 from rbdyn.scene.ball import BallRow, SingleRowScene
@@ -67,14 +67,13 @@ def point_of(value: float, case: Case, start: Solution | None = None) -> Point:
     solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.constraint, start)
     if not solution.is_equilibrium and start is not None:
         solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.constraint)
-    table = solution.figures[np.newaxis]
-    if solution.is_equilibrium and (why := overloads(table, [case.rating])):
-        solution = solution._replace(status=why[0])
+    if solution.is_equilibrium and (why := overload(solution, case.rating)):
+        solution = solution._replace(status=why)
     if not solution.is_equilibrium:
         return Point(value, solution, case.rating)
-    peak = np.max(list(pressures(table, [case.rating]).values()))
+    peak = max(pressures(solution, case.rating).values())
     life = solution_life(solution, case.rating.capacities, turning_rings(*case.rating.speeds))
-    return Point(value, solution, case.rating, float(peak), life.million_turns)
+    return Point(value, solution, case.rating, peak, life.million_turns)
 
 
 def scan(case_at: Callable[[float], Case], values: Sequence[float], name: str, unit: str, scale: float = 1.0) -> Scan:

@@ -1,16 +1,16 @@
-"""Results of ball bearings in equilibrium: ``BallResult`` with its reports, remarks, and columns of many equilibria.
+"""Results of ball bearings in equilibrium: ``BallResult`` with its reports, remarks, and figures of a point of a sweep.
 
 Reports hold contact angles, loads, stress, contacts, film, stiffness and life. Remarks warn of balls clear of a race, dents,
-steep angles, slip, and a ring that tips. Columns have units in their names.
+steep angles, slip, and a ring that tips. Figures have units in their names.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, outside_json, spread
@@ -21,7 +21,7 @@ from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_line import BALLS, SHAKEDOWN, dent_sentence, overload_sentence
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, Turning, turning_rings
-from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL, dynamic_capacity, rated_capacities, row_life
+from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
@@ -78,157 +78,132 @@ class Rating(NamedTuple):
     capacities: tuple[float, float]
     speeds: tuple[float, float]
 
+    def contact(self, race: Race) -> PointContact:
+        """The contact of a ball with a race."""
+        return self.model.inner_contact if race == "inner" else self.model.outer_contact
+
+    def groove(self, race: Race) -> float:
+        """Radius of the groove of a race [m]."""
+        inner, outer = self.drawing.groove_factors
+        return (inner if race == "inner" else outer) * self.drawing.ball_diameter
+
 
 class Remark(NamedTuple):
-    """A note: its code, its subject in a word, the mask of the points (n,) that it is about, and its sentence for each point."""
+    """A note on an equilibrium, and its subject in a word."""
 
-    code: str
     word: str
-    where: Mask
-    say: Callable[[int], str]
-    row: str = ""
-
-    def note(self, place: int) -> Note:
-        """The note for a point, with the row of balls in a bearing of two rows."""
-        return Note(self.code, self.row + self.say(place))
+    note: Note
 
 
-def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
-    """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, FIGURES)."""
-    peaks = {}
-    for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
-        contact = PointContact(*np.array([getattr(rating.model, f"{race}_contact") for rating in ratings]).T)
-        peaks[race] = peak_pressure(contact, balls[:, :, place].max(axis=1))
-    return peaks
+def loads_on(solution: Solution, race: Race) -> Array:
+    """Loads (Z,) of the balls on a race [N]."""
+    return solution.inner_load if race == "inner" else solution.outer_load
 
 
-def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
-    """Points with a contact ellipse too long for its groove or a pressure above shakedown, and a sentence for each."""
-    causes: dict[int, str] = {}
-    for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
-        loads = balls[:, :, place]
-        factor = np.array([getattr(rating.drawing, f"{race}_groove_factor") for rating in ratings])
-        groove = factor * np.array([rating.drawing.ball_diameter for rating in ratings])
-        unit = np.array([getattr(rating.model, f"{race}_contact").semi_major for rating in ratings])
-        half = unit * np.cbrt(loads.max(axis=1))
-        for k in np.flatnonzero(half > groove).tolist():
-            azimuth, load = 360.0 * loads[k].argmax() / loads.shape[1], loads[k].max()
-            length, radius = 2e3 * half[k], 1e3 * groove[k]
-            causes.setdefault(
-                k,
-                f"overloaded: the ball at {azimuth:.0f} deg would carry {load:.4g} N on the {race} race over "
-                f"{length:.3g} mm in a groove of {radius:.3g} mm radius; reduce the load",
+def pressures(solution: Solution, rating: Rating) -> dict[Race, float]:
+    """Largest Hertz pressure on each race [Pa]."""
+    return {race: float(peak_pressure(rating.contact(race), loads_on(solution, race).max())) for race in RACES}
+
+
+def overload(solution: Solution, rating: Rating) -> str:
+    """A sentence on a contact ellipse too long for its groove or a pressure above shakedown; empty without."""
+    for race in RACES:
+        loads, groove = loads_on(solution, race), rating.groove(race)
+        half = rating.contact(race).semi_major * np.cbrt(loads.max())
+        if half > groove:
+            azimuth = 360.0 * loads.argmax() / len(loads)
+            return (
+                f"overloaded: the ball at {azimuth:.0f} deg would carry {loads.max():.4g} N on the {race} race over "
+                f"{2e3 * half:.3g} mm in a groove of {1e3 * groove:.3g} mm radius; reduce the load"
             )
-    for race, peaks in pressures(balls, ratings).items():
-        for k in np.flatnonzero(peaks > SHAKEDOWN[BALLS]).tolist():
-            causes.setdefault(k, f"overloaded: {race} race by {overload_sentence(float(peaks[k]), BALLS)}")
-    return causes
+    over = (item for item in pressures(solution, rating).items() if item[1] > SHAKEDOWN[BALLS])
+    return next((f"overloaded: {race} race by {overload_sentence(peak, BALLS)}" for race, peak in over), "")
 
 
-def edge_angles(balls: Array, ratings: Sequence[Rating], race: Race) -> Array:
-    """Angles (n, Z) [rad] at the edge of the contact ellipse that is nearer to the shoulder; -inf without a contact.
+def edge_angles(solution: Solution, rating: Rating, race: Race) -> Array:
+    """Angles (Z,) [rad] at the edge of the contact ellipse that is nearer to the shoulder; -inf without a contact.
 
     The ellipse lies along the groove: a semi-axis a adds asin(a/(f D)) to the contact angle. Negative angles of a bearing with
     one shoulder are not counted.
     """
-    loads = balls[:, :, INNER_LOAD if race == "inner" else OUTER_LOAD]
-    angles = balls[:, :, INNER_ANGLE if race == "inner" else OUTER_ANGLE]
-    grooves = [getattr(rating.drawing, f"{race}_groove_factor") * rating.drawing.ball_diameter for rating in ratings]
-    units = [getattr(rating.model, f"{race}_contact").semi_major for rating in ratings]
-    shouldered = np.array([rating.drawing.contact_angle > 0.0 for rating in ratings])[:, np.newaxis]
-    share = (np.array(units) / np.array(grooves))[:, np.newaxis] * np.cbrt(np.maximum(loads, 0.0))
-    size = np.where(shouldered, angles, np.abs(angles))
+    loads = loads_on(solution, race)
+    angles = solution.inner_angle if race == "inner" else solution.outer_angle
+    share = rating.contact(race).semi_major / rating.groove(race) * np.cbrt(np.maximum(loads, 0.0))
+    size = angles if rating.drawing.contact_angle > 0.0 else np.abs(angles)
     return np.where((loads > NO_LOAD) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
 
 
-def climbing(balls: Array, ratings: Sequence[Rating], race: Race, row: str) -> Remark:
-    """Remark on contacts whose ellipse climbs over the shoulder of a race."""
-    edges = edge_angles(balls, ratings, race)
-    shoulders = np.array([rating.drawing.shoulder_angle(race) for rating in ratings])
-    beyond, key = edges.max(axis=1) - shoulders, f"{race}_shoulder_height_mm"
-
-    def sentence(k: int) -> str:
-        drawing = ratings[k].drawing
-        azimuth, groove = 360.0 * edges[k].argmax() / edges.shape[1], getattr(drawing, f"{race}_groove_factor")
-        height = groove * drawing.ball_diameter_mm * (1.0 - math.cos(shoulders[k]))
-        kind = "estimated" if getattr(drawing, key) is None else "stated"
-        remedy = f"state {key}" if kind == "estimated" else "make it higher"
-        return (
-            f"the ellipse of the ball at {azimuth:.0f} deg climbs {math.degrees(beyond[k]):.2g} deg over the {kind} "
-            f"{race} shoulder of {height:.3g} mm; {remedy}, or reduce load or clearance"
-        )
-
-    steep = np.abs(balls[:, :, INNER_ANGLE]).max(axis=1) > STEEPEST
-    return Remark("shoulder", f"{row}{race} shoulder", (beyond > 0.0) & ~steep, sentence, row)
+def _climbing(solution: Solution, rating: Rating, race: Race) -> tuple[bool, str]:
+    """Whether a contact ellipse climbs over the shoulder of a race, and a sentence on it."""
+    edges, shoulder, drawing = edge_angles(solution, rating, race), rating.drawing.shoulder_angle(race), rating.drawing
+    key = f"{race}_shoulder_height_mm"
+    azimuth, beyond = 360.0 * edges.argmax() / len(edges), float(edges.max() - shoulder)
+    height = 1e3 * rating.groove(race) * (1.0 - math.cos(shoulder))
+    kind = "estimated" if getattr(drawing, key) is None else "stated"
+    remedy = f"state {key}" if kind == "estimated" else "make it higher"
+    return beyond > 0.0, (
+        f"the ellipse of the ball at {azimuth:.0f} deg climbs {math.degrees(beyond):.2g} deg over the {kind} "
+        f"{race} shoulder of {height:.3g} mm; {remedy}, or reduce load or clearance"
+    )
 
 
-def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
-    """Largest friction coefficient (n,) that a contact needs for its share of the gyroscopic moment, 2 s M_g/(D Q)."""
-    inner, outer = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
-    controls = [rating.model.control for rating in ratings]
-    # All points of a sweep have the same kind of control.
-    if not isinstance(controls[0], FixedShare | FrictionShare):
-        return np.zeros(len(ratings))
-    share = np.array([[control[0]] for control in controls])
-    diameter = np.array([[rating.drawing.ball_diameter] for rating in ratings])
+def needed_friction(solution: Solution, rating: Rating) -> float:
+    """Largest friction coefficient that a contact needs for its share of the gyroscopic moment, 2 s M_g/(D Q)."""
+    control, inner, outer = rating.model.control, solution.inner_load, solution.outer_load
+    if not isinstance(control, FixedShare | FrictionShare):
+        return 0.0
+    share: Any = control[0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        if isinstance(controls[0], FrictionShare):
-            models = [rating.model for rating in ratings]
-            ratio = np.array([[m.outer_contact.stiffness / m.inner_contact.stiffness] for m in models])
+        if isinstance(control, FrictionShare):
+            ratio = rating.contact("outer").stiffness / rating.contact("inner").stiffness
             weight = share * (inner / outer * ratio) ** (4.0 / 3.0)
             share = weight / (1.0 + weight)
-        pull = 2.0 * np.abs(balls[:, :, MOMENT]) / diameter
+        pull = 2.0 * np.abs(solution.gyroscopic_moment) / rating.drawing.ball_diameter
         needed = np.maximum(share * pull / inner, (1.0 - share) * pull / outer)
-    return np.where((inner > 0.0) & (outer > 0.0), needed, 0.0).max(axis=1)
+    return float(np.where((inner > 0.0) & (outer > 0.0), needed, 0.0).max())
 
 
-def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
-    """Remarks on n equilibria of a row, ``balls`` (n, Z, FIGURES); ``name`` of the row, where there are two."""
+def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
+    """Remarks on the equilibrium of a row; ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
-    touching, angle = balls[:, :, INNER_LOAD] > NO_LOAD, np.degrees(balls[:, :, INNER_ANGLE])
-    size = touching.shape[1]
-    clear = size - touching.sum(axis=1)
-    steepest = np.where(touching, np.abs(angle), 0.0).max(axis=1)
-    steep = steepest > math.degrees(STEEPEST)
-    turned = np.sum(touching & (angle < 0.0), axis=1)
-    shouldered = np.array([rating.drawing.contact_angle > 0.0 for rating in ratings])
-    needed, (inner, outer) = needed_friction(balls, ratings), pressures(balls, ratings).values()
+    touching, angle = solution.inner_load > NO_LOAD, np.degrees(solution.inner_angle)
+    size, clear = len(touching), int(np.sum(~touching))
+    steepest = float(np.where(touching, np.abs(angle), 0.0).max())
+    steep, turned = steepest > math.degrees(STEEPEST), int(np.sum(touching & (angle < 0.0)))
+    needed, (inner, outer) = needed_friction(solution, rating), pressures(solution, rating).values()
+    climbs = {race: _climbing(solution, rating, race) for race in RACES}
+    very_steep = bool(np.abs(solution.inner_angle).max() > STEEPEST)
     # fmt: off
     listed = [
-        ("loose-ring", "unloaded", clear == size, lambda k:
+        ("loose-ring", "unloaded", clear == size,
             "no ball touches the inner race, so the position of the ring is undetermined; load the ring or reduce the clearance"),
-        ("clear-balls", "clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
-        ("dent", "inner dent", inner > BALLS, lambda k: dent_sentence(float(inner[k]), BALLS, "inner")),
-        ("dent", "outer dent", outer > BALLS, lambda k: dent_sentence(float(outer[k]), BALLS, "outer")),
-        ("no-shoulder", "steep angle", steep, lambda k:
-            f"inner angles reach {steepest[k]:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
+        ("clear-balls", "clear balls", 0 < clear < size, f"{clear} of {size} balls are clear of the inner race"),
+        ("dent", "inner dent", inner > BALLS, dent_sentence(inner, BALLS, "inner")),
+        ("dent", "outer dent", outer > BALLS, dent_sentence(outer, BALLS, "outer")),
+        ("no-shoulder", "steep angle", steep,
+            f"inner angles reach {steepest:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
             "preload it axially or reduce the speed"),
-        ("no-shoulder", "negative angle", shouldered & (turned > 0) & ~steep, lambda k:
-            f"{turned[k]} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
+        ("no-shoulder", "negative angle", rating.drawing.contact_angle > 0.0 and turned > 0 and not steep,
+            f"{turned} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
             "thrust or pair the bearing"),
-        ("gyroscopic-slip", "gyroscopic slip", needed > OILED_FRICTION, lambda k:
-            f"the gyroscopic moment needs a friction coefficient of {needed[k]:.2f}, more than oil gives: the balls slip "
+        ("gyroscopic-slip", "gyroscopic slip", needed > OILED_FRICTION,
+            f"the gyroscopic moment needs a friction coefficient of {needed:.2f}, more than oil gives: the balls slip "
             "about its axis; raise the load or reduce the speed"),
+        *(("shoulder", f"{race} shoulder", climbs and not very_steep, words) for race, (climbs, words) in climbs.items()),
     ]
     # fmt: on
-    over = [climbing(balls, ratings, race, row) for race in RACES]
-    return [*(Remark(code, row + word, where, say, row) for code, word, where, say in listed), *over]
+    return [Remark(row + word, Note(code, row + sentence)) for code, word, holds, sentence in listed if holds]
 
 
-def tipping(tilts: Array, scene: BallScene) -> Remark:
-    """Remark on a ring that is free to tilt and does, from ``tilts`` (n, 2) [rad]."""
-    rigid = np.array([value is not None for value in scene.operation.displacements[3:]])
-    tilt = np.hypot(*np.where(rigid, 0.0, tilts).T)
-    # fmt: off
-    return Remark("tipped-ring", "tipped ring", tilt > TIPPED, lambda k:
-        f"the free ring tips by {1e3 * tilt[k]:.2g} mrad ({math.degrees(tilt[k]) * 60.0:.0f} arc minutes), more than a ring can on "
-        "a shaft; set operation.tilt = 'fixed' if a shaft holds the ring")
-    # fmt: on
-
-
-def notes_of(entries: Sequence[Remark]) -> list[Note]:
-    """Notes of the remarks on the first equilibrium."""
-    return [remark.note(0) for remark in entries if remark.where[0]]
+def tipping(displacement: Array, scene: BallScene) -> list[Remark]:
+    """Remark on a ring that is free to tilt and does, by its displacement (5,) [m, rad]."""
+    free = [value is None for value in scene.operation.displacements[3:]]
+    tilt = float(np.hypot(*np.where(free, displacement[3:], 0.0)))
+    sentence = (
+        f"the free ring tips by {1e3 * tilt:.2g} mrad ({math.degrees(tilt) * 60.0:.0f} arc minutes), more than a ring can on "
+        "a shaft; set operation.tilt = 'fixed' if a shaft holds the ring"
+    )
+    return [Remark("tipped ring", Note("tipped-ring", sentence))] if tilt > TIPPED else []
 
 
 class RowReport(Record):
@@ -427,24 +402,24 @@ def displacement_record(displacement: Array) -> dict[str, Any]:
     return {"displacement_mm": {"x": x, "y": y, "z": z}, "tilt_mrad": {"x": tilt_x, "y": tilt_y}}
 
 
-def ball_columns(balls: Array) -> dict[str, Array]:
-    """Figures of the balls, (n, Z) each, by the column names of ``BallResult.table``."""
-    size = balls.shape[1]
+def ball_columns(figures: Array) -> dict[str, Array]:
+    """Figures of the balls (..., Z), by the column names of ``BallResult.table``, from those (..., Z, FIGURES) of ``solve_row``."""
+    shape = figures.shape[:-1]
     return {
-        "azimuth_deg": np.broadcast_to(360.0 * np.arange(size) / size, balls.shape[:2]),
-        "inner_angle_deg": np.degrees(balls[:, :, INNER_ANGLE]),
-        "outer_angle_deg": np.degrees(balls[:, :, OUTER_ANGLE]),
-        "inner_load_N": balls[:, :, INNER_LOAD],
-        "outer_load_N": balls[:, :, OUTER_LOAD],
-        "centrifugal_force_N": balls[:, :, PULL],
-        "gyroscopic_moment_Nmm": 1e3 * balls[:, :, MOMENT],
+        "azimuth_deg": np.broadcast_to(360.0 * np.arange(shape[-1]) / shape[-1], shape),
+        "inner_angle_deg": np.degrees(figures[..., INNER_ANGLE]),
+        "outer_angle_deg": np.degrees(figures[..., OUTER_ANGLE]),
+        "inner_load_N": figures[..., INNER_LOAD],
+        "outer_load_N": figures[..., OUTER_LOAD],
+        "centrifugal_force_N": figures[..., PULL],
+        "gyroscopic_moment_Nmm": 1e3 * figures[..., MOMENT],
     }
 
 
 def ball_records(figures: Array) -> list[dict[str, float]]:
     """One record a ball, from the figures (Z, FIGURES) of ``solve_row``."""
-    columns = ball_columns(figures[np.newaxis])
-    return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(figures))]
+    columns = ball_columns(figures)
+    return [{name: float(values[j]) for name, values in columns.items()} for j in range(len(figures))]
 
 
 def stiffness_record(stiffness: Array) -> dict[str, Any]:
@@ -459,16 +434,14 @@ def stiffness_record(stiffness: Array) -> dict[str, Any]:
 
 def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: dict[str, Any] | None) -> RowReport:
     """Report of one row; ``film``: as ``film_record`` gives it."""
-    contacts = {"inner": rating.model.inner_contact, "outer": rating.model.outer_contact}
-    loads = {"inner": solution.inner_load, "outer": solution.outer_load}
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
     return RowReport(
         **displacement_record(solution.displacement),
         balls=ball_records(solution.figures),
-        max_stress_MPa={race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
+        max_stress_MPa={race: 1e-6 * pressure for race, pressure in pressures(solution, rating).items()},
         contacts={
             race: {
-                **contact_record(contacts[race], float(loads[race].max())),
+                **contact_record(rating.contact(race), float(loads_on(solution, race).max())),
                 **_shoulder_record(rating, solution, race),
                 **film.get(race, {}),
             }
@@ -476,7 +449,7 @@ def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reactio
         },
         stiffness=stiffness_record(solution.stiffness),
         life={**life.as_record(*rating.speeds), "method": "ISO/TS 16281"},
-        needed_friction=float(needed_friction(solution.figures[np.newaxis], [rating])[0]),
+        needed_friction=needed_friction(solution, rating),
         residual_N=solution.residual,
         iterations=solution.steps,
         searches=solution.searches,
@@ -498,7 +471,7 @@ def contact_record(contact: PointContact, load: float) -> dict[str, float]:
 
 def _shoulder_record(rating: Rating, solution: Solution, race: Race) -> dict[str, float]:
     """Largest angle at the edge of a contact ellipse, if any ball touches, and that of the shoulder [deg]."""
-    edge = float(edge_angles(solution.figures[np.newaxis], [rating], race).max())
+    edge = float(edge_angles(solution, rating, race).max())
     reached = {"edge_angle_deg": math.degrees(edge)} if math.isfinite(edge) else {}
     return {**reached, "shoulder_angle_deg": math.degrees(rating.drawing.shoulder_angle(race))}
 
@@ -537,60 +510,38 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
     return films
 
 
-Columns = dict[str, Array]
-
-
-def ring_columns(displacement: Array, reaction: Array, stiffness: Array) -> Columns:
-    """Displacement, reaction and diagonal stiffnesses of a ring, from arrays (n, 5), (n, 5), (n, 5, 5) in SI."""
-    columns = {f"{axis}_mm": 1e3 * displacement[:, i] for i, axis in enumerate("xyz")}
-    columns |= {f"tilt_{axis}_mrad": 1e3 * displacement[:, 3 + i] for i, axis in enumerate("xy")}
-    columns |= {f"force_{axis}_N": reaction[:, i] for i, axis in enumerate("xyz")}
-    columns |= {f"moment_{axis}_Nm": reaction[:, 3 + i] for i, axis in enumerate("xy")}
-    columns |= {f"stiffness_{axis}_N_per_um": 1e-6 * stiffness[:, i, i] for i, axis in enumerate("xyz")}
-    return columns | {
-        f"stiffness_tilt_{axis}_Nm_per_mrad": 1e-3 * stiffness[:, 3 + i, 3 + i] for i, axis in enumerate("xy")
+def ring_figures(displacement: Array, reaction: Array, stiffness: Array) -> dict[str, float]:
+    """Displacement, reaction and diagonal stiffnesses of a ring, from arrays (5,), (5,), (5, 5) in SI."""
+    figures = {f"{axis}_mm": 1e3 * displacement[i] for i, axis in enumerate("xyz")}
+    figures |= {f"tilt_{axis}_mrad": 1e3 * displacement[3 + i] for i, axis in enumerate("xy")}
+    figures |= {f"force_{axis}_N": reaction[i] for i, axis in enumerate("xyz")}
+    figures |= {f"moment_{axis}_Nm": reaction[3 + i] for i, axis in enumerate("xy")}
+    figures |= {f"stiffness_{axis}_N_per_um": 1e-6 * stiffness[i, i] for i, axis in enumerate("xyz")}
+    return figures | {
+        f"stiffness_tilt_{axis}_Nm_per_mrad": 1e-3 * stiffness[3 + i, 3 + i] for i, axis in enumerate("xy")
     }
 
 
-def row_columns(balls: Array, ratings: Sequence[Rating]) -> Columns:
-    """Angles, loads, pressures and life of a row, from ``balls`` (n, Z, FIGURES) and as many ratings.
+def row_figures(solution: Solution, rating: Rating) -> dict[str, float]:
+    """Angles, loads, pressures and life of a row.
 
     A ball on the outer race alone has no inner angle: the extremes leave it out, and its angle as ball 1 is NaN.
     """
-    inner_load, outer_load = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
-    touching = inner_load > 0.0
-    inner_angle, outer_angle = np.degrees(balls[:, :, INNER_ANGLE]), np.degrees(balls[:, :, OUTER_ANGLE])
-    lowest = np.where(touching, inner_angle, np.inf).min(axis=1)
-    highest = np.where(touching, inner_angle, -np.inf).max(axis=1)
-    columns = {
-        "inner_angle_min_deg": np.where(np.isfinite(lowest), lowest, np.nan),
-        "inner_angle_max_deg": np.where(np.isfinite(highest), highest, np.nan),
-        "inner_angle_ball_1_deg": np.where(touching[:, 0], inner_angle[:, 0], np.nan),
-        "outer_angle_min_deg": outer_angle.min(axis=1),
-        "outer_angle_max_deg": outer_angle.max(axis=1),
-        "outer_angle_ball_1_deg": outer_angle[:, 0],
-        "loaded_balls": touching.sum(axis=1).astype(float),
-        "inner_load_max_N": inner_load.max(axis=1),
-        "outer_load_max_N": outer_load.max(axis=1),
+    touching = solution.inner_load > 0.0
+    inner, outer = np.where(touching, np.degrees(solution.inner_angle), np.nan), np.degrees(solution.outer_angle)
+    loaded = inner[touching] if touching.any() else np.array([np.nan])
+    life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
+    return {
+        "inner_angle_min_deg": loaded.min(),
+        "inner_angle_max_deg": loaded.max(),
+        "inner_angle_ball_1_deg": inner[0],
+        "outer_angle_min_deg": outer.min(),
+        "outer_angle_max_deg": outer.max(),
+        "outer_angle_ball_1_deg": outer[0],
+        "loaded_balls": touching.sum(),
+        "inner_load_max_N": solution.inner_load.max(),
+        "outer_load_max_N": solution.outer_load.max(),
+        **{f"{race}_pressure_MPa": 1e-6 * pressure for race, pressure in pressures(solution, rating).items()},
+        "L10_Mrev": life.million_turns,
+        "L10_h": life.hours(*rating.speeds),
     }
-    columns |= {f"{race}_pressure_MPa": 1e-6 * pressure for race, pressure in pressures(balls, ratings).items()}
-    millions = lives(inner_load, outer_load, ratings)
-    speed = np.array([abs(rating.speeds[0] - rating.speeds[1]) for rating in ratings])
-    with np.errstate(divide="ignore"):
-        hours = np.where(speed > 0.0, 1e6 * millions * 2.0 * math.pi / (3600.0 * speed), np.inf)
-    return columns | {"L10_Mrev": millions, "L10_h": hours}
-
-
-def lives(inner_load: Array, outer_load: Array, ratings: Sequence[Rating]) -> Array:
-    """L10 [1e6 turns] from loads (n, Z) [N], ``life.row_life`` of many points; infinite without a load."""
-    standing = {"inner": "outer", "outer": "inner", "both": ""}
-    damage = np.zeros(len(ratings))
-    for i, (race, load) in enumerate((("inner", inner_load), ("outer", outer_load))):
-        cubes = load**LOAD_LIFE
-        turning = np.mean(cubes, axis=1) ** (1.0 / LOAD_LIFE)
-        fixed = np.mean(cubes**WEIBULL, axis=1) ** (1.0 / RACE_EXPONENT)
-        stands = np.array([standing[turning_rings(*rating.speeds)] == race for rating in ratings])
-        capacity = np.array([rating.capacities[i] for rating in ratings])
-        damage += (np.where(stands, fixed, turning) / capacity) ** RACE_EXPONENT
-    with np.errstate(divide="ignore"):
-        return np.where(damage > 0.0, damage ** (-1.0 / WEIBULL), math.inf)

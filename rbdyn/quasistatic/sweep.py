@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -31,14 +30,13 @@ from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
-    BallResult,
     DoubleDeckerReport,
     Remark,
     ball_columns,
     ball_records,
     remarks,
-    ring_columns,
-    row_columns,
+    ring_figures,
+    row_figures,
     tipping,
 )
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
@@ -270,6 +268,38 @@ def _number(point: dict[str, Any], name: str) -> float:
     return float(value)
 
 
+class PointRecord(NamedTuple):
+    """One point: status, its figures, those of the balls by row, remarks and solutions of the rows.
+
+    ``cold``: whether its start was not the point before.
+    """
+
+    status: str
+    figures: dict[str, float]
+    balls: dict[str, Array]
+    remarks: list[Remark]
+    rows: tuple[Solution, ...]
+    cold: bool
+
+    def as_text(self) -> str:
+        """JSON, every number with all its digits."""
+        notes = [(word, note.code, note) for word, note in self.remarks]
+        return json.dumps(self._replace(remarks=notes), default=np.ndarray.tolist)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """Inverse of ``as_text``."""
+        status, figures, balls, remarks, rows, cold = json.loads(text)
+        return cls(
+            status,
+            figures,
+            {name: np.array(values) for name, values in balls.items()},
+            [Remark(word, Note(code, sentence)) for word, code, sentence in remarks],
+            tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
+            cold,
+        )
+
+
 def sweep(
     scene: BallScene | Scene | Path | str,
     keys: Mapping[str, Sequence[float]],
@@ -295,45 +325,32 @@ def sweep(
             kept_in.unlink(missing_ok=True)
     shape = tuple(len(axis.values) for axis in axes)
     # From the order of the snake to that of the table.
-    visited = np.ravel_multi_index(np.array(order).T, shape)
-    back = np.argsort(visited)
-    table = [solved[place] for place in back]
-    names = dict.fromkeys(name for point in table for name in point.figures)
+    table = [solved[place] for place in np.argsort(np.ravel_multi_index(np.array(order).T, shape))]
+    return result_of({axis.key: axis.values for axis in axes}, table, time.perf_counter() - began, task["scene"])
+
+
+def result_of(
+    keys: dict[str, tuple[float, ...]], points: Sequence[PointRecord], wall_s: float, scene: dict[str, Any]
+) -> SweepResult:
+    """A sweep of its points, in the order of the table."""
+    names = dict.fromkeys(name for point in points for name in point.figures)
+    remarks: dict[str, list[tuple[int, Note]]] = {}
+    for place, point in enumerate(points):
+        for word, note in point.remarks:
+            remarks.setdefault(word, []).append((place, note))
     return SweepResult(
-        {axis.key: axis.values for axis in axes},
-        {name: np.array([point.figures.get(name, np.nan) for point in table]) for name in names},
-        tuple(point.status for point in table),
-        sum(point.cold for point in table),
-        time.perf_counter() - began,
-        task["scene"],
-        {name: _by_size([point.balls[name] for point in table]) for name in table[0].balls},
-        notes_by_topic(
-            [(place, remark) for place, point in enumerate(table) for remark in point.remarks],
-            np.arange(len(table)),
-            [point.status for point in table],
-        ),
+        keys,
+        {name: np.array([point.figures.get(name, np.nan) for point in points]) for name in names},
+        tuple(point.status for point in points),
+        sum(point.cold for point in points),
+        wall_s,
+        scene,
+        {name: _by_size([point.balls[name] for point in points]) for name in points[0].balls},
+        [
+            {**placed[0][1].as_dict(), "about": word, "points": [place for place, _ in placed]}
+            for word, placed in remarks.items()
+        ],
     )
-
-
-def notes_by_topic(
-    entries: Sequence[tuple[int, Remark]], visited: Whole, statuses: Sequence[str]
-) -> list[dict[str, Any]]:
-    """Notes by topic: that of the first point in the table, and all points, counted from 0.
-
-    ``entries``: remarks, each with the place of its first point on the walk. ``visited``: place in the table of each point
-    of the walk.
-    """
-    groups: dict[str, list[tuple[int, int, Remark]]] = {}
-    for first, remark in entries:
-        for k in np.flatnonzero(remark.where).tolist():
-            if statuses[first + k] == OK:
-                groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
-    notes = []
-    for word, group in groups.items():
-        _, k, remark = min(group, key=lambda one: one[0])
-        points = sorted(place for place, _, _ in group)
-        notes.append({**remark.note(k).as_dict(), "about": word, "points": points})
-    return notes
 
 
 def _by_size(balls: Sequence[Array]) -> list[Group]:
@@ -342,41 +359,6 @@ def _by_size(balls: Sequence[Array]) -> list[Group]:
     for place, one in enumerate(balls):
         sizes.setdefault(len(one), []).append(place)
     return [(np.array(places), np.array([balls[place] for place in places])) for places in sizes.values()]
-
-
-class PointRecord(NamedTuple):
-    """One point: status, its figures, those of the balls by row, remarks and solutions of the rows.
-
-    ``cold``: whether its start was not the point before.
-    """
-
-    status: str
-    figures: dict[str, float]
-    balls: dict[str, Array]
-    remarks: list[Remark]
-    rows: tuple[Solution, ...]
-    cold: bool
-
-    def as_text(self) -> str:
-        """JSON, every number with all its digits."""
-        notes = [(one.code, one.word, one.note(0)) for one in self.remarks]
-        return json.dumps(self._replace(remarks=notes), default=np.ndarray.tolist)  # type: ignore[arg-type]
-
-    @classmethod
-    def from_text(cls, text: str) -> Self:
-        """Inverse of ``as_text``."""
-        status, figures, balls, remarks, rows, cold = json.loads(text)
-        return cls(
-            status,
-            figures,
-            {name: np.array(values) for name, values in balls.items()},
-            [
-                Remark(code, word, np.array([True]), partial(lambda sentence, _: sentence, text))
-                for code, word, text in remarks
-            ],
-            tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
-            cold,
-        )
 
 
 def _walk(
@@ -408,36 +390,26 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
     if not result.is_equilibrium:
         nothing = {name: np.full((size, FIGURES), np.nan) for name, size in zip(rows, sizes, strict=True)}
         return PointRecord(result.status, {}, nothing, [], (), not started)
-    figures, balls, remarks = _figures(scene, result)
-    # Only remarks about this point are kept.
-    return PointRecord(
-        result.status, figures, balls, [one for one in remarks if one.where[0]], result.rows, not started
-    )
-
-
-def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Array], list[Remark]]:
-    """Figures of one point, figures of its balls by row, and remarks."""
     report = result.reached
     assert report.reaction is not None
     reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
-    stiffness = np.array(report.stiffness["matrix_SI"])
-    columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
-    balls, notes = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
-    names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
-    for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
-        balls[name] = solution.figures
-        notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
+    figures = ring_figures(result.displacement, reaction, np.array(report.stiffness["matrix_SI"]))
+    found = tipping(result.displacement, scene)
+    for name, rating, solution in zip(rows, result.ratings, result.rows, strict=True):
+        found += remarks(solution, rating, name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
-        columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
+        figures |= {f"{prefix}{key}": value for key, value in row_figures(solution, rating).items()}
     limits = (note for note in result.notes or () if note.code in ("seizure", "fast", "overspeed"))
-    notes += [Remark(note.code, note.code, np.array([True]), partial(lambda note, _: note, note)) for note in limits]
-    figures = {name: float(value[0]) for name, value in columns.items()}
+    found += [Remark(note.code, note) for note in limits]
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
     if result.temperatures_C is not None and result.thermal is not None:
         figures |= {f"{node}_temperature_C": value for node, value in result.temperatures_C.items()}
         figures |= {"thermal_gain": result.thermal["gain"], "friction_W": sum(result.thermal["friction_W"].values())}
-    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, notes
+    figures |= {"residual_N": report.residual_N, "iterations": report.iterations}
+    balls = {name: solution.figures for name, solution in zip(rows, result.rows, strict=True)}
+    exact = {name: float(value) for name, value in figures.items()}
+    return PointRecord(result.status, exact, balls, found, result.rows, not started)
 
 
 class Axis(NamedTuple):

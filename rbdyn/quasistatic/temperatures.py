@@ -40,7 +40,7 @@ from rbdyn.life.friction import (
 )
 from rbdyn.properties.catalogue import diameter_series
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
-from rbdyn.quasistatic.result import BallResult, Rating, overloads, reference_capacities
+from rbdyn.quasistatic.result import BallResult, Rating, overload, reference_capacities
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, cage_speed, clearance_of, constraint_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
@@ -245,7 +245,7 @@ def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
     status = solution.status
     if solution.is_equilibrium:
         rating = Rating(hot.bearing, model, reference_capacities(hot.bearing), hot.operation.speeds)
-        status = overloads(solution.figures[np.newaxis], [rating]).get(0, status)
+        status = overload(solution, rating) or status
     if status != solution.status or not solution.is_equilibrium:
         places = ", ".join(f"{node} {value:.4g}" for node, value in zip(NODES, nodes, strict=True))
         raise InputError([f"the bearing at {places} C: {status}"])
