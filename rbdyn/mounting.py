@@ -22,7 +22,9 @@ free edge. The cage grows freely by temperature, and as a thin hoop by rotation.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import range_ends
@@ -53,8 +55,9 @@ CLEARANCES = (
 )
 # Those whose changes in operation a result reports.
 REPORTED = tuple(clearance for clearance in CLEARANCES if clearance.words)
+DIFFERENCE = "inner_minus_outer_K"
 # Ranges of a heat balance beside those of its temperatures, in words and with their unit.
-OTHER_RANGES = {"inner_minus_outer_K": ("inner ring over outer ring", "K")} | {
+OTHER_RANGES = {DIFFERENCE: ("inner ring over outer ring", "K")} | {
     f"{clearance.name}_um": (clearance.words, "µm") for clearance in REPORTED
 }
 
@@ -122,12 +125,11 @@ class Ring:
         return (self.inner_radius * self.outer_radius / radius) ** 2 if self.inner_radius > 0.0 else 0.0
 
 
-def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
-    """Pressure [Pa] between two fitted rings at their temperature and speed; 0 for a loose fit.
+def overlap(inner: Ring, outer: Ring, interference: float) -> Any:
+    """Radial overlap of two rings before they press on each other, at their temperature and speed; negative is a gap [m].
 
-    ``interference``: diametral, at rest and at the temperature of the drawing [m], positive for a tight fit. Compatibility: the
-    growth of the outer bore less that of the inner outside diameter is half the interference. Raises MethodError where the rings
-    do not share the nominal radius.
+    ``interference``: diametral, at rest and at the temperature of the drawing [m], positive for a tight fit. Raises MethodError
+    where the rings do not share the nominal radius.
     """
     if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
         raise MethodError(
@@ -135,9 +137,19 @@ def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
             "the nominal radius, and the difference as interference"
         )
     radius = outer.inner_radius
-    overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
+    return 0.5 * interference + inner.growth(radius) - outer.growth(radius)
+
+
+def interface_pressure(inner: Ring, outer: Ring, interference: float) -> Any:
+    """Pressure [Pa] between two fitted rings at their temperature and speed; 0 for a loose fit.
+
+    Compatibility: the growth of the outer bore less that of the inner outside diameter is half the ``interference``, as of
+    ``overlap``, which also says what is raised. Temperatures of rings may be arrays.
+    """
+    radius, closing = outer.inner_radius, overlap(inner, outer, interference)
     compliance = outer.pressure_growth(radius, inside=1.0) - inner.pressure_growth(radius, outside=1.0)
-    return max(overlap / compliance, 0.0)
+    pressure = closing / compliance
+    return max(pressure, 0.0) if isinstance(pressure, float) else np.maximum(pressure, 0.0)
 
 
 def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
@@ -149,9 +161,9 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
     if interface_pressure(replace(inner, speed=0.0), replace(outer, speed=0.0), interference) == 0.0:
         return 0.0
     radius = outer.inner_radius
-    overlap = 0.5 * interference + inner.thermal_growth(radius) - outer.thermal_growth(radius)
+    at_rest = 0.5 * interference + inner.thermal_growth(radius) - outer.thermal_growth(radius)
     opening = replace(outer, speed=1.0).rotation_growth(radius) - replace(inner, speed=1.0).rotation_growth(radius)
-    return math.sqrt(overlap / opening) if opening > 0.0 else math.inf
+    return math.sqrt(at_rest / opening) if opening > 0.0 else math.inf
 
 
 @dataclass(frozen=True)

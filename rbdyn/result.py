@@ -139,6 +139,51 @@ TEMPERATURES = {
 }
 
 
+class LeastClearance(Record):
+    """Least diametral clearance of a start [um], and when; ``time_s``: None where it falls to its steady value without a minimum."""
+
+    least: Quantity
+    time_s: float | None
+
+
+class StartMoment(Record):
+    """A simulated moment of a start: its time, operating point, and the temperatures and powers there."""
+
+    time_s: float | None
+    speed_rpm: float
+    load_N: float  # noqa: N815
+    temperatures_C: dict[str, float]  # noqa: N815
+    power_loss_W: float  # noqa: N815
+
+
+class StartResult(Record, kw_only=True):
+    """Start of a cold machine: least clearances, the lead of the inner ring, and temperatures over time.
+
+    - ``status``: "steady", or with its ``reason`` "seizure", "too hot", "no steady state" or "undecided"
+    - ``temperature_difference_K``: largest lead of the inner ring over the outer one; ``time_to_steady_s``: from which on all
+      temperatures stay within 1 K of the last ones, None without a steady state
+    - ``race_pressure_MPa``: largest pressure where the radial clearance is least, None where some is left
+    - ``ranges``: 5, 50 and 95 % of figures over the ``inputs``, and ``share_of_seizure`` of the input sets
+    - ``path``: columns over time; with the capacities they satisfy C dT/dt = heat - what the conductances carry off
+    """
+
+    status: str
+    reason: str | None = None
+    radial_um: LeastClearance
+    guide_um: LeastClearance | None
+    pocket_um: LeastClearance
+    temperature_difference_K: Quantity  # noqa: N815
+    time_to_steady_s: float | None
+    race_pressure_MPa: float | None  # noqa: N815
+    ranges: dict[str, tuple[float, ...]]
+    inputs: tuple[str, ...]
+    share_of_seizure: float
+    capacities_J_K: dict[str, float]  # noqa: N815
+    boundaries_C: dict[str, float]  # noqa: N815
+    moments: tuple[StartMoment, ...]
+    path: dict[str, Any]
+
+
 class FigureOf:
     """A figure that every result has, as an attribute of its key."""
 
@@ -175,6 +220,7 @@ class SimulationResult(Brief, SavedRecord):
     - ``part_figures``: power terms, operating clearances, contact pressures and films, life and stiffness by name, each with its
       errors (``rbdyn.dynamics.figures``)
     - ``stiffness_N_um``: "xx" along the load, "yy" across it, of the static loads by ISO/TS 16281; None where no roller carries load
+    - ``start``: start of the cold machine (``StartResult``), None without [thermal.start]
     """
 
     FORMAT = "rbdyn.simulation/5"
@@ -204,6 +250,7 @@ class SimulationResult(Brief, SavedRecord):
     damage: dict[str, Quantity] | None = None
     verdict: CageVerdict | None = nullable(default=None)
     stiffness_N_um: dict[str, float] | None = derived(lambda self: self._stiffness())  # noqa: N815
+    start: StartResult | None = None
 
     impact_force_N, impact_contact_force_N = FigureOf(), FigureOf()  # noqa: N815
     power_loss_W, cage_speed_rpm, cage_slip = FigureOf(), FigureOf(), FigureOf()  # noqa: N815

@@ -7,8 +7,8 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, range_ends, shown, value_alone, with_error
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
-from rbdyn.mounting import REPORTED, other_ranges
-from rbdyn.result import SimulationResult, figure_sheet
+from rbdyn.mounting import DIFFERENCE, REPORTED, other_ranges
+from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *_temperatures(result),
+        *_start(result),
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
         *_clearances(result),
         Paragraph(_life_sentence(result)),
@@ -139,6 +140,58 @@ def _temperatures(result: SimulationResult) -> list[Block]:
         *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
     ]
+
+
+def _start(result: SimulationResult) -> list[Block]:
+    """Least clearances of a start with what the inputs leave open first, and how it goes; nothing without a start."""
+    start = result.start
+    if start is None:
+        return []
+    ranges, rows = start.ranges, []
+    for clearance in REPORTED:
+        name = f"{clearance.name}_um"
+        play: LeastClearance | None = getattr(start, name)
+        if play is None:
+            continue
+        least, spread = play.least, ranges[name]
+        rows.append(
+            (
+                clearance.words,
+                value_alone(least.value, 0.5 * (spread[-1] - spread[0]) or least.stated_error),
+                range_ends(spread),
+                _error(least.stated_error),
+                _when(start, name, play),
+            )
+        )
+    header = ("start: least clearance [µm]", "value", "inputs (90 %)", "error (95 %)", "after [s] (inputs)")
+    simulations = counted(len(start.moments) - 1, "short simulation")
+    inputs = f"start: heat by {simulations} and the steady state; inputs that vary: {', '.join(start.inputs)}"
+    return [Table("", header, rows), Paragraph(_start_sentence(start)), Paragraph(inputs, detail=Detail.ALL)]
+
+
+def _when(start: StartResult, name: str, play: LeastClearance) -> str:
+    """When a clearance is least; times over the inputs only where nearly all of these have a minimum."""
+    if play.time_s is None:
+        first, last = (start.path["figures"][name][place] for place in (0, -1))
+        return "at the start" if first <= last else "at the end"
+    times = start.ranges.get(f"{name}_time_s")
+    return f"{shown(play.time_s, 3)} ({range_ends(times) if times else 'not always a minimum'})"
+
+
+def _start_sentence(start: StartResult) -> str:
+    """How a start goes, in a line."""
+    lead, spread = start.temperature_difference_K, start.ranges[DIFFERENCE]
+    steady = start.reason or start.status
+    if start.time_to_steady_s is not None and start.reason is None:
+        times = start.ranges.get("time_to_steady_s")
+        steady = f"steady after {shown(start.time_to_steady_s, 3)} s{f' ({range_ends(times)})' if times else ''}"
+    pressure = (
+        "" if start.race_pressure_MPa is None else f"; races reach {start.race_pressure_MPa:.0f} MPa without clearance"
+    )
+    return (
+        f"start: inner ring up to {with_error(lead.value, lead.stated_error)} K ({range_ends(spread)}) warmer than the outer ring; "
+        f"{steady}{pressure}"
+    )
 
 
 def _clearances(result: SimulationResult) -> list[Block]:

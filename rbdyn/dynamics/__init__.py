@@ -3,7 +3,7 @@
 - ``parameters``: what a scene becomes for compiled code; ``forces``: interactions, state and equations; ``integrators``: time stepping
 - ``run``: one replicate under way, and its method; ``recording``: the same in batches; ``ensemble``: runs side by side in threads
 - ``settling``: replicates that go on until their figures no longer drift; ``simulate``: their figures as one result;
-  ``temperatures``: those that the friction of a bearing keeps up
+  ``temperatures``: those that the friction of a bearing keeps up; ``start``: those of a cold machine over time
 - ``figures``: one list of them, which studies, maps, rigs and the manual follow; ``statistics``: their errors
 - ``part_figures``: those of parts; ``cage_verdict``: class of the cage by its orbit; ``duty_simulation``: runs over a duty
 - ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load

@@ -79,11 +79,16 @@ def simulate(
         from rbdyn.dynamics.target import reach
 
         return reach(scene, target, partial(simulate, notice=notice), workers, progress, stop, notice)
-    run = partial(_ensemble, workers=workers, stop=Stop(outer=stop), pace=_pace(scene, notice, threads_of(workers)))
+    run = partial(_ensemble, workers=workers, stop=stop, pace=_pace(scene, notice, threads_of(workers)))
     if scene.thermal is not None:
         from rbdyn.dynamics.temperatures import with_temperatures
 
-        return with_temperatures(scene, run, _gather, progress)
+        balanced = with_temperatures(scene, run, _gather, progress)
+        if scene.thermal.start is None:
+            return balanced.result
+        from rbdyn.dynamics.start import with_start
+
+        return with_start(balanced)
     return _gather(scene, *run(scene, roller_bearing(scene), progress))
 
 
@@ -96,7 +101,7 @@ def steady_scene(scene: Scene, workers: int | None = None, stop: Stop | None = N
         return scene
     from rbdyn.dynamics import temperatures
 
-    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=Stop(outer=stop), pace=pace))
+    return temperatures.steady_scene(scene, partial(_ensemble, workers=workers, stop=stop, pace=pace))
 
 
 def _pace(scene: Scene, notice: Notice, threads: int) -> Pace:
@@ -112,7 +117,7 @@ def _pace(scene: Scene, notice: Notice, threads: int) -> Pace:
 
 
 def _ensemble(
-    scene: Scene, bearing: RollerBearing, progress: Reporter, workers: int | None, stop: Stop, pace: Pace | None
+    scene: Scene, bearing: RollerBearing, progress: Reporter, workers: int | None, stop: Stop | None, pace: Pace | None
 ) -> tuple[Ensemble, dict[str, float]]:
     """Replicates of a scene with its parameters, and the time [s] that they took."""
     compile_s = 0.0
@@ -121,7 +126,9 @@ def _ensemble(
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
     started, compiled_s = time.perf_counter(), COMPILING.seconds
-    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop, pace)
+    # A replicate that fails stops those of its own scene alone.
+    own = Stop(outer=stop)
+    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, own, pace)
     # A method that a run tries, and this run first, is compiled then.
     more_s = COMPILING.seconds - compiled_s
     return ensemble, {"wall_s": time.perf_counter() - started - more_s, "compile_s": compile_s + more_s}

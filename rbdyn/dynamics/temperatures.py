@@ -52,6 +52,8 @@ from rbdyn.thermal.network import NODES, carried_off
 SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
 # Short states of a search at least: two for the balance, and two for the gain of its loop.
 SHORT_STATES = 4
+# Usual short simulations of a start.
+START_STATES = 5
 # Warmer nodes of the runs that measure the gain [K].
 WARMER = 5.0
 # Rise of all nodes by the heat [K], up to which the losses of one state serve elsewhere, and solutions of the network that follow.
@@ -124,7 +126,8 @@ def short_turns(scene: Scene, threads: int = 1) -> tuple[float, float]:
     """Shaft turns of the short runs of a search that each thread makes one after the other, and those of one run."""
     few = short(scene).numerics
     length = few.warm_up_turns + few.turns
-    return SHORT_STATES * math.ceil(few.replicates / threads) * length, length
+    states = SHORT_STATES + (0 if scene.thermal is None or scene.thermal.start is None else START_STATES)
+    return states * math.ceil(few.replicates / threads) * length, length
 
 
 class Balance:
@@ -147,9 +150,18 @@ class Balance:
         """Temperatures before any heat [C]."""
         return np.full(len(NODES), inlet_temperature(self.thermal, self.scene.lubricant))
 
-    def at(self, temperatures: Array, whole: bool = False, progress: Reporter = None) -> State:
-        """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt."""
-        hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()))
+    def at(
+        self,
+        temperatures: Array,
+        whole: bool = False,
+        progress: Reporter = None,
+        seats: tuple[float, float] | None = None,
+    ) -> State:
+        """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt.
+
+        ``seats``: temperatures of housing and shaft where these do not follow their rings at once [C].
+        """
+        hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()), seats)
         # The numerics of a short run change no parameter, and tables of traction take a quarter of a second.
         bearing = roller_bearing(hot)
         network = network_of(hot, self.thermal, bearing)
@@ -256,8 +268,16 @@ def verdict_of(balance: Balance) -> Verdict:
     return Verdict(search.status, search.reason, search.slopes, [*search.states], temperatures)
 
 
-def with_temperatures(scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None) -> SimulationResult:
-    """The result of a scene with [thermal], at its steady temperatures or at the last possible ones. Raises as ``verdict_of``."""
+class Balanced(NamedTuple):
+    """A result at steady temperatures, or at the last possible ones, with its balance and the states visited."""
+
+    result: SimulationResult
+    balance: Balance
+    path: list[State]
+
+
+def with_temperatures(scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None) -> Balanced:
+    """The result of a scene with [thermal]. Raises as ``verdict_of``."""
     balance = Balance(scene, simulate)
     verdict = verdict_of(balance)
     path, temperatures = verdict.path, verdict.temperatures
@@ -270,7 +290,7 @@ def with_temperatures(scene: Scene, simulate: Simulate, gather: Gather, progress
     status, reason = verdict.status, verdict.reason
     if verdict.steady and not _closes(state, verdict.slopes):
         status, reason = "undecided", _open_reason(state, verdict.slopes)
-    return _result(balance, path, verdict.slopes, status, reason, gather)
+    return Balanced(_result(balance, path, verdict.slopes, status, reason, gather), balance, path)
 
 
 def _closes(state: State, slopes: Array) -> bool:

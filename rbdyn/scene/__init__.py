@@ -6,7 +6,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
 - ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
-- ``thermal``: heat balance; ``input_ranges``: what the unknown inputs of the balance leave open
+- ``thermal``: heat balance; ``start``: warming of a cold machine; ``input_ranges``: what the unknown inputs of the balance leave open
 - ``geometry``: radii, masses and speeds; ``fits``: rings, clearances and grooves as mounted; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys,
   and columns of tables named by them; ``duty``: points of operation
@@ -54,10 +54,18 @@ from rbdyn.scene.lubricant import (
     with_fraction_of_flow,
     with_traction_of_oil,
 )
-from rbdyn.scene.notes import catalogue_notes, unit_notes
+from rbdyn.scene.notes import catalogue_entry, catalogue_notes, unit_notes
 from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
-from rbdyn.scene.thermal import FilmTemperatures, Thermal, film_temperatures, thermal_faults, with_first_guess
+from rbdyn.scene.start import start_faults
+from rbdyn.scene.thermal import (
+    FilmTemperatures,
+    Thermal,
+    film_temperatures,
+    oil_ceiling,
+    thermal_faults,
+    with_first_guess,
+)
 from rbdyn.scene.uncertain import Calibrate, Uncertain
 from rbdyn.verdict.orbits import SAMPLES_A_TURN
 
@@ -146,6 +154,10 @@ class Scene(SceneFile):
         )
         faults += self._overload_faults()
         faults += thermal_faults(self.thermal, self.lubricant, self.mounting, self.bearing.designation)
+        if self.thermal is not None:
+            listed, ceiling = catalogue_entry(self.bearing), oil_ceiling(self.thermal, self.lubricant)
+            reference = None if listed is None else listed[1].reference_speed
+            faults += start_faults(self.thermal.start, self.lubricant, self.thermal.ambient_C, ceiling, reference)
         if self.thermal is not None and self.operation.schedule is not None:
             faults.append(
                 "operation.schedule: [thermal] balances the heat of a steady speed and load; leave out one of them"

@@ -584,5 +584,7 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
     ):
         if value != usual:
             yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"
+    if thermal.start is not None:
+        yield "[thermal.start]: is for roller bearings; a ball bearing has its steady state only, so leave it out"
     if scene.errors is not None:
         yield "[thermal] and [errors]: runout is computed at stated temperatures; leave out one of them"

@@ -7,7 +7,7 @@ uncertainty``, which also varies all other inputs, by simulation.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, keyed
+from rbdyn.mounting import DIFFERENCE
 from rbdyn.thermal.heat import TERMS
 from rbdyn.thermal.losses import HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
@@ -34,9 +35,10 @@ SCALED = {
     "oil_share": ("flow",),
 }
 OTHER = ("film_share_to_oil", "shaft_lag", "cage_offset_K")
+# Keys of [thermal.start] that vary.
+STARTING = ("housing_widths", "shaft_widths")
 # Input sets, a power of two, their seed, and the quantiles that a range states.
 SETS, SEED, QUANTILES = 256, 1, (0.05, 0.5, 0.95)
-DIFFERENCE = "inner_minus_outer_K"
 
 
 class Ranges(Record):
@@ -84,16 +86,7 @@ def input_ranges(
     sets = input_sets(scene, levels, estimated)
     dry, wet = shares(0.0), shares(1.0)
     rows, others = [], list[Mapping[str, float]]()
-    for place in range(SETS if sets else 1):
-        values = {key: float(column[place]) for key, column in sets.items()}
-        own = {key.removeprefix("thermal."): value for key, value in values.items() if key not in levels}
-        changed = thermal.model_copy(update=own)
-        ratios = {
-            name: own[key] / getattr(thermal, key) for key, names in SCALED.items() if key in own for name in names
-        }
-        level = np.ones(len(TERMS))
-        for key in sorted(set(levels) & set(values)):
-            level *= levels[key](values[key])
+    for changed, ratios, level in varied_inputs(thermal, sets, levels):
         varied = model.varied(ratios, level, dry + changed.film_share_to_oil * (wet - dry))
         guess = varied.balanced()
         stable = varied.is_stable(guess)
@@ -112,10 +105,35 @@ def input_ranges(
     return Ranges(figures, tuple(sets), float(np.mean(table.max(axis=1) >= HOTTEST)))
 
 
+def varied_inputs(
+    thermal: "Thermal", sets: Mapping[str, Array], levels: Levels
+) -> "Iterator[tuple[Thermal, dict[str, float], Array]]":
+    """For each set of inputs: keys of [thermal], ratios of conductances by name, and losses (terms,) over the usual ones."""
+    start = thermal.start
+    for place in range(SETS if sets else 1):
+        values = {key: float(column[place]) for key, column in sets.items()}
+        own = {key.removeprefix("thermal."): value for key, value in values.items() if key not in levels}
+        widths = {key: own.pop(f"start.{key}") for key in STARTING if f"start.{key}" in own}
+        update = own if start is None else own | {"start": start.model_copy(update=widths)}
+        ratios = {
+            name: own[key] / getattr(thermal, key) for key, names in SCALED.items() if key in own for name in names
+        }
+        level = np.ones(len(TERMS))
+        for key in sorted(set(levels) & set(values)):
+            level *= levels[key](values[key])
+        yield thermal.model_copy(update=update), ratios, level
+
+
 def input_sets(
-    scene: "Scene | SingleRowScene", levels: Collection[str], estimated: Collection[str] = ()
+    scene: "Scene | SingleRowScene",
+    levels: Collection[str],
+    estimated: Collection[str] = (),
+    starting: Collection[str] = (),
 ) -> dict[str, Array]:
-    """Values of each unknown input of the balance, (SETS,), by its key; ``levels``: keys that change losses."""
+    """Values of each unknown input of the balance, (SETS,), by its key; ``levels``: keys that change losses.
+
+    ``starting``: keys of [thermal.start] that vary too.
+    """
     from scipy.stats import qmc
 
     from rbdyn.scene.uncertain import documented
@@ -125,10 +143,12 @@ def input_sets(
     assert thermal is not None
     stated = {f"{table}.{key}" for table in ("lubricant", "model") for key in scene._tables.get(table, {})}
     stated |= {f"thermal.{key}" for key in thermal.model_fields_set}
+    stated |= {f"thermal.start.{key}" for key in ([] if thermal.start is None else thermal.start.model_fields_set)}
     # A conductance of zero stays so.
     keys = {
         *levels,
         *(f"thermal.{key}" for key in OTHER),
+        *(f"thermal.start.{key}" for key in starting),
         *(f"thermal.{key}" for key in SCALED if getattr(thermal, key)),
     }
     laws = {

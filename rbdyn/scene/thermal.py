@@ -6,13 +6,14 @@ temperatures, and its films have those of their surfaces.
 
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
-from rbdyn.base.faults import NonNegative, Positive, Share, Strict
+from rbdyn.base.faults import NonNegative, Positive, Share, Sparse
 from rbdyn.scene.lubricant import HOTTEST_C, Lubricant, OilCelsius
 from rbdyn.scene.operation import Mounting
+from rbdyn.scene.start import Start
 
 if TYPE_CHECKING:
     from rbdyn.mounting import MountedRings
@@ -39,13 +40,15 @@ NO_MOUNTING = (
 )
 
 
-class Thermal(Strict):
+class Thermal(Sparse):
     """Heat balance of the bearing, which computes its temperatures: oil, outer ring with housing, inner ring with shaft, and
     rolling elements with cage have one temperature each.
 
     Needs [mounting], and lubricant.oil_flow_l_min or a lubricant.supply other than a jet. lubricant.temperature_C becomes the
     first guess and may be left out. The result has the temperatures, their errors and what the loop of heat and clearance does.
     """
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"start": None}
 
     ambient_C: OilCelsius = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
@@ -77,6 +80,8 @@ class Thermal(Strict):
     """Highest temperature of the oil. Default by base oil: mineral 120, PAO and PAG 150, ester 200."""
     cage_ceiling_C: Annotated[float, Field(ge=-60.0, le=1000.0)] | None = None  # noqa: N815
     """Highest temperature of the cage. Default by material: PEEK 150, phenolic laminate 120, none for metals."""
+    start: Start | None = None
+    """Start of the cold machine: temperatures and clearances over time until they are steady; without it only the steady state."""
 
 
 class Temperatures(NamedTuple):
@@ -229,23 +234,29 @@ def _cold_films(mounting: Mounting) -> Iterator[str]:
         )
 
 
-def part_temperatures(thermal: Thermal, temperatures: Temperatures, cage: bool = True) -> dict[str, float]:
-    """Keys of [mounting] at temperatures of the nodes [C]; ``cage``: whether the bearing's model has one."""
+def part_temperatures(
+    thermal: Thermal, temperatures: Temperatures, cage: bool = True, seats: tuple[Any, Any] | None = None
+) -> dict[str, Any]:
+    """Keys of [mounting] at temperatures of the nodes [C]; ``cage``: whether the bearing's model has one.
+
+    ``seats``: temperatures of housing and shaft where these do not follow their rings at once.
+    """
     _, outer, inner, rollers = temperatures
+    housing, shaft = (outer, inner) if seats is None else seats
     parts = {
         "inner_ring_temperature_C": inner,
         "outer_ring_temperature_C": outer,
         "roller_temperature_C": rollers,
-        "shaft_temperature_C": inner - thermal.shaft_lag * (inner - thermal.ambient_C),
-        "housing_temperature_C": outer,
+        "shaft_temperature_C": shaft - thermal.shaft_lag * (shaft - thermal.ambient_C),
+        "housing_temperature_C": housing,
     }
     return parts | ({"cage_temperature_C": rollers + thermal.cage_offset_K} if cage else {})
 
 
-def at_temperatures(scene: "Scene", temperatures: Temperatures) -> "Scene":
+def at_temperatures(scene: "Scene", temperatures: Temperatures, seats: tuple[float, float] | None = None) -> "Scene":
     """The scene with stated temperatures in place of its heat balance; its films have those of their surfaces.
 
-    Raises InputError where it is impossible at these temperatures, such as a cage that seizes.
+    ``seats``: as of ``part_temperatures``. Raises InputError where it is impossible at these temperatures, such as a cage that seizes.
     """
     thermal = scene.thermal
     assert thermal is not None
@@ -255,7 +266,7 @@ def at_temperatures(scene: "Scene", temperatures: Temperatures) -> "Scene":
     tables["lubricant"] |= {"temperature_C": oil, "film_temperature": "parts"}
     if scene.lubricant.viscosity_mPas is not None:
         tables["lubricant"]["viscosity_mPas"] = 1e3 * scene.lubricant.at(oil).viscosity
-    tables["mounting"] |= part_temperatures(thermal, temperatures)
+    tables["mounting"] |= part_temperatures(thermal, temperatures, seats=seats)
     return scene.from_dict(tables, f"the bearing at {oil:.4g} C")
 
 

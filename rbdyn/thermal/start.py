@@ -27,7 +27,7 @@ LEAST_SEAT = 2.0
 # Tolerance of LSODA, relative and in kelvins.
 TOLERANCE = 1e-7
 # Rows a factor e of time, and the time from which they are so dense [s].
-ROWS, FIRST = 24.0, 2.0
+ROWS, FIRST = 16.0, 2.0
 # Time constants of the slowest node after which a network at rest is steady: exp(-16) of 100 K are 1e-5 K.
 SETTLED = 16.0
 # Speed and load, over the largest of a course, below which the power laws see no further fall, or logarithms have no end.
@@ -56,25 +56,51 @@ def seat(area: float, gap: float, conductivity: float, roughness: float) -> floa
     return conductivity * area / (gap + roughness)
 
 
-def warming_network(conductances: Conductances, seats: Seats, boundaries: Boundaries) -> tuple[Array, Array]:
-    """G (6, 6) [W/K] and b (6,) [W] of ``WARMING_NODES``.
+class WarmingConductances(NamedTuple):
+    """Conductances between ``WARMING_NODES`` and out of them [W/K]; those of ``network`` but for the ways out of the rings."""
 
-    Housing and shaft lose to the surroundings so much that in series with their seats the rings lose what they do in ``network``.
-    """
-    inside = conductances._replace(outer_ambient=0.0, inner_ambient=0.0)
-    whole, inflow = np.zeros((len(WARMING_NODES),) * 2), np.zeros(len(WARMING_NODES))
-    whole[: len(NODES), : len(NODES)], inflow[: len(NODES)] = matrix(inside), source(inside, boundaries)
+    flow: float
+    sump: float
+    oil_outer: float
+    oil_inner: float
+    oil_rollers: float
+    outer_rollers: float
+    inner_rollers: float
+    outer_housing: float
+    inner_shaft: float
+    housing_ambient: float
+    shaft_ambient: float
+
+
+def warming_conductances(conductances: Conductances, seats: Seats) -> WarmingConductances:
+    """Conductances of which the rings, in series with their seats, lose what they do in ``network``."""
+    found = {name: value for name, value in conductances._asdict().items() if name in WarmingConductances._fields}
     for ring, part, way_out, between in (
-        (OUTER, HOUSING, conductances.outer_ambient, seats.housing),
-        (INNER, SHAFT, conductances.inner_ambient, seats.shaft),
+        ("outer", "housing", conductances.outer_ambient, seats.housing),
+        ("inner", "shaft", conductances.inner_ambient, seats.shaft),
     ):
         between = max(between, LEAST_SEAT * way_out)
-        outside = way_out * between / (between - way_out) if way_out else 0.0
+        found[f"{ring}_{part}"] = between
+        found[f"{part}_ambient"] = way_out * between / (between - way_out) if way_out else 0.0
+    return WarmingConductances(**found)
+
+
+def warming_network(conductances: WarmingConductances, boundaries: Boundaries) -> tuple[Array, Array]:
+    """G (6, 6) [W/K] and b (6,) [W] of ``WARMING_NODES``."""
+    g, whole = conductances, np.zeros((len(WARMING_NODES),) * 2)
+    inside = Conductances(
+        g.flow, g.oil_outer, g.oil_inner, g.oil_rollers, g.outer_rollers, g.inner_rollers, 0.0, 0.0, g.sump
+    )
+    whole[: len(NODES), : len(NODES)] = matrix(inside)
+    inflow = np.append(source(inside, boundaries), [g.housing_ambient, g.shaft_ambient] * np.array(boundaries.ambient))
+    for ring, part, between, outside in (
+        (OUTER, HOUSING, g.outer_housing, g.housing_ambient),
+        (INNER, SHAFT, g.inner_shaft, g.shaft_ambient),
+    ):
         whole[ring, ring] += between
         whole[part, part] += between + outside
         whole[ring, part] -= between
         whole[part, ring] -= between
-        inflow[part] += outside * boundaries.ambient
     return whole, inflow
 
 
@@ -90,9 +116,13 @@ class Course(NamedTuple):
         return np.asarray(np.interp(time, self.times, self.speeds)), np.asarray(np.interp(time, self.times, self.loads))
 
     def logarithms(self, time: float | Array) -> Array:
-        """Logarithms of speed and load (..., 2), which a machine at rest or without load keeps finite."""
+        """Logarithms of speed and load at times (..., 2)."""
+        return self.logarithms_of(*self.at(time))
+
+    def logarithms_of(self, speed: float | Array, load: float | Array) -> Array:
+        """Logarithms of a speed and a load (..., 2), which a machine at rest or without load keeps finite."""
         floors = SLOWEST * self.speeds.max(), LIGHTEST * max(self.loads.max(), 1e-9)
-        return np.log(np.stack([np.maximum(x, least) for x, least in zip(self.at(time), floors, strict=True)], axis=-1))
+        return np.log(np.stack([np.maximum(speed, floors[0]), np.maximum(load, floors[1])], axis=-1))
 
 
 class Moment(NamedTuple):

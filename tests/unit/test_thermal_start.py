@@ -19,6 +19,7 @@ from rbdyn.thermal.start import (
     settling_time,
     slowest,
     warming,
+    warming_conductances,
     warming_network,
 )
 
@@ -40,7 +41,7 @@ def _constant(whole, inflow, heat):
 
 def test_unit_constant_heat_is_a_matrix_exponential():
     """Unit: constant heat and network have the closed form T = T_s + exp(-C^-1 G t)(T_0 - T_s), within 1e-8."""
-    whole, inflow = warming_network(BATH, SEATS, AROUND)
+    whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
     found = warming(CAPACITIES, _constant(whole, inflow, HEAT), COLD, 4000.0, tolerance=1e-10)
     steady = np.linalg.solve(whole, HEAT + inflow)
     for row in (1, 40, 90, -1):
@@ -51,21 +52,21 @@ def test_unit_constant_heat_is_a_matrix_exponential():
 
 def test_unit_steady_state_is_that_of_the_network():
     """Unit: with housing and shaft as nodes the four others become as warm as in the network without them."""
-    whole, inflow = warming_network(BATH, SEATS, AROUND)
+    whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
     end = 16.0 * slowest(CAPACITIES, whole)
     last = warming(CAPACITIES, _constant(whole, inflow, HEAT), COLD, end).temperatures[-1]
     assert last[: len(NODES)] == pytest.approx(temperatures(BATH, AROUND, HEAT[: len(NODES)]), abs=1e-3)
     # The seat's resistance is in series with what leaves: the housing is colder by the heat that passes it over the seat.
     assert last[OUTER] - last[HOUSING] == pytest.approx(2.0 * (last[OUTER] - 20.0) / 60.0, abs=1e-3)
     assert last[INNER] - last[SHAFT] == pytest.approx(0.9 * (last[INNER] - 20.0) / 40.0, abs=1e-3)
-    loose, _ = warming_network(BATH, Seats(1e-3, 1e-3), AROUND)
+    loose, _ = warming_network(warming_conductances(BATH, Seats(1e-3, 1e-3)), AROUND)
     assert loose[OUTER, HOUSING] == pytest.approx(-4.0)  # ISO 15312's heat passes the seat
 
 
 def test_unit_network_without_ways_out():
     """Unit: housing and shaft that lose nothing only store heat, and rows and columns of their network sum to zero."""
     closed = BATH._replace(outer_ambient=0.0, inner_ambient=0.0)
-    whole, inflow = warming_network(closed, SEATS, AROUND)
+    whole, inflow = warming_network(warming_conductances(closed, SEATS), AROUND)
     assert whole[[HOUSING, SHAFT]].sum(axis=1) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert np.array_equal(whole, whole.T) and inflow[HOUSING] == inflow[SHAFT] == 0.0
     assert whole.sum() == pytest.approx(matrix(closed).sum(), rel=1e-12)
@@ -117,7 +118,7 @@ def test_unit_heat_runs_away_at_a_gain_of_one(share, steady):
 
 
 def _difference(capacities):
-    whole, inflow = warming_network(BATH, SEATS, AROUND)
+    whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
     found = warming(capacities, _constant(whole, inflow, HEAT), COLD, 8000.0).temperatures
     return found[:, INNER] - found[:, OUTER]
 
@@ -132,7 +133,7 @@ def test_unit_heavy_housing_holds_the_outer_ring_back():
     assert leads == sorted(leads) and leads[-1] - leads[0] > 3.0
     # A housing of infinite mass is the surroundings behind the seat.
     cold = BATH._replace(outer_ambient=60.0 * 1e6 / (60.0 + 1e6))
-    whole, inflow = warming_network(cold, Seats(60.0 * 1e3, SEATS.shaft), AROUND)
+    whole, inflow = warming_network(warming_conductances(cold, Seats(60.0 * 1e3, SEATS.shaft)), AROUND)
     steady = np.linalg.solve(whole, HEAT + inflow)
     assert leads[-1] == pytest.approx(steady[INNER] - steady[OUTER], rel=0.02)
 
@@ -140,7 +141,7 @@ def test_unit_heavy_housing_holds_the_outer_ring_back():
 def test_unit_rings_alike_do_not_overshoot():
     """Unit: rings with the same capacity, heat and conductances stay as warm as each other, and their rise has no overshoot."""
     alike = Conductances(0.0, 8.0, 8.0, 12.0, 18.0, 18.0, 2.0, 2.0, 2.0)
-    whole, inflow = warming_network(alike, Seats(60.0, 60.0), AROUND)
+    whole, inflow = warming_network(warming_conductances(alike, Seats(60.0, 60.0)), AROUND)
     capacities, heat = np.array([40.0, 110.0, 110.0, 100.0, 600.0, 600.0]), np.array([45.0, 25.0, 25.0, 50.0, 0.0, 0.0])
     found = warming(capacities, _constant(whole, inflow, heat), COLD, 8000.0).temperatures
     assert found[:, INNER] == pytest.approx(found[:, OUTER], abs=1e-7)
@@ -160,7 +161,7 @@ def test_unit_machines_together_warm_as_alone():
 
 def _moment(temperature, powers, course=FULL):
     nodes = np.full(len(WARMING_NODES), temperature)
-    return Moment(nodes, course, np.asarray(powers), warming_network(BATH, SEATS, AROUND))
+    return Moment(nodes, course, np.asarray(powers), warming_network(warming_conductances(BATH, SEATS), AROUND))
 
 
 FILMS = np.array([[0.0, 0.5, 0.0, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])

@@ -189,14 +189,19 @@ def _rolling_force(hot: Scene, loads: LoadDistribution, distance: float | None) 
     return total
 
 
+def cavity_of(scene: Scene) -> float:
+    """Free volume between the raceways, over the width of the rings [m^3]."""
+    geometry = scene.geometry
+    volume = geometry.roller_mass / scene.material("roller").density
+    cage = scene.cage.mass / scene.material("cage").density
+    return cavity_volume(geometry.raceways, ring_width(scene), scene.bearing.rollers, volume, cage)
+
+
 def flow_notes(hot: Scene) -> Notes:
     """Notes where the oil fraction that follows from a flow is a guess; none without a flow."""
     flow, geometry = hot.lubricant.oil_flow, hot.geometry
     if flow is None or hot.mounting is None:
         return ()
     inner, outer = hot.operation.speeds
-    volume = geometry.roller_mass / hot.material("roller").density
-    cage = hot.cage.mass / hot.material("cage").density
-    cavity = cavity_volume(geometry.raceways, ring_width(hot), hot.bearing.rollers, volume, cage)
-    stay = residence(hot.lubricant.oil_fraction, cavity, flow, geometry.motion.cage_speed)
+    stay = residence(hot.lubricant.oil_fraction, cavity_of(hot), flow, geometry.motion.cage_speed)
     return fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)

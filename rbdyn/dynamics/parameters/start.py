@@ -1,0 +1,129 @@
+"""A cold roller bearing that warms: capacities of its parts, its seats, its clearances at temperatures, and its course."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import RPM
+from rbdyn.dynamics.parameters.heat import cavity_of, ring_width
+from rbdyn.mounting import MountedRings, Ring, overlap
+from rbdyn.scene import Scene
+from rbdyn.scene.fits import mounted_rings
+from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
+from rbdyn.thermal.network import NODES
+from rbdyn.thermal.start import HOUSING, SHAFT, Course, Seats, seat
+
+# Gap of a tight seat by its roughness [m]: filled with oil of 0.13 W/(m K) it conducts 1.5e5 W/(m^2 K).
+ROUGHNESS = 0.87e-6
+# Names of clearances in JSON by those of a scene.
+NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
+
+
+def capacities(scene: Scene, thermal: Thermal) -> Array:
+    """Heat capacities of ``WARMING_NODES`` [J/K], from the drawing.
+
+    Rings have their whole width between seat and raceway. The oil is what the cavity holds: full for a bath, which has as much again
+    at its sides, else the oil fraction. Housing and shaft count over some widths of the bearing.
+    """
+    mounting, geometry, start = scene.mounting, scene.geometry, thermal.start
+    assert mounting is not None and start is not None
+    width, rings = ring_width(scene), _rings(scene)
+    parts = {
+        "outer": _capacity(rings.outer_ring, width),
+        "inner": _capacity(rings.inner_ring, width),
+        "rollers": scene.bearing.rollers * geometry.roller_mass * scene.material("roller").heat_capacity
+        + scene.cage.mass * scene.material("cage").heat_capacity,
+    }
+    oil = scene.oil()
+    fill = 1.0 if scene.lubricant.supply == "bath" else scene.lubricant.oil_fraction
+    parts["oil"] = fill * cavity_of(scene) * oil.density * oil.heat_capacity
+    housing = start.housing_widths * _capacity(rings.housing, width)
+    shaft = start.shaft_widths * _capacity(rings.shaft, width)
+    return np.array([*(parts[node] for node in NODES), housing, shaft])
+
+
+def _capacity(ring: Ring, width: float) -> float:
+    area = math.pi * (ring.outer_radius**2 - ring.inner_radius**2)
+    return area * width * ring.material.density * ring.material.heat_capacity
+
+
+def _rings(scene: Scene) -> MountedRings:
+    assert scene.mounting is not None
+    material = scene.material("rings")
+    return mounted_rings(scene.mounting, scene.bearing, material, material, *scene.operation.speeds)
+
+
+def seats_of(hot: Scene) -> Seats:
+    """Conductances of both seats of a scene at temperatures: the gap of a loose fit has oil [W/K]."""
+    rings, width, conductivity = _rings(hot), ring_width(hot), hot.oil().conductivity
+    pairs = (
+        (rings.outer_ring, rings.housing, rings.outer_interference),
+        (rings.shaft, rings.inner_ring, rings.inner_interference),
+    )
+    gaps = [max(-overlap(*pair), 0.0) for pair in pairs]
+    areas = [2.0 * math.pi * pair[0].outer_radius * width for pair in pairs]
+    return Seats(*(seat(area, gap, conductivity, ROUGHNESS) for area, gap in zip(areas, gaps, strict=True)))
+
+
+class Clearances(NamedTuple):
+    """Diametral clearances at temperatures [um] by their name in JSON, and what is left of others before parts touch [um]."""
+
+    figures: dict[str, Array]
+    left: dict[str, Array]
+
+
+def clearances_at(hot: Scene, thermal: Thermal, temperatures: Array, speed_ratio: Array | float = 1.0) -> Clearances:
+    """Clearances at temperatures (..., 6) [C] and speeds over that of the scene; rotation changes them by its square.
+
+    ``hot``: the scene with stated temperatures, whose own do not count. ``left``: of what seizes, by name.
+    """
+    mounting = hot.mounting
+    assert mounting is not None
+    nodes = Temperatures(*np.moveaxis(temperatures[..., : len(NODES)], -1, 0))
+    keys = part_temperatures(thermal, nodes, seats=(temperatures[..., HOUSING], temperatures[..., SHAFT]))
+    turning = mounting.model_copy(update=keys)
+    found = [_clearances(hot, turning), _clearances(hot, turning.model_copy(update={"rotation": False}))]
+
+    def blend(name: str, place: int) -> Array:
+        fast, still = (1e6 * np.asarray(each[place][name]) for each in found)
+        return np.asarray(still + (fast - still) * speed_ratio**2 + 0.0 * nodes.outer)
+
+    return Clearances(*({name: blend(name, place) for name in found[0][place]} for place in (0, 1)))
+
+
+def _clearances(hot: Scene, mounting: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Clearances [m], and how much of those that may not be lost is left."""
+    plays = {NAMES[name]: play for name, play in hot.clearances_of(mounting).items()}
+    running = hot.running_clearances(mounting)
+    left = {name: play.play.operating - play.touching for name, play in running.items() if math.isfinite(play.touching)}
+    return plays, left
+
+
+def course_of(scene: Scene) -> Course:
+    """Speed [rad/s] and load [N] over time: those of the schedule, else the operating point."""
+    thermal, operation = scene.thermal, scene.operation
+    assert thermal is not None and thermal.start is not None
+    schedule = thermal.start.schedule
+    times = [0.0] if schedule is None else schedule.time_s
+    speeds, loads = (None, None) if schedule is None else (schedule.speed, schedule.load_N)
+    speeds, loads = speeds or [turning_speed(scene)] * len(times), loads or [operation.radial_load_N] * len(times)
+    return Course(*(np.array(column, dtype=np.float64) for column in (times, speeds, loads)))
+
+
+def turning_speed(scene: Scene) -> float:
+    """Speed of the inner ring, or of the outer one where the inner ring stands still, without a sign [rad/s]."""
+    inner, outer = scene.operation.speeds
+    return abs(inner) if inner else abs(outer)
+
+
+def at_point(scene: Scene, speed: float, load: float) -> Scene:
+    """The scene at another speed [rad/s] and load [N]; both rings keep their ratio. Raises InputError."""
+    if (speed, load) == (turning_speed(scene), scene.operation.radial_load_N):
+        return scene
+    inner, outer = (speed / turning_speed(scene) * value / RPM for value in scene.operation.speeds)
+    return scene.changed(
+        {"operation.inner_speed_rpm": inner, "operation.outer_speed_rpm": outer, "operation.radial_load_N": load}
+    )

@@ -1,0 +1,98 @@
+"""Start of a cold machine: keys of ``[thermal.start]``, and their contradictions with oil, bearing and operating point."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated
+
+from pydantic import Field
+
+from rbdyn.base.faults import Consistent, InSI, NonNegative, Positive, Strict
+from rbdyn.base.words import counted
+from rbdyn.scene.lubricant import THICKEST, Lubricant, OilCelsius
+from rbdyn.scene.operation import SLOWEST_RPM, Load
+
+MOST_POINTS = 60
+# Speed over the reference speed of a catalogue, above which a unit is wrong or the bearing is another one.
+MOST_OF_REFERENCE = 2.0
+# Longest schedule [s]: a week.
+LONGEST = 7.0 * 24.0 * 3600.0
+Pace = Annotated[float, Field(ge=0.0, le=1e6)]
+
+
+class StartSchedule(Consistent):
+    """Speed and load over time: linear between the points, constant after the last. A step takes two points a second apart."""
+
+    time_s: Annotated[list[NonNegative], Field(min_length=1, max_length=MOST_POINTS)]
+    """Times of the points from the start of the machine, the first 0."""
+    speed_rpm: list[Pace] | None = None
+    """Speed at each time, without a sign: that of the inner ring, or of the outer one where the inner ring stands still; the other
+    ring keeps the ratio of [operation]. Default: the speed of [operation]."""
+    load_N: list[Load] | None = None  # noqa: N815
+    """Radial load at each time. Default: the load of [operation]."""
+    speed = InSI[list[float] | None]("rpm")
+
+    def faults(self) -> Iterator[str]:
+        times, name = self.time_s, "thermal.start.schedule"
+        if times[0] != 0.0:
+            yield f"{name}.time_s: begins at {times[0]:g} s; give the speed and load of the start at 0"
+        for place, (before, after) in enumerate(pairwise(times), 2):
+            if after <= before:
+                yield f"{name}.time_s: times must rise, but {after:g} s (point {place}) follows {before:g} s; sort them"
+        if times[-1] > LONGEST:
+            yield f"{name}.time_s: ends after {times[-1]:g} s, more than a week ({LONGEST:g} s); give seconds"
+        for key in ("speed_rpm", "load_N"):
+            values = getattr(self, key)
+            if values is not None and len(values) != len(times):
+                yield (
+                    f"{name}.{key}: {counted(len(values), 'value')} for {counted(len(times), 'time')}; give one value for each "
+                    "time"
+                )
+        if self.speed_rpm is None and self.load_N is None:
+            yield f"{name}: has neither speed nor load; give speed_rpm or load_N"
+        elif self.speed_rpm is not None and len(self.speed_rpm) == len(times) and max(self.speed_rpm) < SLOWEST_RPM:
+            yield f"{name}.speed_rpm: the machine stands still at every time; give a speed of at least {SLOWEST_RPM:g}"
+
+
+class Start(Strict):
+    """Warming of a cold machine: temperatures and clearances over time until they are steady. Rings warm before the housing, so
+    clearances are often least after one to five minutes.
+
+    The heat follows a few short simulations, at most ten, from which it is interpolated over temperature, speed and load.
+    """
+
+    from_C: OilCelsius | None = None  # noqa: N815
+    """Temperature of all parts and of the oil at the start. Default: thermal.ambient_C."""
+    schedule: StartSchedule | None = None
+    """Speed and load over time. Default: the operating point from the start on."""
+    housing_widths: Positive = 1.7
+    """Length of housing that warms with the bearing, in widths of the bearing: 1 to 3. The heavier the housing, the longer the
+    inner ring stays warmer than the outer one."""
+    shaft_widths: Positive = 2.2
+    """Length of shaft that warms with the bearing, in widths of the bearing: 1 to 5."""
+
+
+def start_faults(
+    start: Start | None, lubricant: Lubricant, ambient: float, ceiling: float, reference_rpm: float | None
+) -> Iterator[str]:
+    """Contradictions of a start with the oil and the reference speed of a catalogue, if any.
+
+    ``ambient``: temperature around the machine; ``ceiling``: of the oil [C].
+    """
+    if start is None:
+        return
+    cold, name = (ambient, "thermal.ambient_C") if start.from_C is None else (start.from_C, "thermal.start.from_C")
+    oil = lubricant.at(cold)
+    thickness = 1e6 * oil.viscosity / oil.density
+    if cold >= ceiling:
+        yield f"{name} = {cold:g}: not below the ceiling of the oil, {ceiling:g} C (thermal.oil_ceiling_C); start colder"
+    elif thickness > THICKEST:
+        yield (
+            f"{name} = {cold:g}: the oil has {thickness:.2g} mm2/s there, above the {THICKEST:g} of its law; start warmer or take a "
+            "thinner oil"
+        )
+    fastest = max((start.schedule and start.schedule.speed_rpm) or [0.0])
+    if reference_rpm is not None and fastest > MOST_OF_REFERENCE * reference_rpm:
+        yield (
+            f"thermal.start.schedule.speed_rpm: reaches {fastest:g}, above twice the reference speed of {reference_rpm:g} rpm; "
+            "lower it or check its unit"
+        )
