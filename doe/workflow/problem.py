@@ -21,7 +21,7 @@ from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError, key_path, refuse
 from rbdyn.base.records import Record, spread
 from rbdyn.base.words import label, quantity
-from rbdyn.dynamics.figures import why_missing
+from rbdyn.dynamics.figures import sums_left_out, why_missing
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
@@ -229,7 +229,8 @@ class Problem(Study):
 
         Raises InputError for an impossible value.
         """
-        texts = (*self.scene.set, *overrides, f"numerics.seed={seed}", *self.assignments(factors))
+        left_out = sums_left_out(self.figures)
+        texts = (*self.scene.set, *left_out, *overrides, f"numerics.seed={seed}", *self.assignments(factors))
         if (kind, *texts) not in self.built:
             scene = kind.from_dict(self.scene_tables, str(self.path_of(self.scene.file)), texts)
             keys = [factor.key for factor in self.file.factor]

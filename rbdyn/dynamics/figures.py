@@ -4,7 +4,7 @@ They stand apart from compiled code so that a command can check a name without i
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -13,7 +13,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
-from rbdyn.dynamics.forces.state import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.forces.state import EXPONENTS, NUMBER, PEAK_POWERS, POCKET_CONTACT_LOAD, POCKET_LOAD, SQUARES
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.losses import (
@@ -49,6 +49,7 @@ class Figure:
     - ``panel``: place on a map from 1, and its heading in tables of points, "[%]" where these show it in percent
     - ``worst``: which value is the worst one over a duty
     - ``needs``: what a scene without it lacks, in words
+    - ``sums``: key of [damage] without which a run leaves out its sums
     - ``is_defined``: whether runs bear it, where it needs more than its scene
     - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse
     - ``accuracy``: of a rig's sensor [%] where its table states none, 0 where no rig measures the figure
@@ -70,12 +71,15 @@ class Figure:
     worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
     is_defined: Callable[[Sequence[Replicate]], bool] = lambda runs: True
     needs: str = ""
+    sums: Literal["", "impacts"] = ""
     response: bool = True
     harmonic: bool = False
     accuracy: float = 0.0
 
     def scale_in(self, scene: "Scene") -> float | None:
         """Factor of the statistic in a scene; None where the scene has no such figure."""
+        if self.sums and not getattr(scene.damage, self.sums):
+            return None
         return self.scale(scene) if callable(self.scale) else self.scale
 
     @property
@@ -200,6 +204,39 @@ def _pocket_sliding(scene: "Scene") -> float | None:
     return 1.0 / (friction * scene.bearing.rollers) if friction > 0.0 else None
 
 
+def _impacts(run: Replicate) -> Array:
+    """Sums over the impacts of all pockets that end in each batch counted."""
+    return run.impacts[run.first :].sum(axis=1)
+
+
+def fatigue_force(sums: Array) -> Array:
+    """(sum F^m/n)^(1/m) from n, sum F^m and n m on the last axis; 0 of no impacts."""
+    number, powers, exponents = np.moveaxis(sums, -1, 0)
+    defined = (number > 0.5) & (powers > 0.0)
+    number, powers, exponents = (np.where(defined, part, 1.0) for part in (number, powers, exponents))
+    return np.where(defined, (powers / number) ** (number / exponents), 0.0)
+
+
+def _mean_or_none(sums: Array) -> Array:
+    """Second sum over the first; 0 of no impacts."""
+    return np.where(sums[..., 0] > 0.5, sums[..., 1] / np.maximum(sums[..., 0], 1.0), 0.0)
+
+
+def _with_pockets(scale: "Callable[[Scene], float | None]") -> "Callable[[Scene], float | None]":
+    """A ``scale`` of scenes with pockets."""
+    return lambda scene: None if scene.model.pocket == "off" else scale(scene)
+
+
+def _half_impact_mass(scene: "Scene") -> float:
+    """Half of m_r [kg], with 1/m_r = 1/m + 1/m_c + r^2/J_c of a roller and a cage that is free to move and turn."""
+    geometry, radius = scene.geometry, 0.5 * scene.bearing.pitch_diameter
+    return 0.5 / (1.0 / geometry.roller_mass + 1.0 / scene.cage.mass + radius**2 / geometry.cage_inertia)
+
+
+def _any_impacts(runs: Sequence[Replicate]) -> bool:
+    return any(bool(_impacts(run)[:, NUMBER].any()) for run in runs)
+
+
 def _land_sliding(scene: "Scene") -> float | None:
     """Sliding on the guide land over its friction power; none without a land or its friction."""
     guided = scene.cage.guidance != "roller" and scene.model.guide_land != "off"
@@ -230,7 +267,7 @@ DAMAGE = (
         "pocket_force_mean_N",
         "force on a pocket, mean over time and pockets; with films that on its more loaded wall",
         timed(partial(_work, POCKET_FORCE)),
-        lambda scene: None if scene.model.pocket == "off" else 1.0 / scene.bearing.rollers,
+        _with_pockets(lambda scene: 1.0 / scene.bearing.rollers),
         kind="damage",
         words="mean force on a pocket [N]",
         needs="pockets",
@@ -239,16 +276,48 @@ DAMAGE = (
         "pocket_impact_power_W",
         "power that impacts lose in all pockets: by damping of the walls and by squeezing films",
         timed(lambda run: run.work[:, POCKET_DAMPING] + run.work[:, POCKET_SQUEEZE]),
-        lambda scene: None if scene.model.pocket == "off" else 1.0,
+        _with_pockets(lambda scene: 1.0),
         kind="damage",
         words="power that impacts lose in all pockets [W]",
         needs="pockets",
     ),
     Figure(
+        "impacts_per_turn",
+        "contacts of rollers and pocket walls in a shaft turn whose first approach exceeds damage.impact_speed_m_s",
+        timed(lambda run: run.impacts[:, :, NUMBER].sum(axis=1)),
+        _with_pockets(lambda scene: scene.turn_s),
+        kind="damage",
+        words="impacts in all pockets in a shaft turn",
+        needs="pockets",
+        sums="impacts",
+    ),
+    Figure(
+        "impact_energy_J",
+        "energy that roller and free cage bring into an impact by their first approach, mean over impacts",
+        Statistic(lambda run: _impacts(run)[:, [NUMBER, SQUARES]], _mean_or_none),
+        _with_pockets(_half_impact_mass),
+        kind="damage",
+        words="energy of an impact, mean [J]",
+        needs="pockets",
+        sums="impacts",
+        is_defined=_any_impacts,
+    ),
+    Figure(
+        "impact_fatigue_force_N",
+        "equal peak force of all impacts that tires a bar as they do, by the exponent damage.fatigue_exponent",
+        Statistic(lambda run: _impacts(run)[:, [NUMBER, PEAK_POWERS, EXPONENTS]], fatigue_force),
+        _with_pockets(lambda scene: 1.0),
+        kind="damage",
+        words="equal peak force of impacts, for fatigue [N]",
+        needs="pockets",
+        sums="impacts",
+        is_defined=_any_impacts,
+    ),
+    Figure(
         "impact_return_force_N",
         f"force on a pocket that one of {RETURN_WINDOWS} impact windows exceeds, by Gumbel's law (from {FEWEST_WINDOWS} windows on)",
         RETURN_FORCE,
-        lambda scene: None if scene.model.pocket == "off" else 1.0,
+        _with_pockets(lambda scene: 1.0),
         kind="damage",
         slow=False,
         words=f"impact force that one of {RETURN_WINDOWS} windows exceeds [N]",
@@ -259,7 +328,7 @@ DAMAGE = (
         "bar_stress_MPa",
         "bending stress of a clamped cage bar under the impact return force; a fatigue limit is 0.3 to 0.4 of the strength, at least",
         RETURN_FORCE,
-        lambda scene: None if scene.model.pocket == "off" else scene.bar_stress_MPa_N,
+        _with_pockets(lambda scene: scene.bar_stress_MPa_N),
         kind="damage",
         slow=False,
         words="stress of a bar under it, at least [MPa]",
@@ -277,6 +346,8 @@ def why_missing(scene: "Scene", key: str) -> str | None:
     figure = next((figure for figure in DAMAGE if figure.key == key), None)
     if figure is None:
         return None
+    if figure.sums and not getattr(scene.damage, figure.sums):
+        return f"the scene leaves out its sums (damage.{figure.sums} = false); write true or choose another figure"
     if figure.scale_in(scene) is None:
         return f"the scene leaves out {figure.needs}; state it or choose another figure"
     numerics = scene.numerics
@@ -287,6 +358,12 @@ def why_missing(scene: "Scene", key: str) -> str | None:
             "numerics.replicates, or shorten numerics.impact_window_turns"
         )
     return None
+
+
+def sums_left_out(keys: Collection[str]) -> list[str]:
+    """Overrides by which a scene leaves out the sums that none of the figures needs, by their keys."""
+    tables = {figure.sums: any(one.key in keys for one in DAMAGE if one.sums == figure.sums) for figure in DAMAGE}
+    return [f"damage.{table}=false" for table, needed in tables.items() if table and not needed]
 
 
 _PLACES = {"oil": "oil that leaves the bearing", "outer": "outer ring", "inner": "inner ring", "rollers": "rollers"}

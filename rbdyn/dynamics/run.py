@@ -83,7 +83,7 @@ class Run:
         first_method = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = carry_from(y, bearing.rollers, first_step, method_of(first_method, scene, bearing))
-        self.tally = empty_tally()
+        self.tally = empty_tally(bearing.rollers)
         self.sample_step = scene.turn_s / numerics.samples_per_turn
         self.control = self._control_by(first_method)
 

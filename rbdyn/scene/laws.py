@@ -141,7 +141,20 @@ class Laws(Consistent):
 class Damage(Sparse):
     """Inputs of figures of damage; no motion depends on them."""
 
-    UNSAVED: ClassVar[Mapping[str, Any]] = {"stress_concentration": 2.0}
+    UNSAVED: ClassVar[Mapping[str, Any]] = {
+        "impacts": True,
+        "impact_speed_m_s": 0.01,
+        "fatigue_exponent": 8.0,
+        "stress_concentration": 2.0,
+    }
+
+    impacts: bool = True
+    """Follow impacts in the pockets one by one for impacts_per_turn, impact_energy_J and impact_fatigue_force_N, which false leaves
+    out. A study follows them only where it names one of these."""
+    impact_speed_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.01
+    """Speed of the first approach above which the contact of a roller and a pocket wall is an impact."""
+    fatigue_exponent: Annotated[float, Field(ge=1.0, le=20.0)] = 8.0
+    """Exponent m of the S-N curve of the cage, by which impact_fatigue_force_N weighs the peak forces of impacts."""
 
     stress_concentration: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
     """Stress at the corner of a pocket over that of a smooth bar, for bar_stress_MPa."""

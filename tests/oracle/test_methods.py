@@ -147,7 +147,7 @@ def test_unit_failures_stay_in_the_table(smooth, smooth_end, stretches, known):
 def test_unit_fixed_step_stops_where_it_ceases_to_be_finite(stretches):
     """Unit: the steps done are returned; a state of NaN does none."""
     y = np.full_like(stretches[0].start, np.nan)
-    tally = empty_tally()
+    tally = empty_tally(10)
     assert runge_kutta_4(stretches[0].bearing, y, 1e-6, 5, scratch(10), tally) == 0
     assert steps_of(1.0, 0.3) == 4 and steps_of(1.0, 0.25) == 4 and steps_of(1.0, 5.0) == 1
 

@@ -262,7 +262,7 @@ def test_unit_force_on_the_wall(side):
 
 def test_unit_both_peaks_are_booked():
     """Unit: contact and whole force keep each its own peak and time, at the vertex of the parabola through three points."""
-    tally = empty_tally()
+    tally = empty_tally(10)
     points, values = np.linspace(0.0, 1.0, 10), np.empty((2, 10))
     for point, theta in enumerate(points):
         loads = np.zeros((3, LOADS))

@@ -132,6 +132,8 @@ def test_stress_follows_the_return_force_and_its_concentration():
         ("impact_return_force_N", "model.drag_coefficient=1.0", "6 impact windows, and a return force needs 30"),
         ("bar_stress_MPa", "model.drag_coefficient=1.0", "the section of a bar"),
         ("land_sliding_N_m_s", "model.guide_land=off", "leaves out the guide land"),
+        ("impact_energy_J", "damage.impacts=false", "damage.impacts = false"),
+        ("impacts_per_turn", "model.pocket=off", "leaves out pockets"),
         ("wear_life_h", "model.drag_coefficient=1.0", "wear needs K/H of a rig"),
     ],
 )
@@ -157,3 +159,31 @@ def test_mean_force_slides_at_the_speed_of_the_rollers():
     )
     wet = result("model.pocket_film=true")
     assert wet.damage["pocket_impact_power_W"].value > wet.power_terms_W["pocket_damping"]
+
+
+def test_a_study_follows_impacts_only_where_it_names_them(tmp_path):
+    """Scenes of a study leave the sums out unless a response needs them; figures that remain keep their bits without them."""
+    problem = Problem.load(short_study(tmp_path))
+    scene = problem.scene_at(problem.baseline, 1)
+    assert not scene.damage.impacts
+    text = problem.path.read_text(encoding="utf-8").replace("power_loss_W", "impact_fatigue_force_N")
+    path = tmp_path / "named.toml"
+    path.write_text(text, encoding="utf-8")
+    named = Problem.load(path)
+    assert named.scene_at(named.baseline, 1).damage.impacts
+    full, bare = result(), result("damage.impacts=false")
+    missing = {"impacts_per_turn", "impact_energy_J", "impact_fatigue_force_N"}
+    assert set(full.damage) - set(bare.damage) == missing
+    assert bare.figures == full.figures and bare.power_terms_W == full.power_terms_W
+    assert bare.damage == {key: figure for key, figure in full.damage.items() if key not in missing}
+
+
+def test_impacts_are_fewer_the_faster_they_must_be():
+    """A higher threshold leaves fewer impacts of more energy and force each; without any, energy and force are left out."""
+    slow, fast = (result(f"damage.impact_speed_m_s={speed}").damage for speed in (0.01, 0.1))
+    assert slow["impacts_per_turn"].value > fast["impacts_per_turn"].value > 0.0
+    for key in ("impact_energy_J", "impact_fatigue_force_N"):
+        assert slow[key].value < fast[key].value
+    none = result("damage.impact_speed_m_s=50").damage
+    assert none["impacts_per_turn"].value == 0.0
+    assert "impact_energy_J" not in none and "impact_fatigue_force_N" not in none

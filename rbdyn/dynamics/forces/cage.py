@@ -53,6 +53,17 @@ class LippedPocket(NamedTuple):
     friction: Any
 
 
+class NoImpacts(NamedTuple):
+    """Impacts in the pockets are not followed."""
+
+
+class Impacts(NamedTuple):
+    """Which contacts in the pockets are impacts, and how their peak forces are summed."""
+
+    speed: float  # of the first approach, above which a contact is an impact [m/s]
+    exponent: float  # of the sum of peak forces
+
+
 class PocketWrench(NamedTuple):
     """What a pocket does to its roller: force [N]; moments on the roller and on the cage about its centre [N m].
 
@@ -106,6 +117,28 @@ def _(pocket, radius, offset, height):
 def _(pocket, radius, offset, height):
     walls = pocket_gap(pocket.walls, radius, offset, height)
     return min(walls, clearance_of(pocket, radius) - abs(height - pocket.orbit_radius))
+
+
+@law
+def pocket_approach(pocket, radius, offset, height, across, along):
+    """Speed at which a roller nears the wall or lip that it is nearest to [m/s].
+
+    ``across, along``: rates of ``offset`` and ``height``, which are as in ``pocket_gap``.
+    """
+
+
+@pocket_approach.body(Pocket, LubricatedPocket)
+def _(pocket, radius, offset, height, across, along):
+    return across if offset > 0.0 else -across
+
+
+@pocket_approach.body(LippedPocket)
+def _(pocket, radius, offset, height, across, along):
+    to_wall = clearance_of(pocket.walls, radius) - abs(offset)
+    to_lip = clearance_of(pocket, radius) - abs(height - pocket.orbit_radius)
+    if to_wall <= to_lip:
+        return pocket_approach(pocket.walls, radius, offset, height, across, along)
+    return along if height > pocket.orbit_radius else -along
 
 
 @law

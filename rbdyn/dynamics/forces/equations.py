@@ -75,6 +75,7 @@ class RollerBearing(NamedTuple):
     inner_ring_mass: float
     drive: Any
     gravity: Any
+    impacts: Any
 
 
 @kernel
@@ -183,7 +184,10 @@ def touching_rollers(bearing, cage, y, scratch):
 
 @kernel
 def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
-    """Add the forces of the pocket walls to row ``row`` of ``dy``, which still holds forces and moments on the rollers."""
+    """Add the forces of the pocket walls to row ``row`` of ``dy``, which still holds forces and moments on the rollers.
+
+    The contact loads of the rollers that touch take the places of their gaps, negative.
+    """
     z = roller_count(bearing)
     fx = fy = moment = friction = damping = film = 0.0
     load = contact_load = force = squeeze = 0.0
@@ -198,6 +202,7 @@ def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
         moment += wall.cage_moment
         load = max(load, abs(wall.on_wall))
         contact_load = max(contact_load, wall.load)
+        scratch.gap[j] = -wall.load
         friction += wall.friction
         damping += wall.damping
         film += wall.film

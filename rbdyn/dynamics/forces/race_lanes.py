@@ -96,7 +96,7 @@ class Scratch(NamedTuple):
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     met: NDArray[np.float64]  # (INPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
-    gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m]
+    gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m], or less its contact load there [N]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
 
 

@@ -48,6 +48,10 @@ SUPPORT_X, SUPPORT_Y, SUPPORT_VX, SUPPORT_VY = range(len(SUPPORT))
 TIME, INNER_ANGLE, OUTER_ANGLE = range(len(CLOCK))
 # Places of the largest loads in their vector. On a pocket wall: contact and film together, and contact alone.
 POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
+# Rows of impacts under way, by roller: speed of the first approach [m/s], 0 without contact, and largest load since then [N].
+APPROACH, PEAK, FOLLOWED = range(3)
+# Sums over the impacts of a pocket: number, squared speeds [m2/s2], peaks to the power of the exponent, and the exponent.
+NUMBER, SQUARES, PEAK_POWERS, EXPONENTS, IMPACT_SUMS = range(5)
 
 
 class Layout(NamedTuple):

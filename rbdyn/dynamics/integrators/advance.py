@@ -23,12 +23,15 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, law, routine
 from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
+from rbdyn.dynamics.forces.impacts import book_impacts
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.state import (
     CAGE_VX,
     CAGE_VY,
     CAGE_X,
     CAGE_Y,
+    FOLLOWED,
+    IMPACT_SUMS,
     INNER_LOAD,
     LOADS,
     POCKET_CONTACT_LOAD,
@@ -110,6 +113,7 @@ class Carry(NamedTuple):
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
     stiffness: NDArray[np.float64]
+    followed: NDArray[np.float64]  # (FOLLOWED, rollers) impacts under way
     method: Any  # the implicit one with its work space
     trace: Trace  # begins at the time in the clock, infinite for never
 
@@ -121,6 +125,7 @@ class Tally(NamedTuple):
     largest: NDArray[np.float64]  # (LOADS,) largest loads [N]
     largest_time: NDArray[np.float64]  # (LOADS,) and when [s]
     whirl: NDArray[np.float64]
+    impacts: NDArray[np.float64]  # (rollers, IMPACT_SUMS)
 
 
 def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: Any) -> Carry:
@@ -129,13 +134,16 @@ def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: 
     clock[STEP], clock[ERROR], clock[TRACED] = first_step, PI_START_ERROR, math.inf
     k, power, loads = (np.zeros((ROWS, columns)) for columns in (y.size, POWERS, LOADS))
     counts = np.zeros(COUNTS, dtype=np.int64)
-    stiffness, trace = np.zeros(STIFFNESS), trace_of([], math.inf, 0)
-    return Carry(y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, stiffness, method, trace)
+    followed, stiffness, trace = np.zeros((FOLLOWED, rollers)), np.zeros(STIFFNESS), trace_of([], math.inf, 0)
+    return Carry(
+        y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, stiffness, followed, method, trace
+    )
 
 
-def empty_tally() -> Tally:
-    """A tally of nothing."""
-    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL))
+def empty_tally(rollers: int) -> Tally:
+    """A tally of nothing of so many rollers."""
+    impacts = np.zeros((rollers, IMPACT_SUMS))
+    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL), impacts)
 
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -300,6 +308,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     y, k, stage, clock, counts = carry.y, carry.k, carry.stage, carry.clock, carry.counts
     power, loads, scratch, stiffness = carry.power, carry.loads, carry.scratch, carry.stiffness
     work, largest, largest_time, whirl = tally.work, tally.largest, tally.largest_time, tally.whirl
+    followed, impacts = carry.followed, tally.impacts
     inverse_tolerance, method = control.inverse_tolerance, carry.method
     z = roller_count(bearing)
     worst = begin(method, bearing, y, k, power, loads, scratch, clock, counts)
@@ -319,6 +328,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
             if counts[ACCEPTED] % TEST_EVERY == 0:
                 test_stiffness(method, k, stiffness, h, inverse_tolerance)
             end_step(method, bearing, stage, k, power, loads, scratch, counts)
+            book_impacts(bearing.impacts, bearing, y, scratch.gap, followed, impacts)
             if keep(
                 method,
                 ROLLER_STATES * z,

@@ -40,11 +40,13 @@ from rbdyn.dynamics.forces.bodies import (
 )
 from rbdyn.dynamics.forces.cage import (
     DryContact,
+    Impacts,
     InnerGuide,
     LippedPocket,
     LubricatedPocket,
     NoFilm,
     NoGuide,
+    NoImpacts,
     NoPocket,
     OuterGuide,
     Pocket,
@@ -243,6 +245,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         inner_ring_mass=drawing.inner_ring_mass_kg,
         drive=_drive(scene),
         gravity=_gravity(scene),
+        impacts=_impacts(scene),
     )
     if not isinstance(bearing.open_film, LayerFilm):
         return bearing
@@ -446,6 +449,13 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     outer, inner = scene.geometry.raceways
     circle = 0.5 * (outer + inner) + (0.0 if mounted is None else mounted.shift)
     return LippedPocket(pocket, circle, 0.5 * lip, radius, contact, damping, friction)
+
+
+def _impacts(scene: Scene) -> NoImpacts | Impacts:
+    damage = scene.damage
+    if scene.model.pocket == "off" or not damage.impacts:
+        return NoImpacts()
+    return Impacts(damage.impact_speed_m_s, damage.fatigue_exponent)
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
