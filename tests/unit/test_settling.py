@@ -22,6 +22,7 @@ from rbdyn.dynamics.forces.state import (
     CAGE_VY,
     CAGE_X,
     CAGE_Y,
+    IMPACT_SUMS,
     LOADS,
     POCKET_CONTACT_LOAD,
     POCKET_LOAD,
@@ -64,7 +65,24 @@ def made_of(loss, first=0, per_window=1, impact=None):
     largest[:, POCKET_LOAD] = largest[:, POCKET_CONTACT_LOAD] = loss if impact is None else impact
     whirl[:, 0] = 10.0
     ones = np.ones(count)
-    return Replicate(first, per_window, ones, whirl, work, largest, ones, ones, np.zeros(count + 1), 1.0, 1, 0, 1, 0.0)
+    impacts = np.zeros((count, 1, IMPACT_SUMS))
+    return Replicate(
+        first,
+        per_window,
+        ones,
+        whirl,
+        work,
+        largest,
+        ones,
+        ones,
+        np.zeros(count + 1),
+        1.0,
+        1,
+        0,
+        1,
+        0.0,
+        impacts=impacts,
+    )
 
 
 def noisy(draw, replicates, length, trend=lambda turns: 0.0 * turns, first=0):

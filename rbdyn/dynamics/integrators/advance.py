@@ -297,6 +297,18 @@ def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_
     return on_wall > largest[POCKET_LOAD] or contact > largest[POCKET_CONTACT_LOAD]
 
 
+@kernel
+def end_to_start(method, y, stage, k, power, loads):
+    """Make the end of a step the start of the next one."""
+    for i in range(y.size):
+        y[i] = stage[i]
+        k[0, i] = k[method.last, i]
+    for p in range(POWERS):
+        power[0, p] = power[method.last, p]
+    for force in range(LOADS):
+        loads[0, force] = loads[method.last, force]
+
+
 @entry
 def advance(bearing, control, carry, tally, t_end, sample_step):
     """Integrate from the time in ``carry`` to ``t_end`` [s]; returns FINISHED or why not: see ``Status``.
@@ -350,13 +362,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 book_trace(carry, h)
             counts[ACCEPTED] += 1
             clock[NOW] = t_end if cut else clock[NOW] + h
-            for i in range(y.size):
-                y[i] = stage[i]
-                k[0, i] = k[method.last, i]
-            for p in range(POWERS):
-                power[0, p] = power[method.last, p]
-            for force in range(LOADS):
-                loads[0, force] = loads[method.last, force]
+            end_to_start(method, y, stage, k, power, loads)
             next_frame(method, clock, h, z, y, k)
             after_accepted(method, clock, h, cut, error, refused, control.largest_step)
             refused = False
