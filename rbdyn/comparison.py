@@ -75,7 +75,7 @@ def value_words(value: Any, is_default: bool) -> str:
 
 def input_sheet(inputs: Sequence[Input]) -> Sheet[Input]:
     """A row a key that differs."""
-    content = "A row a key that differs, of `rbdyn compare`."
+    content = "One row per key that differs, of `rbdyn compare`."
     return Sheet("", columns_of(Input), inputs, file="inputs.csv", content=content)
 
 
@@ -125,7 +125,7 @@ DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
 
 def difference_sheet(figures: Mapping[str, Difference]) -> Sheet[tuple[str, Difference]]:
     """A row a figure."""
-    content = "A row a figure of `rbdyn compare`, those of the parts last."
+    content = "One row per figure of `rbdyn compare`, those of the parts last."
     return Sheet("", DIFFERENCES, tuple(figures.items()), file="differences.csv", content=content)
 
 

@@ -92,7 +92,9 @@ def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]
     """A row a figure by its name, or its words."""
     name: Column[tuple[str, Quantity]] = Column("figure", at=0, meaning="name of the figure, its unit at the end")
     columns = (name, *within(1, columns_of(Quantity)))
-    return Sheet("", columns, tuple(figures.items()), file="figures.csv", content="A row a figure of `rbdyn simulate`.")
+    return Sheet(
+        "", columns, tuple(figures.items()), file="figures.csv", content="One row per figure of `rbdyn simulate`."
+    )
 
 
 def figure_columns(names: Iterable[str]) -> tuple[Column[Any], ...]:

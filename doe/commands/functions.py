@@ -59,7 +59,8 @@ run = command(
     "results",
     "run_answer",
     table=Annotated[
-        Path, typer.Argument(metavar="TABLE", help="CSV, xlsx or parquet: a row a run, columns are keys of a scene.")
+        Path,
+        typer.Argument(metavar="TABLE", help="CSV, xlsx or parquet: one row per run, columns are keys of a scene."),
     ],
     scene=Annotated[Path | None, valued("SCENE.toml", "Scene of rows without one.", "the column scene", "--scene")],
     part=Part,

@@ -48,7 +48,7 @@ BASELINE = """[baseline] # the original design, over which gains count
 """
 TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
 """
-HINT = """# Add to a factor: tolerance = 0.005, the half width that manufacture keeps; then [front] tolerance_aware = "quantile" and
+HINT = """# Add to a factor: tolerance = 0.005, the half width that can be manufactured; then [front] tolerance_aware = "quantile" and
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
 BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}

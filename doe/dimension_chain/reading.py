@@ -85,7 +85,7 @@ def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
 def _function_faults(link: Link) -> list[str]:
     """Faults of a link that is a function, such as keys of a dimension."""
     kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
-    sentences = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
+    sentences = [f"{' and '.join(kinds)} contradict; a link is one of them"] if len(kinds) > 1 else []
     alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
     sentences += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
     rise = link.thermal_growth

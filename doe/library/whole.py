@@ -30,9 +30,9 @@ STUDY_FILES = (
 class StudyAnswer(Answer):
     """Chosen clearances with their gains, limits and parts.
 
-    Tables: "gains" (a row a response: baseline and pick, simulated), "pick" (a row a factor), "runs", "front", "confirmation"
+    Tables: "gains" (one row per response: baseline and pick, simulated), "pick" (one row per factor), "runs", "front", "confirmation"
     (all simulated points), "parts" (dimensions [mm]), and "quality", "anova", "coefficients" of the fits. Over a duty also
-    "duty" (a row a response at each of its points).
+    "duty" (one row per response at each of its points).
 
     ``finished_before``: whether the answer was read from the folder, because nothing had changed since.
     """

@@ -38,7 +38,7 @@ PartCount = Callable[[Array], Array]
 
 MARCH = 32  # steps up to the rim of the region in the search for the first loss
 HALVINGS = 24
-RIM = "the rim of the region"
+RIM = "the bound of the region"
 MOST_JUDGED = 4096  # parts that are evaluated on every draw
 
 
@@ -185,7 +185,7 @@ class _Parts:
     def nothing(self, limit: str, cause: str) -> WidestTolerances:
         """Result without any tolerance, because of a limit."""
         zero, share = np.zeros_like(self.centre), self.share(np.zeros_like(self.centre))
-        sentence = f"No tolerance is possible: {cause}; demand less of the gain or a lower probability."
+        sentence = f"No tolerance is possible: {cause}; require less of the gain or a lower probability."
         error = error_of_share(share, len(self.offsets))
         return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
 
@@ -203,7 +203,7 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     error = error_of_share(share, len(parts.offsets))
     interval, (promise, open_errors) = parts.interval(half), parts.texts
     within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}; {parts.percent} are required."
-    rim = "Where a tolerance ends at the rim of the region, no run shows whether it may be wider."
+    rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
     sentences = [within, f"They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
     return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
 

@@ -216,7 +216,7 @@ def reference_sheet(factors: Sequence[str], responses: Sequence[str], rows: Sequ
         *Column[Row]("{}_ours", unit="of the response", meaning=both).of(responses),
         *Column[Row]("{}_theirs", unit="of the response", meaning=both).of(responses),
     )
-    content = "A row a run, next to the table of a publication."
+    content = "One row per run, next to the table of a publication."
     return Sheet("", columns, rows, file="published_comparisons.csv", content=content)
 
 
@@ -273,7 +273,7 @@ def confirmation_sheet(
         ),
         Column("limit_verdict", at=lambda row: row["judged"].verdict if row["judged"] else ""),
     )
-    content = "A row a response of each point that was simulated anew."
+    content = "One row per response of each point that was simulated again."
     return Sheet("", columns, rows, file="confirmation.csv", content=content)
 
 

@@ -206,7 +206,7 @@ class Database:
         except sqlite3.Error as error:
             if getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
                 cause = f"{self.path}: cannot be written ({error})"
-                raise StoppedError(cause, "make room on the disk and start again") from None
+                raise StoppedError(cause, "free space on the disk and start again") from None
             fix = FIXES.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
             raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {fix}"]) from None
 

@@ -224,7 +224,7 @@ class Tolerances(Strict):
     smallest_difference_percent: Positive = 1.0
     """Smallest difference of a response that matters, in percent of the baseline."""
     finest_grade: Annotated[int, Field(ge=1, le=18)] = 4
-    """Finest grade of ISO 286 that the shop holds. Parts of a finer one are a warning, with the response that demands them."""
+    """Finest grade of ISO 286 that can be manufactured. Parts of a finer one are a warning, with the response that requires them."""
     distribution: Literal["normal", "uniform"] = "normal"
     """Distribution of the parts within the tolerances."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096

@@ -306,8 +306,8 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
         Scene.from_dict(case.data, case.source, [*case.uncertain.assignments, "numerics.companion=true"])
         for case in rows.cases
     ]
-    labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
-    results = rows.run(scenes, labels, "as the scene says")
+    labels = [f"scene values, condition {place + 1}" for place in range(len(scenes))]
+    results = rows.run(scenes, labels, "scene values")
     for result, label in zip(results, labels, strict=True):
         if isinstance(result, Failure):
             raise RunError(f"{label}: {result.cause}")
@@ -394,7 +394,7 @@ def _stages(case: Case, rig: Rig, targets: Sequence[Input], work: float) -> list
     waves, sets = case.scene.calibrate.waves, sets_a_wave(min(len(targets), case.uncertain.inputs)) * conditions
     return [
         *([Stage.of("screening", screening_runs, work)] if screening_runs else []),
-        Stage.of("as the scene says", conditions, work),
+        Stage.of("scene values", conditions, work),
         Stage.of("waves", waves * sets, work, "wave", fewest=sets),
         # If emulators miss the posterior, it is simulated once more.
         Stage.of("posterior", TRIED * conditions, work, most=2 * TRIED * conditions),

@@ -209,10 +209,10 @@ def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
         if result is not None and result.jitters and result.cage_orbit_radius_share is not None:
             points = ", ".join(result.jitter_points) if isinstance(result, DutyResult) else ""
             where = f"at the {name}{f' ({points})' if points else ''}"
-            radii.append(f"{result.cage_orbit_radius_share.value:.2g} of its play {where}")
+            radii.append(f"{result.cage_orbit_radius_share.value:.2g} of its clearance {where}")
     if WHIRL not in objectives or not radii:
         return ""
-    return f"The {WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {' and '.join(radii)}."
+    return f"The {WHIRL} has little meaning, because the cage does not whirl: its orbit has a radius of {' and '.join(radii)}."
 
 
 def statement(gains: Mapping[str, Gain]) -> str:

@@ -125,7 +125,7 @@ def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int
             continue
         probability = study.file.confirmation.limit_probability
         margin = "the margin" if share >= 1.0 else f"{100.0 * share:g} % of the margin"
-        words = f"; limits keep {margin} for the demanded probability of {probability:g}"
+        words = f"; limits keep {margin} for the required probability of {probability:g}"
         return replace(searched, pick_reason=searched.pick_reason + words)
     raise AssertionError("the last share either returns or raises")
 
@@ -401,15 +401,15 @@ def open_errors(surfaces: Sequence[Surface], searched: bool = False) -> str:
     """The errors that the interval of a share of parts holds, and those that it leaves out, in a sentence."""
     if searched:
         return (
-            "The interval holds the errors of the search and the count of the parts; numerical errors and the scene's "
+            "The interval includes the errors of the search and the count of the parts; numerical errors and the scene's "
             "inputs count as exact."
         )
     if all(surface.model_error for surface in surfaces):
         return (
-            "The interval holds the errors of the surfaces and the count of the parts; numerical errors and the scene's "
+            "The interval includes the errors of the surfaces and the count of the parts; numerical errors and the scene's "
             "inputs count as exact."
         )
     return (
-        "The interval holds the errors of the surfaces and the count of the parts; the form of the surfaces, numerical "
+        "The interval includes the errors of the surfaces and the count of the parts; the form of the surfaces, numerical "
         "errors and the scene's inputs count as exact."
     )

@@ -151,8 +151,8 @@ def _of_front(robust: Robust) -> list[str]:
         f"{quantity(name)[0]} {shown(x)} {quantity(name)[1]}".rstrip() for name, x in best.factors.items()
     )
     return [
-        f"Safer alternative: {place} (better in all responses in {best.chances.all.of_hundred} of 100 cases; the pick at the "
-        f"same input sets in {pick.chances.all.of_hundred}){doubt}."
+        f"Safer alternative: {place} (better in all responses in {best.chances.all.of_hundred} % of the cases; the pick at the "
+        f"same input sets in {pick.chances.all.of_hundred} %){doubt}."
     ]
 
 

@@ -125,13 +125,13 @@ class Problem(Study):
         """
         half_widths = dict.fromkeys(compress(self.factors, self.rigid), 0.0) | self.known_tolerances
         faults = [
-            f"{self.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that manufacture "
-            "keeps, here or as half_width_mm of a chain that closes on this factor"
+            f"{self.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that can be "
+            "manufactured, here or as half_width_mm of a chain that closes on this factor"
             for name in self.factors
             if name not in half_widths
         ]
         faults += [
-            f"{self.path}: factor.tolerance of {name} = {half_widths[name]:g}: leaves no room in the region, which reaches "
+            f"{self.path}: factor.tolerance of {name} = {half_widths[name]:g}: leaves no space in the region, which reaches "
             f"{limit:g} to either side of the centre; narrow it or widen the design"
             for name, limit in zip(self.factors, self.half_ranges, strict=True)
             if half_widths.get(name, 0.0) >= limit

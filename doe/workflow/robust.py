@@ -284,7 +284,7 @@ def _choices(study: Problem, pareto: ParetoFront, emulators: _GainEmulators) -> 
     smallest = np.quantile(gains, 0.05, axis=1).min(axis=1)
     rows: dict[str, int] = {"surest": int(np.lexsort((smallest, all_gain))[-1])}
     rows.update({str(rule): row for rule, row in pareto.picks.items()})
-    reasons = {"surest": "the point of the robust front that is likeliest to gain in all responses"}
+    reasons = {"surest": "the point of the robust front that most probably gains in all responses"}
     candidates: dict[str, tuple[Array, str]] = {}
     for name, row in rows.items():
         point = study.rounded_within(pareto.points[row])

@@ -101,7 +101,9 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
 def unrivalled(surfaces: Sequence[Surface]) -> list[Note]:
     """A note on surfaces with too many runs for a comparison with a Gaussian process; else none."""
     runs = max(len(surface.data.values) for surface in surfaces)
-    sentence = f"{runs} runs are not compared with a rival: a Gaussian process of more than {MOST_RIVALLED} is too slow"
+    sentence = (
+        f"{runs} runs are not compared with an alternative: a Gaussian process of more than {MOST_RIVALLED} is too slow"
+    )
     return [Note("remark", sentence)] if runs > MOST_RIVALLED else []
 
 

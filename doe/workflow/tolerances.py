@@ -245,16 +245,16 @@ class PickTolerances:
         if fine and not self.any_width:
             sentences.append(f"{_begun(cause)} leaves no tolerance.")
         elif fine:
-            sentences.append(f"{_begun(cause)} demands parts finer than {grade}: {self._listed(fine)}.")
+            sentences.append(f"{_begun(cause)} requires parts finer than {grade}: {self._listed(fine)}.")
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
             sentences.append(f"Without {cause} the tolerance would be {wider}, limited by {limit}.")
             sentences.append(f"Then, in 95 % of the parts: {self.relaxed._spread([self.limiting_gain])}.")
         elif fine:
-            sentences.append("A pick with more room to it has wider tolerances.")
+            sentences.append("A pick farther from it has wider tolerances.")
         if rim:
-            sentences.append(f"The rim of the region demands parts finer than {grade}: {self._listed(rim)}.")
-            sentences.append("A wider design gives these more room.")
+            sentences.append(f"The bound of the region requires parts finer than {grade}: {self._listed(rim)}.")
+            sentences.append("A wider design gives these more space.")
         return " ".join(sentences)
 
     def _listed(self, names: Sequence[str]) -> str:

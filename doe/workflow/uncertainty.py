@@ -128,9 +128,9 @@ def find_uncertainty(
     """
     case = _case_of(path, overrides, figures)
     count = case.uncertain.points if points is None else points
-    (nominal,) = simulations.run([case.scene], ["as the scene says"], simulations.progress("as the scene says"))
+    (nominal,) = simulations.run([case.scene], ["scene values"], simulations.progress("scene values"))
     if isinstance(nominal, Failure):
-        raise RunError(f"{path}: as the scene says: {nominal.cause}")
+        raise RunError(f"{path}: at the scene values: {nominal.cause}")
     refuse(
         f"--figure {name}: {path} does not give it; leave it out"
         for name in case.outputs
@@ -279,7 +279,7 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     case = _case_of(path, overrides)
     count = case.uncertain.points if points is None else points
     return [
-        Stage.of("as the scene says", 1, work_of(case.scene)),
+        Stage.of("scene values", 1, work_of(case.scene)),
         Stage.of("input sets", count, work_of_set(case), most=MOST_EFFORT * max(count, MOST)),
         Stage(ANSWER),
     ]

@@ -169,7 +169,7 @@ def solve_chains(
         if half_width is not None and half_width > limit:
             sentence = (
                 f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: wider than the {limit:.3g} within which "
-                "the gains are kept as [tolerances] asks; narrow it, or demand less there"
+                "the gains are kept as [tolerances] asks; narrow it, or require less there"
             )
             notes.append(Note("chain", sentence))
         try:

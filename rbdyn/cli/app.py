@@ -149,8 +149,8 @@ def accuracy(
         str | None,
         typer.Argument(
             metavar="[tolerances|methods|coverage|options|stability]",
-            help="Error by tolerance; other integrators, or the solver of a ball bearing; how often the stated intervals hold "
-            "the truth; what each option costs; how extreme variants of the scene end.",
+            help="Error by tolerance; other integrators, or the solver of a ball bearing; how often the stated intervals contain "
+            "the true value; what each option costs; how extreme variants of the scene end.",
             show_default="tolerances; methods of a ball bearing",
         ),
     ] = None,

@@ -272,7 +272,7 @@ def limit_sheet(record: Mapping[str, Any]) -> Sheet[Mapping[str, Any]]:
     rows = [
         {"race": race, **{name: record.get(f"{race}_{name}") for name in ("roundness_um", "sway_um")}} for race in RACES
     ]
-    content = "A row a race, of `rbdyn ball --race-limits`."
+    content = "One row per race, of `rbdyn ball --race-limits`."
     return Sheet("", columns, rows, file="race_limits.csv", content=content)
 
 

@@ -99,7 +99,7 @@ def _catalogue_bearing(words: str, options: Options) -> Subject:
     """The bearing of a designation. Raises InputError with all faults at once."""
     name = one_line(words, LONGEST_NAME)
     for stated in options.typed(*OF_DRAWINGS):
-        options.note(f"{stated}: is of a bearing of one's own; leave it out, or write {OWN} in place of {name}")
+        options.note(f"{stated}: is of a bearing of one's own; leave it out, or write {OWN} instead of {name}")
     try:
         named = read_designation(words)
     except MethodError as error:

@@ -136,7 +136,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     inputs = ", ".join(balance.get("inputs", ()))
     return [
         Table("", header, rows),
-        Paragraph(f"{state}; gain of heat and temperature {balance['gain']:+.2f}; carried off: {ways}"),
+        Paragraph(f"{state}; gain of heat and temperature {balance['gain']:+.2f}; removed: {ways}"),
         *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
     ]
@@ -261,7 +261,7 @@ def _friction_sentence(check: dict[str, float | None]) -> str:
     power, rolling, sliding, heat, ratio = check.values()
     share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
     return (
-        f"maker's friction: SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 "
+        f"friction by SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 "
         f"heat {heat:.3g} W; {share}"
     )
 

@@ -260,7 +260,7 @@ def save_code(compiled: Any, folder: Path) -> None:
     except OSError:
         return  # without a source file stale code cannot be recognized
     except (ImportError, AttributeError) as error:
-        warn_once(f"numba {numba.__version__} cannot save compiled code ({error}): every run compiles anew")
+        warn_once(f"numba {numba.__version__} cannot save compiled code ({error}): every run compiles again")
 
 
 class EntryCache:
@@ -314,7 +314,7 @@ class EntryCache:
             write_whole(self.path(signature, magic), with_digest(content))
         except OSError as error:
             warn_once(
-                f"compiled code cannot be saved in {self.folder} ({error.strerror}): every run compiles anew; set NUMBA_CACHE_DIR "
+                f"compiled code cannot be saved in {self.folder} ({error.strerror}): every run compiles again; set NUMBA_CACHE_DIR "
                 "to another folder"
             )
 

@@ -98,7 +98,7 @@ def points_sheet(points: Sequence[SimulatedPoint], figures: Iterable[str]) -> Sh
     place, life = (life_sheet(points).columns[part] for part in (slice(4), slice(4, None)))
     columns = (*place, status, *life, *figure_columns(figures))
     return Sheet(
-        "", columns, points, file="points.csv", content="A row a point of the duty, of `rbdyn simulate --duty`."
+        "", columns, points, file="points.csv", content="One row per point of the duty, of `rbdyn simulate --duty`."
     )
 
 

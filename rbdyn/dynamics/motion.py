@@ -133,7 +133,7 @@ def history_sheet(rollers: Iterable[str]) -> Sheet[History]:
     )
     numbers = tuple(rollers)
     columns += tuple(column(series, key, j, meaning) for series, key, meaning in of_rollers for j in numbers)
-    content = "A row a sample of the motion, of `rbdyn simulate` and `rbdyn show`."
+    content = "One row per sample of the motion, of `rbdyn simulate` and `rbdyn show`."
     return Sheet("", columns, file="history.csv", content=content)
 
 

@@ -95,7 +95,7 @@ def run_until_settled(
     try:
         companions = [run.counted_from(stage.first) for run in others.to(stage.turns)]
     except RunError as error:
-        fault = f"a companion at numerics.rtol = {plan.rtol:g} could not go on ({error})"
+        fault = f"a companion at numerics.rtol = {plan.rtol:g} could not continue ({error})"
         return Ensemble(runs, [], plan, begin.first, fault, begin.turns, notes)
     return Ensemble(runs, companions, plan, begin.first, None, begin.turns, notes)
 

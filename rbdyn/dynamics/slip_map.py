@@ -62,7 +62,7 @@ def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Poi
         Column("power_gap", meaning="share of the power that the balance does not account for"),
         Column("status", meaning="ok, or why the point failed"),
     )
-    return Sheet("", columns, points, file="map.csv", content="A row a speed and load of `rbdyn map`.")
+    return Sheet("", columns, points, file="map.csv", content="One row per speed and load of `rbdyn map`.")
 
 
 class SlipMap(Record):

@@ -89,7 +89,7 @@ def life_sheet(points: Sequence[Any]) -> Sheet[Any]:
         columns_of(PointLife),
         points,
         file="duty.csv",
-        content="A row a point of the duty, of `rbdyn map --duty`.",
+        content="One row per point of the duty, of `rbdyn map --duty`.",
     )
 
 

@@ -61,7 +61,7 @@ WITHOUT_EFFECT = {
     "heat_treatment": "rings treated or stabilised by heat",
     "snap_ring": "snap ring groove or notches",
     "lubrication": "holes for oil",
-    "variant": "a maker's variant, whose sizes and clearance may differ",
+    "variant": "a manufacturer's variant, whose sizes and clearance may differ",
     "tolerance": "tolerance class, which counts with --shaft and --housing",
 }
 GROUPS = {

@@ -393,7 +393,7 @@ def ball_sheet(rows: Mapping[str, RowReport]) -> Sheet[Mapping[str, Any]]:
     """A row a ball of the rows by name; a single row has no name."""
     balls = [{"row": name, "ball": place, **ball} for name, row in rows.items() for place, ball in enumerate(row.balls)]
     columns = BALL_COLUMNS if "" in rows else (*ROW_AND_BALL, *BALL_COLUMNS)
-    return Sheet("", columns, balls, file="balls.csv", content="A row a ball of `rbdyn ball`.")
+    return Sheet("", columns, balls, file="balls.csv", content="One row per ball of `rbdyn ball`.")
 
 
 def displacement_record(displacement: Array) -> dict[str, Any]:

@@ -75,7 +75,7 @@ SWEEPS: Sheet[Any] = Sheet(
     "",
     [Column(key, meaning=meaning) for keys, meaning in MEANINGS.items() for key in keys.split()],
     file="sweep.csv, preload.csv, clearance.csv, wear.csv",
-    content="A row a point of `rbdyn ball --sweep` and of the studies over preload, clearance and wear; columns of a double-decker's "
+    content="One row per point of `rbdyn ball --sweep` and of the studies over preload, clearance and wear; columns of a double-decker's "
     "rows begin with `inner_row_` and `outer_row_`.",
 )
 FORMAT = "rbdyn.sweep/3"

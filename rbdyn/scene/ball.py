@@ -54,7 +54,7 @@ class BallRow(Consistent):
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
     inner_shoulder_height_mm: Positive | None = None
-    """Height of the inner ring's shoulder over the bottom of its groove, half of what a maker's shoulder diameter is larger than
+    """Height of the inner ring's shoulder over the bottom of its groove, half of what a manufacturer's shoulder diameter is larger than
     the raceway. Default: a fifth of the ball's diameter, an estimate. A published spindle bearing of 15 degrees (pitch 18 mm,
     balls of 4.485 mm, shoulders of 15.74 and 21.4 mm) has 0.25 of it inside and 0.12 outside. For contact angles above some 32
     degrees the default reaches 20 degrees beyond them. A note says where a contact climbs over it."""

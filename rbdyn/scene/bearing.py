@@ -71,8 +71,8 @@ class Bearing(Consistent):
     kind: Literal["cylindrical_roller"]
     """Kind of bearing."""
     designation: Annotated[str | None, AfterValidator(_catalogue_designation)] = None
-    """Designation in a maker's catalogue, such as NU 210 or NU 210 ECP, which gives bore, outside diameter, width and series.
-    The result then compares the power loss with the maker's friction. The run itself does not change."""
+    """Designation in a manufacturer's catalogue, such as NU 210 or NU 210 ECP, which gives bore, outside diameter, width and series.
+    The result then compares the power loss with the friction by SKF's model. The run itself does not change."""
     rollers: Annotated[int, Field(ge=2, le=500)]
     """Number of rollers."""
     roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]

@@ -95,9 +95,7 @@ def matching(all_keys: list[Key], word: str | None) -> list[Key]:
 
 def lines(key: Key) -> list[str]:
     """A key as printed: name, values, unit and default; below, its meaning."""
-    default = (
-        "required" if key.required else "may be left out" if key.default is None else f"default {_toml(key.default)}"
-    )
+    default = "required" if key.required else "optional" if key.default is None else f"default {_toml(key.default)}"
     head = ", ".join(part for part in (key.values, key.unit, default) if part)
     return [
         f"{key.key}: {head}",

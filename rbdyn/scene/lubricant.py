@@ -84,7 +84,7 @@ class Lubricant(Consistent, Sparse):
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
     """Density of the oil at 15 C."""
     temperature_C: OilCelsius  # noqa: N815
-    """Temperature of the oil in the contacts. With [thermal] the first guess, which may be left out."""
+    """Temperature of the oil in the contacts. With [thermal] an optional first guess."""
     film_temperature: Literal["oil", "parts"] = "oil"
     """Temperature of the films. oil: all have temperature_C; parts: each has the mean temperature of its surfaces by [mounting],
     and temperature_C is that of the oil between them, which drags the rollers. With [thermal] the films follow the parts."""
@@ -93,10 +93,10 @@ class Lubricant(Consistent, Sparse):
     pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
     """Pressure coefficient alpha of viscosity exp(alpha p), 5 to 25 for oils. Default: that of the oil."""
     supply: Supply | None = None
-    """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. It sets the starvation of the maker's friction model and
+    """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. It sets the starvation of SKF's friction model and
     the documented ranges of inlet_distance and oil_fraction. It changes no law of motion."""
     oil_flow_l_min: Positive | None = None
-    """Flow of oil to the bearing. It gives oil_fraction, and with [thermal] it carries off heat. Above D B/12 500 L/min, with
+    """Flow of oil to the bearing. It gives oil_fraction, and with [thermal] it removes heat. Above D B/12 500 L/min, with
     outside diameter and width in mm, it hardly cools further (SKF)."""
     oil_inlet_temperature_C: OilCelsius | None = None  # noqa: N815
     """Temperature of the oil that flows to the bearing."""

@@ -264,7 +264,7 @@ class Mounting(Consistent, Sparse):
     outside_diameter_mm: Positive
     """Outside diameter of the outer ring."""
     width_mm: Positive | None = None
-    """Width of the rings, through whose seats [thermal] carries off heat. Default: that of bearing.designation."""
+    """Width of the rings, through whose seats [thermal] removes heat. Default: that of bearing.designation."""
     shaft_bore_mm: NonNegative = 0.0
     """Bore of the shaft; 0 is a solid shaft."""
     housing_diameter_mm: Positive

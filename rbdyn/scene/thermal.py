@@ -45,7 +45,7 @@ class Thermal(Sparse):
     rolling elements with cage have one temperature each.
 
     Needs [mounting], and lubricant.oil_flow_l_min or a lubricant.supply other than a jet. lubricant.temperature_C becomes the
-    first guess and may be left out. The result has the temperatures, their errors and what the loop of heat and clearance does.
+    first guess and optional. The result has the temperatures, their errors and what the loop of heat and clearance does.
     """
 
     UNSAVED: ClassVar[Mapping[str, Any]] = {"start": None}
@@ -56,11 +56,11 @@ class Thermal(Sparse):
     """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
     Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
-    """Factor on the heat that the housing carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
-    plummer block in moving air carries off more, a hot housing nothing (0)."""
+    """Factor on the heat that the housing removes, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
+    plummer block in moving air removes more, a hot housing nothing (0)."""
     shaft_factor: NonNegative = 0.5
-    """Factor on the heat that the shaft carries off, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
-    surface than housings and carry off 0.2 to 1 of that; a shaft as hot as the inner ring carries off nothing (0)."""
+    """Factor on the heat that the shaft removes, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
+    surface than housings and remove 0.2 to 1 of that; a shaft as hot as the inner ring removes nothing (0)."""
     sump_factor: NonNegative = 1.0
     """Factor on the heat that the oil of a bath loses through the walls of the housing: 150 W/m2K of the seat
     of the outer ring. It counts with lubricant.supply = "bath" only."""

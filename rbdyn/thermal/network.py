@@ -70,7 +70,7 @@ def temperatures(conductances: Conductances, boundaries: Boundaries, heat: Array
         sums[node] = ways_out[node] + others.sum()
         if not sums[node] > 0.0:
             raise MethodError(
-                f"{NODES[node]}: no conductance leads heat out; give an oil flow, a housing or a shaft that carries it off"
+                f"{NODES[node]}: no conductance leads heat out; give an oil flow, a housing or a shaft that removes it"
             )
         shares = others / sums[node]
         ways_out[:node] += shares * ways_out[node]

@@ -266,7 +266,7 @@ def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeyp
     shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear")
     assert (
         shown.exit_code == 0
-        and "note: 12 runs are not compared with a rival: a Gaussian process of more than 11" in shown.stdout
+        and "note: 12 runs are not compared with an alternative: a Gaussian process of more than 11" in shown.stdout
     )
     assert "leave-one-out" not in shown.stdout
 

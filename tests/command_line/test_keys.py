@@ -222,7 +222,7 @@ def test_keys_of_calibration():
 def test_keys_of_a_table_begin_with_what_it_needs():
     """Command line: the table that a word names comes before the keys that only mention it."""
     lines = printed(rbdyn_app, "thermal").splitlines()
-    assert lines[:3] == ["roller bearing", "==============", "thermal: a table, may be left out"]
+    assert lines[:3] == ["roller bearing", "==============", "thermal: a table, optional"]
     assert "Needs [mounting] with bore" in " ".join(lines[3:8]) and lines[8].startswith("thermal.ambient_C: ")
 
 

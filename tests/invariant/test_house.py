@@ -215,6 +215,26 @@ BANNED = {
     r"stands in no": "is in no",
     r"neither closes? nor tells? why": "failed without a diagnosis",
 }
+# Words that messages and pages write as others say them; docstrings are exempt.
+SPOKEN = {
+    r"house|rooms?(?! (?:temperature|for)\b)|doors?": "source layout, package, space",
+    r"jitter\w*|trembl\w*": "does not whirl, local cage motion",
+    r"rim|fellows?|surer|likeliest|likelier|lopsided|luck\w*|rivals?|opinions?": "bound, alternative, most probable, bias",
+    r"makers?": "manufacturer",
+    r"may be left out": "optional",
+    r"anew": "again",
+    r"in place of": "instead of",
+    r"go(?:es|ing)? on(?! the drawing)": "continue",
+    r"carr(?:y|ies|ied)(?: \w+){0,2} off": "remove",
+    r"odds|of a hundred|(?:in|of) 100 cases": "probability, %",
+    r"demand(?:s|ed)?": "require",
+    r"a (?:row|line) an? \w+": "one row per",
+    r"by an estimate": "estimated at",
+    r"holds? the (?:truth|true|errors?)": "contains the true value",
+    r"as the scene says": "scene values",
+    r"what stands|stands? (?:in a|in the|there|together|behind|at a)": "is in, is at, contradict",
+    r"the shop|what manufacture|manufacture keeps": "can be manufactured",
+}
 WORDS = re.compile("|".join(rf"\b(?:{words})\b" for words in BANNED), re.IGNORECASE)
 # Names and public keys, which stay: whole constants of one word, and what stands in backticks or quotes.
 NAME = re.compile(r"\w+|[\w./]+\.csv")
@@ -249,6 +269,29 @@ def test_invariant_words_are_those_of_the_field():
                 place = line + text.count("\n", 0, max(text.find(each.group()), 0))
                 found.append(f"{path.relative_to(ROOT).as_posix()}:{place} {each.group()}")
     assert read > 10_000 and not found, "\n".join(found)
+
+
+def test_invariant_messages_and_pages_use_plain_words():
+    """Invariant: no message, label or page has one of the words that a reader stumbles over; code, names and keys are exempt."""
+    words = re.compile("|".join(rf"\b(?:{words})\b" for words in SPOKEN), re.IGNORECASE)
+    assert all(words.search(text) for text in ("the likeliest pick", "A row a run.", "it goes on", "by luck"))
+    read, found = 0, []
+    for path in [*SOURCES, *PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
+        if path.suffix == ".toml":
+            continue
+        texts = _messages(path) if path.suffix == ".py" else [(1, _without_code(path.read_text(encoding="utf-8")))]
+        for line, text in texts:
+            read += 1
+            if not NAME.fullmatch(text) and not re.fullmatch(r"[\w-]+", text):
+                found += [
+                    f"{path.relative_to(ROOT)}:{line} {each.group()}" for each in words.finditer(QUOTED.sub("", text))
+                ]
+    assert read > 10_000 and not found, "\n".join(found)
+
+
+def _without_code(page: str) -> str:
+    """A page of Markdown without its blocks of code."""
+    return re.sub(r"^```.*?^```$", "", page, flags=re.MULTILINE | re.DOTALL)
 
 
 # Words of a sentence that a reader takes in at once; where a sentence ends; and what is no sentence.

@@ -149,7 +149,7 @@ def test_over_seeds_and_sizes_the_same_decides(name: str, places: tuple[int, ...
 @pytest.mark.parametrize("name", ["two", "equal", "rig"])
 def test_intervals_cover_and_a_wrong_input_is_rarely_named(name: str) -> None:
     """Over 16 repeats of 128 pairs: worths above 0.02 and flips of the first input, and at most one wrong input in ten, of
-    which more than three come in 7 of 100 cases."""
+    which more than three come in 7 % of the cases."""
     worths, flips = KNOWN[name].truth()
     right, worthy = int(worths.argmax()), np.flatnonzero(worths > 0.02)
     held, crossed, wrong = [], [], 0

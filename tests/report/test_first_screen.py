@@ -91,9 +91,9 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
         answer_text(Summary.from_dict(limited())),
         answer_text(Summary.from_dict(limited(odds=[0.57, 0.51, 0.63]))),
     )
-    assert unknown.count("doe study study.toml --robust states the odds over the unknown inputs.") == 1
+    assert unknown.count("doe study study.toml --robust states the probabilities over the unknown inputs.") == 1
     assert answer_text(Summary.from_dict(summary())).count("--robust states the odds") == 1
-    assert "57 (51 to 63)" in known and "kept in 100 cases" in known
+    assert "57 (51 to 63)" in known and "kept [%]" in known
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(
 def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
     text = answer_text(Summary.from_dict(limited(verdict)))
     assert "at the pick. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
-    assert "doe study study.toml --robust states the odds over the unknown inputs." in text
+    assert "doe study study.toml --robust states the probabilities over the unknown inputs." in text
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,8 @@ def test_a_row_number_that_no_sheet_has_is_refused(tmp_path, number):
     """Below the first, repeated, beyond the last of Excel, no number."""
     shown = end_of(write(tmp_path / "t.xlsx", {SHEET: sheet(row(number))}))
     assert (
-        shown == f"is a damaged workbook (part {SHEET}: row number {number} after 1); open it in Excel and save it anew"
+        shown
+        == f"is a damaged workbook (part {SHEET}: row number {number} after 1); open it in Excel and save it again"
     )
 
 

@@ -165,7 +165,7 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
         "whirl_deviation_ratio would improve with a larger value and impact_force_N would improve with a smaller value"
         in told
     )
-    assert "(the front goes on beyond with a probability of 0.97), beyond it the bearing would lose" in told
+    assert "(the front continues beyond with a probability of 0.97), beyond it the bearing would lose" in told
     assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
     assert "dimension chain pocket cannot" in told and "guide cannot" not in told
     outcome.pick.point = centre - half

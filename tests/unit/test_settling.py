@@ -463,5 +463,5 @@ def test_oracle_a_slow_regime_is_held(outer):
         for ours, exact in ((result.impact_force_N, truth.impact_force_N), (result.power_loss_W, truth.power_loss_W))
         if ours.error is not None
     ]
-    # A run that has not settled states no error. Of 20 intervals at 95 % fewer than 17 hold by chance in 2 of 100 cases.
+    # A run that has not settled states no error. Of 20 intervals at 95 % fewer than 17 hold by chance in 2 % of the cases.
     assert len(held) >= 14 and sum(held) >= len(held) - 3

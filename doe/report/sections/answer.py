@@ -71,7 +71,7 @@ def _judged(summary: Summary) -> list[Block]:
 def _command_for_odds(summary: Summary) -> Paragraph:
     """The command that states the odds, where these are unknown."""
     command = f"doe study {summary.asked.study_file} --robust"
-    return Paragraph("" if summary.robust else f"{command} states the odds over the unknown inputs.")
+    return Paragraph("" if summary.robust else f"{command} states the probabilities over the unknown inputs.")
 
 
 def _gained(summary: Summary) -> list[Block]:
@@ -195,7 +195,7 @@ def _robust_points(summary: Summary) -> Table:
         for point in (front.confirmed if front else ())
     ]
     header = ("", *(label(factor.name) for factor in inputs), *(quantity(name)[0] for name in names), "all")
-    note = "Gain over the baseline that holds over the unknown inputs, and in how many of 100 cases there is a gain."
+    note = "Gain over the baseline that holds over the unknown inputs, and the probability of a gain in per cent."
     return Table("Over the unknown inputs", header, rows, note)
 
 
@@ -273,7 +273,7 @@ def _limits_judged(summary: Summary) -> Table:
                 f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}",
             )
         )
-    shares = "kept in 100 cases of unknown inputs"
+    shares = "kept over unknown inputs [%]"
     header = ("limit", "pick", "verdict", "probability", shares, "baseline")
     return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 

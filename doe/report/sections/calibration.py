@@ -74,7 +74,7 @@ CELLS: tuple[Column[Cell], ...] = (
     Column("measured", meaning="measured value with its standard deviation"),
     Column("sd"),
     Column("held", meaning="whether its row is held out"),
-    Column("as_the_scene_says", meaning="simulated as the scene says"),
+    Column("as_the_scene_says", meaning="simulated at the scene values"),
     Column("residual", meaning="distance from its prediction by the others, in standard deviations"),
 )
 
@@ -111,7 +111,7 @@ def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
 def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after")) -> Sheet[Cell]:
     """A row a measured value, with its predictions before and after the calibration."""
     columns = [*CELLS, *(column for when in moments for column in prediction_columns(when))]
-    content = "A row a measured value: measured, simulated and predicted."
+    content = "One row per measured value: measured, simulated and predicted."
     return Sheet("", columns, cells, file=MEASURED, content=content)
 
 
@@ -345,7 +345,7 @@ def draw_compared(cells: Sequence[Cell], path: Path) -> None:
                 axis.vlines(rows, low, high, color=colour, linewidth=width, alpha=0.35, label=words)
                 axis.plot(rows, middle, "_", color=colour, markersize=8)
         nominal = np.array([cell.as_the_scene_says for cell in own])
-        axis.plot(rows, 100.0 * (nominal / measured - 1.0), "x", color=ORANGE, markersize=4, label="as the scene says")
+        axis.plot(rows, 100.0 * (nominal / measured - 1.0), "x", color=ORANGE, markersize=4, label="scene values")
         for in_trial, mark, words in ((False, "o", "measured, 95 %"), (True, "s", "measured and held out")):
             errors = {cell.row: 100.0 * NORMAL * cell.sd / cell.measured for cell in own if cell.held is in_trial}
             if errors:

@@ -94,7 +94,9 @@ def part_sheet(chains: Mapping[str, ChainResult]) -> Sheet[SizeRow]:
     """part_dimensions.csv: the parts of all chains."""
     rows = [(name, part, size) for name, chain in chains.items() for part, size in chain.drawn_sizes.items()]
     columns = (*NAMES, *within(2, columns_of(PartSize)))
-    return Sheet("", columns, rows, file="part_dimensions.csv", content="A row a part of each chain, in millimetres.")
+    return Sheet(
+        "", columns, rows, file="part_dimensions.csv", content="One row per part of each chain, in millimetres."
+    )
 
 
 def allocation_sheet(chains: Mapping[str, ChainResult]) -> Sheet[SizeRow]:
@@ -131,7 +133,7 @@ def share_sheet(chains: Mapping[str, ChainResult]) -> Sheet[Any]:
         ),
         Column[Any]("worst_case_percent", at=(2, "worst_case_percent")),
     )
-    return Sheet("", columns, rows, file="contributions.csv", content="A row a part of each chain.")
+    return Sheet("", columns, rows, file="contributions.csv", content="One row per part of each chain.")
 
 
 def estimates_note(sizes: Mapping[str, PartSize]) -> str:

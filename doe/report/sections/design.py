@@ -40,13 +40,13 @@ def run_sheet(factors: Sequence[str], responses: Sequence[str], runs: Sequence[S
     """The runs of a study that ended."""
     columns = (RUN, KIND, BLOCK, *CODED.of(factors), *FACTOR.of(factors), *RESPONSE.of(responses), *ERROR.of(responses))
     ended = [run for run in runs if run.responses]
-    return Sheet("Runs", columns, ended, file="design_runs.csv", content="A row a run of the design that ended.")
+    return Sheet("Runs", columns, ended, file="design_runs.csv", content="One row per run of the design that ended.")
 
 
 def design_sheet(factors: Sequence[str], runs: Sequence[StandardRun] = ()) -> Sheet[StandardRun]:
     """The runs of a design alone."""
     columns = (RUN, KIND, BLOCK, Column("standard"), Column("seed"), *CODED.of(factors), *FACTOR.of(factors))
-    return Sheet("Runs", columns, runs, file="design.csv", content="A row a run of the design, in its order.")
+    return Sheet("Runs", columns, runs, file="design.csv", content="One row per run of the design, in its order.")
 
 
 def design(summary: Summary, motion: Mapping[str, Any]) -> Section:

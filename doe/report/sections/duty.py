@@ -341,7 +341,7 @@ def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
         if name in point.pick
     ]
     caption = "Simulated figures at every point (95 % intervals)"
-    content = "A row a response at each point of a duty."
+    content = "One row per response at each point of a duty."
     return Sheet(caption, DUTY_POINTS, rows, detail=Detail.ALL, file="duty_points.csv", content=content)
 
 

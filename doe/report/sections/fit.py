@@ -89,14 +89,18 @@ RUN_COLUMNS: tuple[Column[RunDiagnostics], ...] = (
 
 ANOVA = Sheet(
     "Analysis of variance", ANOVA_COLUMNS, note=LEGEND, detail=Detail.USUAL, file="anova.csv",
-    content="Analysis of variance, a row a source of each response.",
+    content="Analysis of variance, one row per source of each response.",
 )  # fmt: skip
 TERMS = Sheet(
-    "Coefficients", TERM_COLUMNS, detail=Detail.USUAL, file="coefficients.csv", content="A row a term of each surface."
+    "Coefficients",
+    TERM_COLUMNS,
+    detail=Detail.USUAL,
+    file="coefficients.csv",
+    content="One row per term of each surface.",
 )
 RUNS = Sheet(
     "Runs and residuals", RUN_COLUMNS, folded=True, detail=Detail.ALL, file="runs.csv",
-    content="Diagnostics, a row a run of each response.",
+    content="Diagnostics, one row per run of each response.",
 )  # fmt: skip
 
 

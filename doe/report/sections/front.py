@@ -35,7 +35,7 @@ RESPONSE: Column[Point] = Column("{}", at=("responses", "{}"), unit="of the name
 def front_sheet(factors: Sequence[str], responses: Sequence[str], points: Sequence[Point] = ()) -> Sheet[Point]:
     """The points of a front."""
     columns = (*FACTOR.of(factors), *RESPONSE.of(responses))
-    return Sheet("Front", columns, points, file="front.csv", content="A row a point of the front.")
+    return Sheet("Front", columns, points, file="front.csv", content="One row per point of the front.")
 
 
 def front(summary: Summary, motion: Mapping[str, Any]) -> Section:

@@ -209,7 +209,7 @@ def limiting_sentence(outcome: StudyResult) -> str:
     limits: dict[str, list[str]] = {}
     for pull in pulls(study, adaptive, outcome.pick.point):
         beyond = math.nan if pull.face is None else pull.face.better
-        odds = "" if math.isnan(beyond) else f" (the front goes on beyond with a probability of {beyond:.2f})"
+        odds = "" if math.isnan(beyond) else f" (the front continues beyond with a probability of {beyond:.2f})"
         limits.setdefault(_why(study, pull), []).append(f"{_place(pull.factor, pull.value)}{odds}")
     why = [f"{_listed(places)}, {words}" for words, places in limits.items()]
     why += [f"the limit {limit.text} is near" for limit in near_limits(adaptive, study, outcome.limits)]

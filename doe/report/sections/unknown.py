@@ -21,7 +21,7 @@ from rbdyn.scene.unknown import UnknownInput
 CAUSES_NAMED, LEAST_SHARE_NAMED = 2, 0.1
 RANGES: tuple[Column[OutputRange], ...] = (
     Column("output", at="name", cell=lambda output: quantity(output.name)[0], meaning="figure"),
-    Column("value", at=("nominal", "value"), screen=False, meaning="value as the scene says, with its 95 % error"),
+    Column("value", at=("nominal", "value"), screen=False, meaning="value in the scene file, with its 95 % error"),
     Column("error", at=("nominal", "stated_error"), screen=False),
     Column("low_5_percent", at=("input", "low"), screen=False, meaning="range over the unknown inputs"),
     Column("median", at=("input", "median"), screen=False),
@@ -96,7 +96,9 @@ def set_sheet(keys: Iterable[str], outputs: Iterable[str]) -> Sheet[Any]:
         *Column[Any]("{}", unit="of the key", meaning="value of each unknown input").of(keys),
         *Column[Any]("{}", unit="of the name", meaning="outputs of that set; not in `posterior.csv`").of(outputs),
     )
-    content = "A row an input set: of `doe uncertainty` with its outputs, of `doe calibrate` drawn from the posterior."
+    content = (
+        "One row per input set: of `doe uncertainty` with its outputs, of `doe calibrate` drawn from the posterior."
+    )
     return Sheet("", columns, file="input_sets.csv, posterior.csv", content=content)
 
 
@@ -192,7 +194,7 @@ def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
         words, unit = quantity(name)
         above.hist(uncertainty.sets.outputs.values[:, column], bins=24, color=BLUE, alpha=0.45)
         above.axvspan(output.input.low, output.input.high, color=BLUE, alpha=0.12, label="5 to 95 % of the cases")
-        above.axvline(output.nominal.value, color=ORANGE, label="as the scene says")
+        above.axvline(output.nominal.value, color=ORANGE, label="scene values")
         above.set(xlabel=f"{words} [{unit}]" if unit else words, ylabel="input sets" if column == 0 else "")
         plain(above)
         plain(below)
@@ -264,9 +266,9 @@ def _odds(robust: Robust) -> Table:
         (quantity(name)[0], share.of_hundred, _percent(robust.explained[name]))
         for name, share in robust.chances.gains.items()
     ]
-    header = ("response", "pick better in 100 cases", "explained by the inputs")
+    header = ("response", "pick better [%]", "explained by the inputs")
     every = ("all of these", robust.chances.all.of_hundred, "")
-    return Table("Odds that the pick is better than the original", header, [*rows, every])
+    return Table("Probability that the pick is better than the original", header, [*rows, every])
 
 
 def _limits(summary: Summary) -> Table:
@@ -276,7 +278,7 @@ def _limits(summary: Summary) -> Table:
         for name, limit in summary.limits.items()
         if limit.odds
     ]
-    return Table("Limits over the unknown inputs", ("response", "limit", "kept in 100 cases"), rows, text_columns=(1,))
+    return Table("Limits over the unknown inputs", ("response", "limit", "kept [%]"), rows, text_columns=(1,))
 
 
 def decider_sheet(robust: Robust) -> Sheet[Decider]:

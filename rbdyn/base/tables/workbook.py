@@ -52,7 +52,7 @@ class Parts:
 
     def damaged(self, place: str) -> InputError:
         """The fault of a workbook that is damaged at a place."""
-        return InputError([f"{self.path}: is a damaged workbook ({place}); open it in Excel and save it anew"])
+        return InputError([f"{self.path}: is a damaged workbook ({place}); open it in Excel and save it again"])
 
     def too_large(self, words: str) -> InputError:
         """The fault of a workbook beyond a bound."""

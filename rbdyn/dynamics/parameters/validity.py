@@ -279,9 +279,7 @@ def left_out_notes(scene: Scene, power_loss: float) -> Notes:
                 share = power / power_loss
                 size = f"{100.0 * share:.2g} % of" if share < 1.0 else f"{share:.2g} times as much as"
                 code = "omission" if share > LARGE_SHARE else "left-out"
-                sentence = (
-                    f"left out: {item.name}, by an estimate {power:.2g} W ({size} the power loss); {item.changes}"
-                )
+                sentence = f"left out: {item.name}, estimated at {power:.2g} W ({size} the power loss); {item.changes}"
                 notes.append(Note(code, sentence))
         elif item.matters is not None and item.matters(scene):
             notes.append(Note("left-out", f"left out: {item.name}; {item.changes}"))
@@ -324,7 +322,7 @@ def light_load_notes(scene: Scene) -> Notes:
     rising = sorted(rules.items(), key=lambda item: item[1])
     loads = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
     sentence = (
-        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {loads}; no rule is "
+        f"load: {load:.4g} N is below {missed} of {len(rules)} manufacturers' minimum loads against skidding: {loads}; no rule is "
         "safe; see cage_slip"
     )
     return (Note("light-load", sentence),)
@@ -378,7 +376,7 @@ def heat_notes(scene: Scene, power_loss: float) -> Notes:
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     sentence = (
-        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times what a jet has carried off such a surface; it takes "
+        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times the heat that a jet has removed from such a surface; it takes "
         f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
         f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s"
     )

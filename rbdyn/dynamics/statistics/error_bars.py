@@ -318,7 +318,7 @@ def error_notes(
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
         sentence = (
-            f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it ({listed}); "
+            f"statistical error: uncertain because of fewer than {FEW_SAMPLES:.0f} effective samples ({listed}); "
             "raise numerics.turns or numerics.replicates"
         )
         notes.append(Note("few-samples", sentence))

@@ -105,7 +105,7 @@ def whirl_notes(scene: Scene, share: Quantity | None) -> Notes:
         return ()
     clearance = "radial play in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
     sentence = (
-        "whirl deviation ratio: that of a jitter, for the cage does not whirl; its orbit has a radius of "
+        "whirl deviation ratio: the cage does not whirl, so the ratio has little meaning; its orbit has a radius of "
         f"{1e6 * play * share.value:.2g} um, {share.value:.2g} of the {clearance}"
     )
     return (Note("jitter", sentence),)

@@ -227,7 +227,7 @@ RUNOUT: Sheet[RingPath] = Sheet(
         Column("largest_load_N", at="largest_load", meaning="largest load of a ball"),
     ),
     file="runout.csv",
-    content="A row a step of the turning ring, of `rbdyn ball` with `[errors]` in the scene.",
+    content="One row per step of the turning ring, of `rbdyn ball` with `[errors]` in the scene.",
 )
 
 
