@@ -432,7 +432,7 @@ def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]
     return [
         f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; gain of the loop {thermal['gain']:.2g}",
         f"heat by SKF's friction model: {sum(friction.values()):.4g} W, rolling {friction['rolling']:.4g} and sliding "
-        f"{friction['sliding']:.4g}; carried off by {ways}",
+        f"{friction['sliding']:.4g}; removed by {ways}",
         f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "
         f"{angle['operating']:.4g} deg of {angle['drawn']:.4g}",
         other_ranges(spans),
