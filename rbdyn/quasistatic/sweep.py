@@ -14,14 +14,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, number_list, refuse, validated
 from rbdyn.base.files import Checkpoint, code_version, read_record, run_key, versions, write_json
 from rbdyn.base.notes import Note, Notes
@@ -85,7 +85,6 @@ MOST_POINTS = 100_000
 FIX = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
 Progress = Callable[[int, int], None]
 Reporter = Progress | None
-Group = tuple[Whole, Array]
 KeyPath = tuple[str | int, ...]
 
 
@@ -93,26 +92,36 @@ KeyPath = tuple[str | int, ...]
 class SweepResult:
     """Equilibria over a grid of scene keys, in the order of ``keys``, the last one running fastest.
 
-    ``keys``: values of each key. ``columns``: figures of the points, units in the names, NaN without an equilibrium;
-    ``statuses`` state the cause. ``figures``: those of the balls in SI by row of balls, as pairs (points, (points, Z, 6)), one
-    for each number Z of balls; empty in a loaded sweep. ``notes``: the JSON form of the note of its first point, its topic
+    ``keys``: values of each key. ``records``: points of the table, each with its keys, its status and, in an equilibrium, its figures
+    with units in the names, None for those that are infinite or missing. ``figures``: those of the balls in SI by row of balls,
+    (Z, 6) of each point; empty in a loaded sweep. ``notes``: the JSON form of the note of its first point, its topic
     ("about"), and all its "points", counted from 0 in the order of the table. ``cold``: number of points not started from their neighbour.
     ``wall_s``: wall time.
     """
 
     keys: dict[str, tuple[float, ...]]
-    columns: dict[str, Array]
-    statuses: tuple[str, ...]
+    records: list[dict[str, Any]]
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    figures: dict[str, list[tuple[Whole, Array]]] = field(default_factory=dict, repr=False)
+    figures: dict[str, list[Array]] = field(default_factory=dict, repr=False)
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values of each key."""
         return tuple(len(values) for values in self.keys.values())
+
+    @cached_property
+    def statuses(self) -> tuple[str, ...]:
+        """Status of each point: "ok", or the cause of the failure."""
+        return tuple(record["status"] for record in self.records)
+
+    @cached_property
+    def columns(self) -> dict[str, Array]:
+        """Figures of the points, NaN without an equilibrium."""
+        names = dict.fromkeys(name for record in self.records for name in record if name not in (*self.keys, "status"))
+        return {name: np.array([_number(record, name) for record in self.records]) for name in names}
 
     @property
     def status(self) -> str:
@@ -134,8 +143,7 @@ class SweepResult:
 
     def key_values(self, place: int) -> dict[str, float]:
         """Values of the keys at a point."""
-        indices = np.unravel_index(place, self.shape)
-        return {key: values[int(index)] for (key, values), index in zip(self.keys.items(), indices, strict=True)}
+        return {key: self.records[place][key] for key in self.keys}
 
     def where(self, places: Sequence[int]) -> str:
         """Number of points, and the values of the keys at the first of them."""
@@ -159,8 +167,9 @@ class SweepResult:
         for note in self.notes:
             for place in note["points"]:
                 words[place].append(note["about"])
+        keys = {key: [record[key] for record in self.records] for key in self.keys}
         about = ["; ".join(topics) for topics in words]
-        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": about})
+        return pd.DataFrame({**keys, **self.columns, "status": self.statuses, "notes": about})
 
     def balls(self) -> "pd.DataFrame":
         """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
@@ -169,61 +178,45 @@ class SweepResult:
         """
         import pandas as pd
 
-        if not self.figures:
-            raise RuntimeError("a loaded sweep has no balls; run the sweep again")
-        frames = []
-        places = self._places()
-        solved = np.array([status == OK for status in self.statuses])
-        for name, groups in self.figures.items():
-            for points, balls in groups:
-                good = points[solved[points]]
-                size = balls.shape[1]
-                columns = {key: np.repeat(values[good], size) for key, values in places.items()}
-                columns["row"] = np.full(good.size * size, name)
-                columns["ball"] = np.tile(np.arange(1, size + 1), good.size)
-                ball_figures = ball_columns(balls[solved[points]])
-                frames.append(pd.DataFrame(columns | {key: value.ravel() for key, value in ball_figures.items()}))
-        return pd.concat(frames, ignore_index=True)
+        parts = []
+        for name, points in self._balls().items():
+            for place, balls in enumerate(points):
+                solved = balls if self.statuses[place] == OK else balls[:0]
+                common = {**self.key_values(place), "row": name}
+                columns = {key: np.full(len(solved), value) for key, value in common.items()}
+                parts.append(columns | {"ball": np.arange(1, len(solved) + 1)} | ball_columns(solved))
+        return pd.DataFrame({key: np.concatenate([part[key] for part in parts]) for key in parts[0]})
 
     def balls_at(self, place: int) -> dict[str, list[dict[str, float]]]:
         """Records of the balls of a point by row, as in ``BallResult``. Raises RuntimeError as ``balls``."""
+        return {name: ball_records(points[place]) for name, points in self._balls().items()}
+
+    def _balls(self) -> dict[str, list[Array]]:
         if not self.figures:
             raise RuntimeError("a loaded sweep has no balls; run the sweep again")
-        records = {}
-        for name, groups in self.figures.items():
-            records[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
-        return records
+        return self.figures
 
     def points(self) -> list[dict[str, Any]]:
         """A record a point, with None for infinite and missing figures."""
-        places, names = self._places(), list(self.columns)
-        values = [[finite(value) for value in self.columns[name].tolist()] for name in names]
-        keys = [column.tolist() for column in places.values()]
-        return [
-            {
-                **dict(zip(places, (column[place] for column in keys), strict=True)),
-                "status": status,
-                **(dict(zip(names, (column[place] for column in values), strict=True)) if status == OK else {}),
-            }
-            for place, status in enumerate(self.statuses)
-        ]
+        return [dict(record) for record in self.records]
 
     def as_dict(self) -> dict[str, Any]:
         """JSON form, with the table by points and without references to this object."""
+        failures = [
+            {
+                "cause": cause,
+                "points": len(places),
+                "first": self.key_values(places[0]),
+                "status": self.statuses[places[0]],
+            }
+            for cause, places in self.failures.items()
+        ]
         return {
             "format": FORMAT,
             "status": self.status,
             "keys": {key: list(values) for key, values in self.keys.items()},
             "points": self.points(),
-            "failures": [
-                {
-                    "cause": cause,
-                    "points": len(points),
-                    "first": self.key_values(points[0]),
-                    "status": self.statuses[points[0]],
-                }
-                for cause, points in self.failures.items()
-            ],
+            "failures": failures,
             "notes": plain(self.notes),
             "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
             "versions": versions(),
@@ -244,18 +237,11 @@ class SweepResult:
 
     @classmethod
     def _of_json(cls, data: dict[str, Any]) -> "SweepResult":
-        keys = {key: tuple(values) for key, values in data["keys"].items()}
-        points = data["points"]
-        names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
-        columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
-        cost = data["cost"]
-        statuses = tuple(point["status"] for point in points)
-        return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
-
-    def _places(self) -> dict[str, NDArray[Any]]:
-        """Values of the keys at every point, a column a key."""
-        grids = np.meshgrid(*(np.array(values) for values in self.keys.values()), indexing="ij")
-        return {key: grid.ravel() for key, grid in zip(self.keys, grids, strict=True)}
+        keys, cost = {key: tuple(values) for key, values in data["keys"].items()}, data["cost"]
+        found = cls(keys, data["points"], cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
+        # What is no table of points fails here.
+        _ = found.columns, [found.key_values(place) for place in range(len(found.statuses))]
+        return found
 
 
 def _number(point: dict[str, Any], name: str) -> float:
@@ -333,32 +319,15 @@ def result_of(
     keys: dict[str, tuple[float, ...]], points: Sequence[PointRecord], wall_s: float, scene: dict[str, Any]
 ) -> SweepResult:
     """A sweep of its points, in the order of the table."""
-    names = dict.fromkeys(name for point in points for name in point.figures)
-    remarks: dict[str, list[tuple[int, Note]]] = {}
-    for place, point in enumerate(points):
+    records, topics = [], dict[str, dict[str, Any]]()
+    for place, (values, point) in enumerate(zip(itertools.product(*keys.values()), points, strict=True)):
+        figures = {name: finite(value) for name, value in point.figures.items()}
+        records.append({**dict(zip(keys, values, strict=True)), "status": point.status, **figures})
         for word, note in point.remarks:
-            remarks.setdefault(word, []).append((place, note))
-    return SweepResult(
-        keys,
-        {name: np.array([point.figures.get(name, np.nan) for point in points]) for name in names},
-        tuple(point.status for point in points),
-        sum(point.cold for point in points),
-        wall_s,
-        scene,
-        {name: _by_size([point.balls[name] for point in points]) for name in points[0].balls},
-        [
-            {**placed[0][1].as_dict(), "about": word, "points": [place for place, _ in placed]}
-            for word, placed in remarks.items()
-        ],
-    )
-
-
-def _by_size(balls: Sequence[Array]) -> list[Group]:
-    """Arrays (Z, 6) grouped by Z, with their places."""
-    sizes: dict[int, list[int]] = {}
-    for place, one in enumerate(balls):
-        sizes.setdefault(len(one), []).append(place)
-    return [(np.array(places), np.array([balls[place] for place in places])) for places in sizes.values()]
+            topics.setdefault(word, {**note.as_dict(), "about": word, "points": []})["points"].append(place)
+    balls = {name: [point.balls[name] for point in points] for name in points[0].balls}
+    cold = sum(point.cold for point in points)
+    return SweepResult(keys, records, cold, wall_s, scene, balls, list(topics.values()))
 
 
 def _walk(
