@@ -36,9 +36,11 @@ SIMULATION_FILES = (
     "roller_loads.png",
     "cage_orbit.png",
     "pocket_forces.png",
+    "stiffness.png",
 )
 DUTY_FILES = ("duty.json", "points.csv")
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"
+STIFFNESS_FILES = ("stiffness.json", "stiffness.csv", "stiffness.png")
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"
     for name in ("accuracy", "trajectory", "methods", "coverage", "options", "stability", "solvers")
@@ -202,8 +204,8 @@ def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
 @app.command("map")
 @result_command(
     "rbdyn map",
-    (*MAP_FILES, *REPORT_FILES),
-    "Write map.json, map.csv and map.png here, and keep finished points.",
+    (*MAP_FILES, *STIFFNESS_FILES, *REPORT_FILES),
+    "Write map.json, map.csv and map.png here, and keep finished points; with --stiffness stiffness.csv and the like.",
     keeps=(MAP_POINTS,),
 )
 def slip_map(
@@ -215,13 +217,37 @@ def slip_map(
         Path | None,
         command.valued("FILE", "Mark its points of operation: TOML such as a study, or CSV.", "no marks", "--duty"),
     ] = None,
+    stiffness: Annotated[
+        bool,
+        command.flag(
+            "--stiffness",
+            says="Instead of that, the stiffness for a program of rotors such as ROSS; also of ball bearings.",
+        ),
+    ] = False,
+    load_angle: Annotated[
+        float,
+        command.valued("DEG", "Direction of the load from x of the stiffness; -90 where gravity pulls along -y.", "0"),
+    ] = 0.0,
+    loss_factor: Annotated[
+        float, command.valued("ETA", "Damping of the stiffness, c = ETA k/speed.", "0, no damping")
+    ] = 0.0,
     assignments: command.Set = None,
     turns: command.Turns = None,
     replicates: command.Replicates = None,
     seed: command.Seed = None,
     workers: command.Workers = None,
 ) -> Delivery:
-    """Map cage slip, power loss, impact and whirl over speed and load."""
+    """Map cage slip, power loss, impact and whirl over speed and load, or the stiffness."""
+    if stiffness:
+        if duty is not None:
+            raise InputError([f"--duty {duty}: marks points of a map of cage slip; leave it or --stiffness out"])
+        from rbdyn.cli.stiffness import over_speed
+
+        chosen = Scene.load(scene, _with_numerics(assignments, turns=turns, replicates=replicates, seed=seed))
+        return over_speed(console, scene, chosen, (axis_values(speed, "--speed"), axis_values(load, "--load")), load_angle,
+                          loss_factor, workers)  # fmt: skip
+    if load_angle or loss_factor:
+        raise InputError(["--load-angle, --loss-factor: belong to --stiffness; state that too, or leave them out"])
     loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
     from rbdyn.dynamics.slip_map import slip_map as run_map
 
@@ -264,8 +290,13 @@ def _map_duty(
 
 def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
     """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
-    numerics = (f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)
-    return rollers_only(Scene.load(path, [*(assignments or []), *numerics]))
+    return rollers_only(Scene.load(path, _with_numerics(assignments, **shorthand)))
+
+
+def _with_numerics(assignments: list[str] | None, **shorthand: float | None) -> list[str]:
+    """Assignments, and those of keys of [numerics] that have options of their own."""
+    numerics = [f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None]
+    return [*(assignments or []), *numerics]
 
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:

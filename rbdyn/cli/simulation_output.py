@@ -64,7 +64,11 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     plots.roller_loads(motion, folder / "roller_loads.png")
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    return ["result.json", "figures.csv", "history.csv", "roller_loads.png", "cage_orbit.png", "pocket_forces.png"]
+    names = ["result.json", "figures.csv", "history.csv", "roller_loads.png", "cage_orbit.png", "pocket_forces.png"]
+    if result.stiffness_N_um is None:
+        return names
+    plots.stiffness_over_clearance(scene, folder / "stiffness.png")
+    return [*names, "stiffness.png"]
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":

@@ -390,11 +390,12 @@ class Stiffness(NamedTuple):
         """K_yy [N/m]."""
         return float(self.matrix[1, 1])
 
-    def turned(self, angle: float) -> Array:
-        """The matrix (2, 2) [N/m] in axes of which the first one sees the load at ``angle`` [rad]."""
-        cosine, sine = math.cos(angle), math.sin(angle)
-        turn = np.array([[cosine, -sine], [sine, cosine]])
-        return np.asarray(turn @ self.matrix @ turn.T)
+
+def turned(matrix: Array, angle: float) -> Array:
+    """A matrix (2, 2) in axes that see the first axis of its own at ``angle`` [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    return np.asarray(turn @ matrix @ turn.T)
 
 
 # Relative errors of the forces on a roller and on the ring; the most steps to a contact and halvings of a step of the ring; the

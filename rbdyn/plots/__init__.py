@@ -16,9 +16,11 @@ from rbdyn.plots.roller import (
     section,
     sliding,
     spectra,
+    stiffness_over_clearance,
     whirl,
 )
 
 __all__ = [
-    "cage_orbit", "forces", "pocket_forces", "power_by_loss", "roller_loads", "section", "sliding", "spectra", "whirl",
+    "cage_orbit", "forces", "pocket_forces", "power_by_loss", "roller_loads", "section", "sliding", "spectra", "stiffness_over_clearance",
+    "whirl",
 ]  # fmt: skip

@@ -1,10 +1,11 @@
 """Pictures of a roller bearing: motion of the cage and its impacts; load, sliding and heat around the bearing; power by loss.
 
-Also cage slip over speed and load, and a moving picture of the bearing with its forces (GIF, or MP4 with ffmpeg).
+Also stiffness over clearance and speed, cage slip over speed and load, and a moving picture of the bearing with its forces (GIF, or MP4 with ffmpeg).
 """
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,15 +14,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
+from rbdyn.base.arrays import Array
+from rbdyn.base.faults import MethodError
 from rbdyn.base.words import label
 from rbdyn.dynamics import motion
+from rbdyn.dynamics.duty import row_stiffness
 from rbdyn.dynamics.figures import PANELS
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
-from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
+from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, METHOD_COLOURS, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion import History
     from rbdyn.dynamics.slip_map import SlipMap
+    from rbdyn.scene import Scene
 
 SHOWN_POCKETS = 3
 POCKET_COLOURS = (BLUE, ORANGE, GREEN)
@@ -273,6 +278,59 @@ def draw_slip_map(
         )
         figure.colorbar(image, ax=axis)
         _mark_points(axis, slip_map, marks)
+    save(figure, path)
+
+
+# Clearances of a picture over the operating or the drawn one, whichever is larger, and how many of them.
+CLEARANCES, CLEARANCE_POINTS = (-0.5, 2.0), 26
+
+
+def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
+    """Stiffness along and across the load, and the travel over a pitch, over the diametral clearance; the operating one is marked.
+
+    Clearances without a stiffness, where no roller carries load, stay empty.
+    """
+    operating = scene.geometry.clearance
+    largest = max(abs(operating), abs(scene.bearing.radial_clearance), 1e-6)
+    clearances = np.sort([*np.linspace(*CLEARANCES, CLEARANCE_POINTS) * largest, operating])
+    rows = [stiffness_row(scene, float(clearance)) for clearance in clearances]
+    figure, (above, below) = plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
+    here = stiffness_row(scene, operating)
+    for axis, place, words, colour in (
+        (above, 0, "along the load", BLUE), (above, 1, "across the load", VERMILION), (below, 2, "", GREEN),
+    ):  # fmt: skip
+        axis.plot(1e6 * clearances, [row[place] for row in rows], color=colour, label=words)
+        axis.plot([1e6 * operating], [here[place]], "o", color=colour)
+        axis.axvline(1e6 * operating, color=GREY, linewidth=0.8, linestyle=":")
+        plain(axis)
+    above.set(ylabel="stiffness [N/µm]", ylim=(0.0, None), title="Static loads; dots: operating clearance")
+    above.legend(frameon=False)
+    below.set(
+        xlabel="diametral operating clearance [µm]", ylabel="travel of the shaft over a pitch [µm]", ylim=(0.0, None)
+    )
+    save(figure, path)
+
+
+def stiffness_row(scene: "Scene", clearance: float) -> tuple[float, float, float]:
+    """Stiffness along and across the load [N/um] and travel [um] at a diametral clearance [m]; NaN where no roller carries load."""
+    try:
+        found = row_stiffness(scene, clearance)
+    except MethodError:
+        return math.nan, math.nan, math.nan
+    return 1e-6 * found.along, 1e-6 * found.across, 1e6 * max(found.travel)
+
+
+def draw_stiffness(
+    speeds_rpm: Sequence[float], loads: Sequence[float], along: Array, across: Array, path: Path
+) -> None:
+    """Stiffness k_xx (full) and k_yy (dashed) [N/um], each (loads, speeds), over speed; a colour a load [N]."""
+    figure, axis = plt.subplots(figsize=(6.4, 4.2))
+    for colour, load, *rows in zip(itertools.cycle(METHOD_COLOURS[1:]), loads, along, across, strict=False):
+        for name, row, line in zip(("k_xx", "k_yy"), rows, ("-", "--"), strict=True):
+            axis.plot(speeds_rpm, row, color=colour, linestyle=line, label=f"{name}, {load:g} N")
+    plain(axis)
+    axis.set(xlabel="inner speed [rpm]", ylabel="stiffness [N/µm]", ylim=(0.0, None))
+    axis.legend(frameon=False, fontsize=8, ncols=max(1, len(loads) // 3))
     save(figure, path)
 
 

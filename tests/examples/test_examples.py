@@ -440,3 +440,17 @@ def test_literature_the_cage_moves_chaotically(outer):
         assert exponent.per_turn - exponent.half_width > 1.0
     wide, fine = found
     assert abs(wide.per_turn - fine.per_turn) < wide.half_width + fine.half_width
+
+
+def test_a_rotor_takes_the_table_of_stiffness(tmp_path):
+    """The arguments of ROSS's BearingElement are those of one load at every speed; a failed point is refused."""
+    from rbdyn.cli.stiffness import stiffness_map
+
+    rotor = script("rotor_in_ross")
+    found = stiffness_map(EXAMPLES / "cylindrical_roller.toml", [4e3, 8e3, 12e3, 16e3, 20e3], [0.0, 500.0])
+    found.sheet.save(tmp_path)
+    arguments = rotor.bearing_arguments(tmp_path / "stiffness.csv", 500.0)
+    assert set(arguments) == {"speed", *rotor.COEFFICIENTS} and all(len(values) == 5 for values in arguments.values())
+    assert arguments["kxx"] == pytest.approx([1e6 * value for value in found.grid("xx")[1]])
+    with pytest.raises(ValueError, match="whole row"):
+        rotor.bearing_arguments(tmp_path / "stiffness.csv")

@@ -61,6 +61,7 @@ def kinds() -> dict[str, type[BaseModel]]:
 def tables() -> dict[str, list[Sheet[Any]]]:
     """The files of tables that the commands write; those of ``rbdyn accuracy`` have the columns that its report explains."""
     from rbdyn.cli.ball_studies import limit_sheet
+    from rbdyn.cli.stiffness import stiffness_sheet
     from rbdyn.comparison import difference_sheet, input_sheet
     from rbdyn.dynamics.duty_simulation import points_sheet
     from rbdyn.dynamics.figures import FIGURES
@@ -75,7 +76,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     figures = ("{figure}",)
     named = [Column[Any](figure.key, meaning=figure.meaning) for figure in FIGURES]
     sheets: list[Sheet[Any]] = [
-        figure_sheet({}), history_sheet(("{j}",)), map_sheet((), figures), life_sheet(()), points_sheet((), figures), input_sheet(()),
+        figure_sheet({}), history_sheet(("{j}",)), map_sheet((), figures), life_sheet(()), points_sheet((), figures), stiffness_sheet(()), input_sheet(()),
         difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, limit_sheet({}),
     ]  # fmt: skip
     return {
