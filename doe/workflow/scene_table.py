@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
 from rbdyn.base.notes import Notes
-from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks
-from rbdyn.base.tables.sheet import Sheet, TableFile, listed, quoted, read_sheet
+from rbdyn.base.tables.sheet import Sheet, listed, read_sheet, sheet_of_frame
 from rbdyn.scene import BallScene, Scene
 from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
@@ -28,7 +27,6 @@ NAME, SCENE = "name", "scene"
 SHORT = {"replicates": "numerics.replicates", "seed": "numerics.seed"}
 # Scene files that are kept at a time.
 FILES_KEPT = 64
-PARQUET = (".parquet", ".pq")
 
 
 @dataclass(frozen=True)
@@ -88,49 +86,11 @@ def read_scene_table(table: "Path | pd.DataFrame", base: Path | None, overrides:
     Those of single rows are kept with them.
     """
     _tables.cache_clear()
-    if isinstance(table, Path):
-        sheet = frame_sheet(_parquet(table), table) if table.suffix.lower() in PARQUET else read_sheet(table)
-    else:
-        sheet = frame_sheet(table, Path("table"))
+    sheet = read_sheet(table) if isinstance(table, Path) else sheet_of_frame(table, Path("table"))
     if base is not None:
         read_toml(base)
     keys = _keys(sheet, overrides)
     return SceneTable(sheet.path, list(_rows(sheet, keys)), list(keys.values()), base, overrides, sheet.notes)
-
-
-def frame_sheet(frame: "pd.DataFrame", path: Path) -> Sheet:
-    """A frame as a table that was read from ``path``; values that are missing are empty cells. Raises InputError."""
-    header = [str(name) for name in frame.columns]
-    repeated = sorted({name for name in header if header.count(name) > 1})
-    faults = [f"{path}: column {quoted(name)} comes more than once; keep one" for name in repeated]
-    refuse([*faults, *([] if len(frame) else [f"{path}: has no rows; add a row for each run"])])
-    columns = [[_text(value) for value in frame.iloc[:, place].tolist()] for place in range(len(header))]
-    rows = [list(row) for row in zip(*columns, strict=True)]
-    return Sheet(path, header, TableFile(header, rows, Marks(POINT), ""))
-
-
-def _text(value: Any) -> str:
-    if value is None or value != value:
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return value if isinstance(value, str) else Exact(repr(value) if isinstance(value, float) else str(value))
-
-
-def _parquet(path: Path) -> "pd.DataFrame":
-    """The frame of a parquet file. Raises InputError where pandas cannot read it."""
-    import pandas as pd
-
-    try:
-        return pd.read_parquet(path)
-    except ImportError:
-        raise InputError(
-            [f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV"]
-        ) from None
-    except OSError as error:
-        raise InputError([f"{path}: {error.strerror or 'cannot be read'}; check the path"]) from None
-    except Exception as error:
-        raise InputError([f"{path}: no parquet file ({one_line(str(error), LONGEST_NAME)}); save it again"]) from None
 
 
 def _keys(sheet: Sheet, overrides: Sequence[str]) -> dict[str, str]:

@@ -169,3 +169,29 @@ def test_parts_of_a_study_give_the_study(folder, monkeypatch):
     assert len(ran) == 2 * (design + further)
     with Path("one/design_runs.csv").open() as one, Path("parts/design_runs.csv").open() as other:
         assert list(csv.reader(one)) == list(csv.reader(other))
+
+
+def test_every_table_may_be_parquet(folder, monkeypatch):
+    """Command line: a parquet file is read by pandas; a file that is none and pandas without a reader are a sentence each."""
+    instantly(monkeypatch.setattr)
+    frame = pd.DataFrame({"name": ["a", "b"], "cage.pocket_clearance_mm": [0.2, 0.3], "seed": [11, 12]})
+    Path("rows.parquet").write_bytes(b"PAR1")
+    monkeypatch.setattr(pd, "read_parquet", lambda file: frame)
+    assert doe("run", "rows.parquet", "--scene", "base.toml", "--out", "out", "-q").returncode == 0
+    frame.to_csv("rows.csv", index=False)
+    assert doe("run", "rows.csv", "--scene", "base.toml", "--out", "other", "-q").returncode == 0
+    assert Path("out/runs.csv").read_bytes() == Path("other/runs.csv").read_bytes()
+
+    def fails(error: Exception) -> None:
+        def read(file: object) -> None:
+            raise error
+
+        monkeypatch.setattr(pd, "read_parquet", read)
+
+    for error, words in (
+        (ImportError("no engine"), "pip install pyarrow"),
+        (ValueError("magic"), "no parquet file (magic)"),
+    ):
+        fails(error)
+        refused = doe("run", "rows.parquet", "--scene", "base.toml", "--out", "third")
+        assert refused.returncode == 2 and words in refused.stderr and len(refused.stderr.splitlines()) == 1

@@ -1,4 +1,4 @@
-"""Tables that a user hands in: ``sheet`` reads text and workbooks, columns, and numbers in bounds.
+"""Tables that a user hands in: ``sheet`` reads text, workbooks and frames, columns, and numbers in bounds.
 
 - ``decimal_marks``: decimal points and commas; ``workbook``: Excel workbooks
 """

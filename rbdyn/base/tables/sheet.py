@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,14 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, not_utf_8, one_line, read_bytes, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
-from rbdyn.base.tables.decimal_marks import POINT, Marks, is_like_number, marks_of
+from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks, is_like_number, marks_of
 from rbdyn.base.tables.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
 from rbdyn.base.words import counted
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+PARQUET = (".parquet", ".pq")
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 # Excel's own line on the separator of a file.
@@ -60,6 +64,8 @@ class TableFile:
 def read_table_file(path: Path) -> TableFile:
     """Read a table of any of the formats. Raises InputError where none or more than one reading is possible."""
     file, sheet = split_path(path)
+    if file.suffix.lower() in PARQUET:
+        return _table_file(path, _frame_rows(_parquet(file)), POINT, "", "")
     if file.suffix.lower() in SUFFIXES:
         table = read_workbook(file, read_bytes(file), sheet)
         rows, numbers = table.rows, table.numbers
@@ -90,6 +96,35 @@ def _table_file(
     together = " and ".join([*([", ".join(signs[:-1])] if signs[1:] else []), *signs[-1:]])
     words = [*([f"with {together}"] if signs else []), *([origin] if origin else [])]
     return TableFile(header, body, marks, f"read {' '.join(words)}" if words else "", numbers[1:])
+
+
+def _parquet(path: Path) -> "pd.DataFrame":
+    """The frame of a parquet file. Raises InputError where pandas cannot read it."""
+    import pandas as pd
+
+    data = read_bytes(path)
+    try:
+        return pd.read_parquet(io.BytesIO(data))
+    except ImportError:
+        raise InputError(
+            [f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV"]
+        ) from None
+    except Exception as error:
+        raise InputError([f"{path}: no parquet file ({one_line(str(error), LONGEST_NAME)}); save it again"]) from None
+
+
+def _frame_rows(frame: "pd.DataFrame") -> list[list[str]]:
+    """Header and rows of a frame as fields; missing values are empty."""
+    columns = [map(_field, frame.iloc[:, place].tolist()) for place in range(frame.shape[1])]
+    return [[str(name) for name in frame.columns], *map(list, zip(*columns, strict=True))]
+
+
+def _field(value: Any) -> str:
+    if value is None or value != value:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else Exact(repr(value) if isinstance(value, float) else str(value))
 
 
 def _decoded(path: Path, data: bytes) -> tuple[str, str]:
@@ -373,7 +408,15 @@ def read_sheet(path: Path) -> Sheet:
     Raises InputError where it cannot be read in one way alone, has no rows, has a name twice, or a row has more or fewer fields
     than the header.
     """
-    file = read_table_file(path)
+    return _sheet(path, read_table_file(path))
+
+
+def sheet_of_frame(frame: "pd.DataFrame", path: Path) -> Sheet:
+    """A frame as a table that messages call ``path``. Raises InputError as ``read_sheet``."""
+    return _sheet(path, _table_file(path, _frame_rows(frame), POINT, "", ""))
+
+
+def _sheet(path: Path, file: TableFile) -> Sheet:
     header = [plain_cell(name.strip()) for name in file.header]
     if len(header) == 1 and "|" in header[0]:
         raise InputError([f"{path}: has '|' between its fields; write commas there and points in numbers"])
