@@ -13,7 +13,6 @@ import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -23,9 +22,9 @@ from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, number_list, refuse, validated
-from rbdyn.base.files import Checkpoint, code_version, read_record, run_key, versions, write_json
+from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import finite, plain, save_table
+from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
@@ -40,6 +39,7 @@ from rbdyn.quasistatic.result import (
     tipping,
 )
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
+from rbdyn.result import SavedRecord
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.thermal import first_guess_faults
@@ -78,7 +78,6 @@ SWEEPS: Sheet[Any] = Sheet(
     content="One row per point of `rbdyn ball --sweep` and of the studies over preload, clearance and wear; columns of a double-decker's "
     "rows begin with `inner_row_` and `outer_row_`.",
 )
-FORMAT = "rbdyn.sweep/3"
 # Points of a stored line: writing a line takes as long as solving a few points.
 ROW = 100
 MOST_POINTS = 100_000
@@ -88,8 +87,7 @@ Reporter = Progress | None
 KeyPath = tuple[str | int, ...]
 
 
-@dataclass(frozen=True)
-class SweepResult:
+class SweepResult(SavedRecord, kw_only=True):
     """Equilibria over a grid of scene keys, in the order of ``keys``, the last one running fastest.
 
     ``keys``: values of each key. ``records``: points of the table, each with its keys, its status and, in an equilibrium, its figures
@@ -99,13 +97,18 @@ class SweepResult:
     ``wall_s``: wall time.
     """
 
+    FORMAT = "rbdyn.sweep/3"
+    WHAT = "sweep"
+    status: str = derived(lambda self: self._status())
     keys: dict[str, tuple[float, ...]]
-    records: list[dict[str, Any]]
-    cold: int
-    wall_s: float
+    records: list[dict[str, Any]] = keyed("points")
+    failed: list[dict[str, Any]] = derived(lambda self: self._failed(), "failures")
+    notes: list[dict[str, Any]]
+    wall_s: float = keyed("cost", "wall_s")
+    cold: int = keyed("cost", "cold_starts")
+    versions: dict[str, str] = derived(lambda self: versions())
     scene: dict[str, Any]
-    figures: dict[str, list[Array]] = field(default_factory=dict, repr=False)
-    notes: list[dict[str, Any]] = field(default_factory=list)
+    figures: dict[str, list[Array]] = outside_json(default_factory=dict, repr=False)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -123,8 +126,7 @@ class SweepResult:
         names = dict.fromkeys(name for record in self.records for name in record if name not in (*self.keys, "status"))
         return {name: np.array([_number(record, name) for record in self.records]) for name in names}
 
-    @property
-    def status(self) -> str:
+    def _status(self) -> str:
         """ "ok", or how many points failed."""
         count = sum(status != OK for status in self.statuses)
         return OK if count == 0 else f"{count} of {counted(len(self.statuses), 'point')} failed"
@@ -140,6 +142,18 @@ class SweepResult:
             if status != OK:
                 causes.setdefault(status.partition(":")[0], []).append(place)
         return causes
+
+    def _failed(self) -> list[dict[str, Any]]:
+        """Causes with the number of their points, and the first of these."""
+        return [
+            {
+                "cause": cause,
+                "points": len(places),
+                "first": self.key_values(places[0]),
+                "status": self.statuses[places[0]],
+            }
+            for cause, places in self.failures.items()
+        ]
 
     def key_values(self, place: int) -> dict[str, float]:
         """Values of the keys at a point."""
@@ -200,45 +214,17 @@ class SweepResult:
         """A record a point, with None for infinite and missing figures."""
         return [dict(record) for record in self.records]
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form, with the table by points and without references to this object."""
-        failures = [
-            {
-                "cause": cause,
-                "points": len(places),
-                "first": self.key_values(places[0]),
-                "status": self.statuses[places[0]],
-            }
-            for cause, places in self.failures.items()
-        ]
-        return {
-            "format": FORMAT,
-            "status": self.status,
-            "keys": {key: list(values) for key, values in self.keys.items()},
-            "points": self.points(),
-            "failures": failures,
-            "notes": plain(self.notes),
-            "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
-            "versions": versions(),
-            "scene": plain(self.scene),
-        }
-
     def save(self, path: Path | str) -> None:
         """Write the table as CSV to a path that ends in ".csv", else all as JSON."""
         if str(path).endswith(".csv"):
             save_table(self.table(), path, "%.9g")
         else:
-            write_json(path, self.as_dict())
+            super().save(path)
 
     @classmethod
-    def load(cls, path: Path | str) -> "SweepResult":
-        """Read a sweep saved as JSON. Raises InputError when the file is missing or no sweep."""
-        return read_record(path, FORMAT, "sweep", cls._of_json)
-
-    @classmethod
-    def _of_json(cls, data: dict[str, Any]) -> "SweepResult":
-        keys, cost = {key: tuple(values) for key, values in data["keys"].items()}, data["cost"]
-        found = cls(keys, data["points"], cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        found = super().from_dict(data)
         # What is no table of points fails here.
         _ = found.columns, [found.key_values(place) for place in range(len(found.statuses))]
         return found
@@ -327,7 +313,8 @@ def result_of(
             topics.setdefault(word, {**note.as_dict(), "about": word, "points": []})["points"].append(place)
     balls = {name: [point.balls[name] for point in points] for name in points[0].balls}
     cold = sum(point.cold for point in points)
-    return SweepResult(keys, records, cold, wall_s, scene, balls, list(topics.values()))
+    notes = list(topics.values())
+    return SweepResult(keys=keys, records=records, notes=notes, wall_s=wall_s, cold=cold, scene=scene, figures=balls)
 
 
 def _walk(

@@ -16,7 +16,6 @@ from doe.study_file.table import read_table as read_runs_table
 from doe.workflow.design import design_of
 from doe.workflow.problem import Problem
 from doe.workflow.whole import check_study
-from rbdyn.quasistatic.sweep import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep import SweepResult
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -52,7 +51,7 @@ def folder(tmp_path_factory) -> Path:
         "notes": [{"level": "note", "code": "remark", "text": "none"}], "versions": {"rbdyn": "1"}, "scene": Scene.load(EXAMPLES / "cylindrical_roller.toml").model_dump(mode="json"),
     }  # fmt: skip
     sweep = {
-        "format": SWEEP_FORMAT, "keys": {"operation.axial_load_N": [1.0, 2.0]}, "cost": {"wall_s": 1.0, "cold_starts": 1},
+        "format": SweepResult.FORMAT, "keys": {"operation.axial_load_N": [1.0, 2.0]}, "cost": {"wall_s": 1.0, "cold_starts": 1},
         "points": [{"operation.axial_load_N": x, "status": "ok", "x_mm": 0.1} for x in (1.0, 2.0)], "scene": {}, "notes": [],
     }  # fmt: skip
     for name, record in (("result", result), ("sweep", sweep)):
