@@ -1,4 +1,4 @@
-"""``doe new``: a study of a scene, with ISO 286-1 tolerances of the parts that make its clearances, and the chains they close."""
+"""``doe new``."""
 
 import json
 import math
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from doe.workflow.parts import DIGITS, ClearanceParts, Part
 from rbdyn.base.command import (
     ForceFile,
     Json,
@@ -25,11 +24,11 @@ from rbdyn.base.command import (
     plain_number,
     valued,
 )
-from rbdyn.base.faults import InputError, MethodError
-from rbdyn.mounting import CLEARANCES
-from rbdyn.properties.tolerances import grade_tolerances
+from rbdyn.base.faults import MethodError
+from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
+    from doe.commands.new_parts import Manufacture
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
@@ -147,7 +146,7 @@ def new(
 def limits_of(texts: Sequence[str]) -> Limits:
     """Limits by response. Raises InputError with all faults at once."""
     from doe.clearance import responses_of
-    from rbdyn.base.faults import LONGEST_NAME, MethodError, one_line, refuse
+    from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
     from rbdyn.base.words import quantity
 
     limits: Limits = {}
@@ -203,6 +202,8 @@ def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: b
     from doe.workflow.parts import clearance_parts
 
     groups = clearance_parts(scene)
+    from doe.commands.new_parts import chain_text, manufacture_of, tolerances_text
+
     manufactures = {factor.name: manufacture_of(groups[factor.name], factor.step) for factor in factors}
     closing = [chain_text(groups[name], manufacture, tolerances) for name, manufacture in manufactures.items()]
     return {
@@ -274,86 +275,3 @@ def _moved(factors: list[Factor], before: "Problem", after: "Problem") -> list[F
 
 def _assigned(values: Mapping[str, float]) -> list[str]:
     return [f"{name} = {value!r}" for name, value in values.items()]
-
-
-# Half widths of rollers of one diameter [mm], the usual one first.
-ROLLER_HALF_WIDTHS = (0.001, 0.0005)
-
-# Of a study that derives its tolerances, whose chains are made to these.
-DERIVED = "would state it. Without: as [tolerances] derives, else as the factor states"
-MARK = "estimated = true # until a drawing states it: parts and reports mark it\n"
-
-
-class Manufacture(NamedTuple):
-    """How the parts of a clearance are made: half width of the clearance and of rollers [mm], and the rule in words."""
-
-    half_width: float
-    rollers: float
-    rule: str
-
-
-def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
-    """The usual grade of the parts, or the next finer one that leaves the clearance within a step [mm] of the design.
-
-    Raises InputError for a part outside the tables of ISO 286.
-    """
-    widths = [(part, _grades(group, part)) for part in group.parts if not part.graded]
-    rollers = sum(abs(part.coefficient) for part in group.parts if part.graded)
-    names = list(widths[0][1])
-    finer = names[names.index(group.grade) :: -1]
-    candidates = [
-        _by_grade(group, grade, half, widths, rollers, finer[0])
-        for half in (ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1])
-        for grade in finer
-    ]
-    return next((candidate for candidate in candidates if candidate.half_width <= step), candidates[-1])
-
-
-def _by_grade(
-    group: ClearanceParts,
-    grade: str,
-    half: float,
-    widths: list[tuple[Part, dict[str, float]]],
-    rollers: float,
-    usual: str,
-) -> Manufacture:
-    whole = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
-    sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
-    graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
-    why = "" if grade == usual else f"; {usual} would be wider than a step"
-    return Manufacture(round(whole, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
-
-
-def _grades(group: ClearanceParts, part: Part) -> dict[str, float]:
-    try:
-        return grade_tolerances(part.nominal)
-    except MethodError as error:
-        why = f"{part.name} of {part.nominal:g} mm {error}"
-        raise InputError([f"{group.factor}: {why}; leave --tolerances and --chains out"]) from None
-
-
-def _template(name: str) -> str:
-    """A part of the template of a study."""
-    return Path(__file__).with_name(f"new_study_{name}.toml").read_text(encoding="utf-8")
-
-
-def tolerances_text() -> str:
-    """The tables of a study that derive its tolerances."""
-    return _template("tolerances")
-
-
-def chain_text(group: ClearanceParts, manufacture: Manufacture, derived: bool) -> str:
-    """A [[chain]] of a study: its links resolve to the clearance of the scene.
-
-    ``derived``: the study derives the widest tolerances, to which the parts are made; so the chain states none itself.
-    """
-    rule, stated = (DERIVED, "# ") if derived else (manufacture.rule, "")
-    head = _template("chain").format(**group._asdict(), half_width=manufacture.half_width, rule=rule, stated=stated)
-    below = {"half_width": manufacture.rollers, "half_width_below": -manufacture.rollers}
-    links = [
-        _template("roller" if part.graded else "part").format(
-            **part._asdict(), **below, mark=MARK if part.estimated else ""
-        )
-        for part in group.parts
-    ]
-    return "".join([head, *links])

@@ -3,7 +3,7 @@
 - ``ClosingFunction``: value and sensitivities; ``interval``: least and greatest value over the limits of the parts
 - ``evaluate``: arithmetic on other links, written as text. It is safe, for it accepts only numbers, names and a few functions.
 - ``press_fit_factor``: change of a raceway by a press fit. Rings, shafts and housings are thick cylinders of one length in
-  plane stress (Lamé), as in `rbdyn.mounting`.
+  plane stress (Lamé), as in `rbdyn.mounting.rings`.
 
 In a linear chain the worst case and the root sum square are sums. Otherwise the worst case is the best of all corners of the
 limits and of points between them, refined where it is no corner. The root sum square uses the sensitivities at
@@ -25,7 +25,7 @@ import numpy as np
 from doe.dimension_chain.links import DIGITS, Interval, Link, Mode, Part, PressFit
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
-from rbdyn.mounting import Ring, interface_pressure
+from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 
 Operator = Callable[[Any, Any], Any]

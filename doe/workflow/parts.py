@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from doe.dimension_chain import Chain, chain_from, grade_tolerances
-from doe.dimension_chain.allocation import Allocation, grade_words
+from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError
+from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import Part as ChainPart
 from doe.study_file.sections import StudyChain
 from doe.workflow.problem import Problem

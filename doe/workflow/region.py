@@ -24,7 +24,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
 from rbdyn.base.words import counted, quantity
-from rbdyn.mounting import NEARLY_K, RunningClearance
+from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C

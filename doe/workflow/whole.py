@@ -56,8 +56,8 @@ from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
+from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
-from rbdyn.mounting import REPORTED
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry

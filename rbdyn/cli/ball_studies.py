@@ -16,7 +16,7 @@ from rbdyn.base.notes import status_notes
 from rbdyn.base.records import plain, save_table
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, label, range_ends, shown, with_error
-from rbdyn.mounting import other_ranges
+from rbdyn.clearances import other_ranges
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import (
     RACES,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, range_ends, shown, value_alone, with_error
+from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
-from rbdyn.mounting import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet
 from rbdyn.scene import Scene
 

@@ -1,9 +1,9 @@
 """Contact laws that rollers and balls share.
 
-- ``hertz_line``: load of a line contact against approach (Palmgren and other laws), whole, in slices, on an elastic bar; profiles of
-  rollers
+- ``hertz_line``: load of a line contact against approach (Palmgren and other laws), whole, in slices, on an elastic bar
 - ``point_contact``: load of a ball against approach, its ellipse and pressure (exact Hertz), and its oil film
 - ``cage_bar``: stiffness of a cross-bar of a window cage, in series with the contact on it
+- ``profile``: roller profiles as drops over the length
 - ``damping``: normal damping of a closing or opening contact; restitution
 - ``traction``: friction coefficient against sliding speed and load, as compiled
 - ``tangential``: the elasticity of the bodies, through which traction follows that coefficient

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.contact.hertz_line import iso_16281, slice_centres
+from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.dynamics.parameters.model import roller_relief
 from rbdyn.life import turning_rings
 from rbdyn.life.duty import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life
@@ -68,6 +68,8 @@ def _relief(scene: Scene, race: str, angle: Array) -> Array:
     drop = roller_relief(scene, slices)[None]
     if drawing.tilt == 0.0:
         return drop
+    from rbdyn.contact.profile import slice_centres
+
     share = drawing.inner_tilt_share if race == "inner" else 1.0 - drawing.inner_tilt_share
     tilt = drawing.tilt * share * np.cos(angle - drawing.tilt_direction)
     return np.asarray(drop - tilt[:, None] * slice_centres(slices, drawing.effective_length))

@@ -13,6 +13,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
+from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces.state import EXPONENTS, NUMBER, PEAK_POWERS, POCKET_CONTACT_LOAD, POCKET_LOAD, SQUARES
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
@@ -25,7 +26,6 @@ from rbdyn.losses import (
     POWER_TERMS,
     SHAFT,
 )
-from rbdyn.mounting import REPORTED
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene.laws import SLOWEST_CAGE
 

@@ -35,7 +35,7 @@ from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.extremes import return_force_notes
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
-from rbdyn.mounting import OperatingClearance
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
 

@@ -16,6 +16,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
+from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
 from rbdyn.dynamics.parameters.start import (
@@ -31,7 +32,6 @@ from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.temperatures import Balance, Balanced
-from rbdyn.mounting import DIFFERENCE
 from rbdyn.result import LeastClearance, Quantity, SimulationResult, StartMoment, StartResult
 from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import QUANTILES, STARTING, input_sets, varied_inputs

@@ -18,7 +18,7 @@ from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import counted
 from rbdyn.life.balls import FASTEST
-from rbdyn.mounting import OperatingClearance
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_record, solve_double_decker
 from rbdyn.quasistatic.result import (

@@ -28,7 +28,7 @@ from rbdyn.base.faults import RPM, MethodError
 from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
-from rbdyn.mounting import GrooveChange
+from rbdyn.mounting.rings import GrooveChange
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise

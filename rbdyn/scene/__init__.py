@@ -70,7 +70,8 @@ from rbdyn.scene.uncertain import Calibrate, Uncertain
 from rbdyn.verdict.orbits import SAMPLES_A_TURN
 
 if TYPE_CHECKING:
-    from rbdyn.mounting import CageClearances, MountedClearance, OperatingClearance, RunningClearance
+    from rbdyn.mounting.cage import CageClearances, OperatingClearance, RunningClearance
+    from rbdyn.mounting.rings import MountedClearance
     from rbdyn.scene.geometry import Geometry
 
 # Slices where a profile or a tilt needs them (ISO/TS 16281 asks for at least 30).
@@ -269,7 +270,7 @@ class Scene(SceneFile):
         By name: "radial", "guide", "pocket", and under guidance by the rollers "lip": what the lips allow less what the circle of
         pockets grows. Those between parts that the model's laws leave out are none.
         """
-        from rbdyn.mounting import OperatingClearance, RunningClearance
+        from rbdyn.mounting.cage import OperatingClearance, RunningClearance
 
         bearing, laws, cage = self.bearing, self.model, self._cage_clearances(mounting)
         radial, pitch = self._mounted_clearance(mounting), bearing.pitch_diameter
@@ -385,7 +386,7 @@ class Scene(SceneFile):
     def clearances(self) -> "dict[str, OperatingClearance | None]":
         """Diametral clearances [m] "radial", "guide" (None where the rollers guide the cage) and "pocket", on the drawing and in
         operation."""
-        from rbdyn.mounting import OperatingClearance
+        from rbdyn.mounting.cage import OperatingClearance
 
         radial, cage = self.mounted_clearance, self.cage_clearances
         if radial is None or cage is None:

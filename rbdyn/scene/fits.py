@@ -4,19 +4,15 @@ from typing import Any, NamedTuple
 
 from rbdyn.base.faults import RPM
 from rbdyn.base.records import finite
-from rbdyn.mounting import (
+from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
+from rbdyn.mounting.rings import (
     UNCHANGED,
-    CageBody,
-    CageClearances,
     GrooveChange,
     MountedClearance,
     MountedRings,
     Ring,
     groove_change,
-    guide_clearance,
     mounted_clearance,
-    pocket_circle_shift,
-    pocket_clearance,
     printed_growth,
 )
 from rbdyn.properties.materials import Material

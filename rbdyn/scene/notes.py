@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
 from rbdyn.life.rollers import REFERENCE_SPEED
-from rbdyn.mounting import OperatingClearance
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.properties.catalogue import Designation, Envelope, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage

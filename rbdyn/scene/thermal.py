@@ -16,7 +16,7 @@ from rbdyn.scene.operation import Mounting
 from rbdyn.scene.start import Start
 
 if TYPE_CHECKING:
-    from rbdyn.mounting import MountedRings
+    from rbdyn.mounting.rings import MountedRings
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 

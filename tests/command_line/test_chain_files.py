@@ -17,7 +17,7 @@ from doe.workflow.problem import Problem
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail
 from rbdyn.base.faults import InputError, read_toml
-from rbdyn.mounting import MountedRings, Ring, mounted_clearance
+from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
 from rbdyn.properties.catalogue import radial_clearance
 from rbdyn.properties.materials import Material
 

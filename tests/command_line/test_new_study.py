@@ -10,7 +10,7 @@ from doe_command import doe
 from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
-from doe.commands.new import manufacture_of
+from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
 from doe.study_file.sections import StudyChain
 from doe.workflow.parts import clearance_parts

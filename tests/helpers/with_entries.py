@@ -110,8 +110,8 @@ def clearance() -> dict[str, bool]:
     from doe.commands.new import _factors
     from doe.report.sections.answer import MEANINGS
     from doe.workflow.whole import NAMES
+    from rbdyn.clearances import other_ranges
     from rbdyn.cli.duty import CLEARANCES
-    from rbdyn.mounting import other_ranges
 
     tables = {"bearing": {"axial_clearance_mm": 0.2}, "cage": {"guidance": "outer"}}
     return {
@@ -134,7 +134,7 @@ def main(kind: str, folder: Path) -> None:
         add("rbdyn.losses", {'    Loss("spin_windage"': LOSS, "SHAFT, LOAD": "CHURNING, "})
         found = loss()
     else:
-        add("rbdyn.mounting", {'    Clearance("lip"': CLEARANCE})
+        add("rbdyn.clearances", {'    Clearance("lip"': CLEARANCE})
         found = clearance()
     print(json.dumps(found))
 

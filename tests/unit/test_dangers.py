@@ -23,7 +23,7 @@ from rbdyn.base.notes import CODES, Level, Note, condensed, ranked, status_notes
 from rbdyn.cli.app import app
 from rbdyn.cli.manual.page import code_table
 from rbdyn.contact.hertz_line import BALLS, ROLLERS, SHAKEDOWN, pressure_notes
-from rbdyn.mounting import OperatingClearance
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import clearance_notes, speed_notes

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from test_life import static_loads as by_standard
 
 from rbdyn.base.faults import MethodError
-from rbdyn.contact.hertz_line import iso_16281, logarithmic_relief, slice_centres
+from rbdyn.contact.hertz_line import iso_16281
+from rbdyn.contact.profile import logarithmic_relief, slice_centres
 from rbdyn.dynamics.duty import roller_duty_life, static_life
 from rbdyn.life import Life
 from rbdyn.life.duty import BALL_EXPONENT, ROLLER_EXPONENT, LoadCase, duty_life, equivalent_load

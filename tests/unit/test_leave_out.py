@@ -95,7 +95,7 @@ STATE = {
 }
 # Modules that an option loads and the plain scene does not.
 CLOCK = ("rbdyn.dynamics.forces.schedule",)
-SLICES = ("rbdyn.contact.hertz_line", "rbdyn.dynamics.forces.observe")
+SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.forces.observe")
 MODULES = {
     "logarithmic profile, 31 slices": SLICES,
     "tilt, 31 slices": SLICES,
@@ -109,7 +109,7 @@ NOT_NEEDED = (
     "pandas", "matplotlib", "pymoo", "sklearn", "doe", "rich",
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
     "rbdyn.accuracy", "rbdyn.accuracy.variants", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
-    "rbdyn.plots", "rbdyn.scene.fits", "rbdyn.mounting", "rbdyn.dynamics.motion", "rbdyn.dynamics.forces.observe",
+    "rbdyn.plots", "rbdyn.scene.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion", "rbdyn.dynamics.forces.observe",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 

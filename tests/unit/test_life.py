@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from rbdyn.contact.hertz_line import logarithmic_relief, slice_centres
+from rbdyn.contact.profile import logarithmic_relief, slice_centres
 from rbdyn.life import rollers as life
 
 GAMMA = 9.0 / 43.5

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rbdyn.contact import hertz_line
-from rbdyn.contact.hertz_line import crowned_relief, logarithmic_relief, slice_centres
+from rbdyn.contact.profile import crowned_relief, logarithmic_relief, slice_centres
 from rbdyn.properties.materials import MATERIALS, Material, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from rbdyn.contact import hertz_line
+from rbdyn.contact import profile
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
@@ -20,7 +20,7 @@ LENGTH = 12e-3
 @pytest.mark.parametrize("slices", [1, 2, 31, 200])
 def test_unit_slice_centres(slices):
     """Unit: centres are symmetric, evenly spaced, half a slice from the ends."""
-    x = hertz_line.slice_centres(slices, LENGTH)
+    x = profile.slice_centres(slices, LENGTH)
     assert x == pytest.approx(-x[::-1], abs=1e-18)
     assert x[0] == pytest.approx(-0.5 * LENGTH * (1.0 - 1.0 / slices), abs=1e-18)
     assert np.diff(x) == pytest.approx(np.full(slices - 1, LENGTH / slices), rel=1e-12)
@@ -30,8 +30,8 @@ def test_unit_logarithmic_relief():
     """Unit: 0.00035 D ln[1/(1 - (2x/l)^2)] for short rollers; a flat middle and 0.0005 D for long ones."""
     x = np.array([-1.2e-3, 0.0, 0.7e-3, 1.7e-3])
     expected = 0.00035 * 9e-3 * np.log(1.0 / (1.0 - (2.0 * x / 3.5e-3) ** 2))
-    assert hertz_line.logarithmic_relief(x, 9e-3, 3.5e-3) == pytest.approx(expected, rel=1e-12)
-    long = hertz_line.logarithmic_relief(np.array([0.0, 2.4e-3, 10e-3]), 9e-3, 27.5e-3)
+    assert profile.logarithmic_relief(x, 9e-3, 3.5e-3) == pytest.approx(expected, rel=1e-12)
+    long = profile.logarithmic_relief(np.array([0.0, 2.4e-3, 10e-3]), 9e-3, 27.5e-3)
     assert long[:2].tolist() == [0.0, 0.0]  # the flat is 27.5 - 22.5 = 5 mm long
     inside = (2.0 * 10e-3 - 5e-3) / 22.5e-3
     assert long[2] == pytest.approx(-0.0005 * 9e-3 * math.log(1.0 - inside**2), rel=1e-12)
@@ -42,20 +42,20 @@ def test_unit_logarithmic_relief():
 def test_unit_crown_is_a_circle(radius, share):
     """Unit: (R - drop)^2 + x^2 = R^2 to round-off, x^2/(2R) for flat crowns, even in x."""
     x = share * 5e-3
-    drop = float(hertz_line.crowned_relief(np.array([x]), radius)[0])
+    drop = float(profile.crowned_relief(np.array([x]), radius)[0])
     # The circle without its cancelling term: 2 R drop = x^2 + drop^2.
     assert 2.0 * radius * drop == pytest.approx(x**2 + drop**2, rel=1e-14, abs=1e-300)
-    assert drop == float(hertz_line.crowned_relief(np.array([-x]), radius)[0])
+    assert drop == float(profile.crowned_relief(np.array([-x]), radius)[0])
     # The next term of the series is x^4/(8 R^3).
     assert drop == pytest.approx(x**2 / (2.0 * radius), rel=0.3 * (x / radius) ** 2 + 1e-15, abs=1e-300)
 
 
 def test_unit_crown_must_span_the_roller():
     """Unit: a circle that does not reach the end of the roller is refused."""
-    assert hertz_line.crowned_relief(np.array([5e-3]), 5e-3)[0] == pytest.approx(5e-3)
+    assert profile.crowned_relief(np.array([5e-3]), 5e-3)[0] == pytest.approx(5e-3)
     for radius in (4.9e-3, 0.0, -1.0, math.nan):
         with pytest.raises(ValueError, match="crown"):
-            hertz_line.crowned_relief(np.array([5e-3]), radius)
+            profile.crowned_relief(np.array([5e-3]), radius)
 
 
 def displacement(x, half_width, load):
@@ -83,7 +83,7 @@ def test_literature_lundberg_presses_uniformly(load):
     for share in (0.2, 0.5, 0.8, 0.95):
         x = share * 0.5 * LENGTH
         needed = displacement(0.0, half_width, load) - displacement(x, half_width, load)
-        drop = float(hertz_line.lundberg_relief(np.array([x]), LENGTH, load, STEEL)[0])
+        drop = float(profile.lundberg_relief(np.array([x]), LENGTH, load, STEEL)[0])
         scale = 2.0 * load / (math.pi * LENGTH * STEEL)
         assert drop == pytest.approx(needed, abs=scale * (half_width / (0.5 * LENGTH - x)) ** 2)
 
@@ -91,22 +91,22 @@ def test_literature_lundberg_presses_uniformly(load):
 def test_unit_lundberg_scales():
     """Unit: proportional to the load, nil in the middle, infinite at the ends, even."""
     x = np.array([-0.5, -0.3, 0.0, 0.3, 0.5]) * LENGTH
-    once, twice = (hertz_line.lundberg_relief(x, LENGTH, load, STEEL) for load in (1e3, 2e3))
+    once, twice = (profile.lundberg_relief(x, LENGTH, load, STEEL) for load in (1e3, 2e3))
     assert twice[1:4] == pytest.approx(2.0 * once[1:4], rel=1e-14)
     assert once[2] == 0.0 and math.isinf(once[0]) and math.isinf(once[4]) and once[1] == once[3]
     with pytest.raises(ValueError, match="off the contact"):
-        hertz_line.lundberg_relief(np.array([0.51 * LENGTH]), LENGTH, 1e3, STEEL)
+        profile.lundberg_relief(np.array([0.51 * LENGTH]), LENGTH, 1e3, STEEL)
 
 
 def test_unit_table_relief():
     """Unit: straight lines between points; one half is mirrored; a whole table may be lopsided."""
     half = ((0.0, 0.0), (2e-3, 0.0), (6e-3, 8e-6))
     x = np.array([-6e-3, -4e-3, 0.0, 1e-3, 3e-3, 6e-3])
-    assert hertz_line.table_relief(x, half) == pytest.approx([8e-6, 4e-6, 0.0, 0.0, 2e-6, 8e-6], rel=1e-12)
+    assert profile.table_relief(x, half) == pytest.approx([8e-6, 4e-6, 0.0, 0.0, 2e-6, 8e-6], rel=1e-12)
     lopsided = ((-6e-3, 12e-6), (0.0, 0.0), (6e-3, 6e-6))
-    assert hertz_line.table_relief(x, lopsided) == pytest.approx([12e-6, 8e-6, 0.0, 1e-6, 3e-6, 6e-6], rel=1e-12)
+    assert profile.table_relief(x, lopsided) == pytest.approx([12e-6, 8e-6, 0.0, 1e-6, 3e-6, 6e-6], rel=1e-12)
     # A half that starts off the middle is level there.
-    assert hertz_line.table_relief(np.array([0.0]), ((1e-3, 2e-6), (6e-3, 9e-6)))[0] == 2e-6
+    assert profile.table_relief(np.array([0.0]), ((1e-3, 2e-6), (6e-3, 9e-6)))[0] == 2e-6
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_unit_table_relief():
 def test_unit_bad_tables_are_refused(points, message):
     """Unit: what is no profile of this roller is refused with the reason."""
     with pytest.raises(ValueError, match=message):
-        hertz_line.table_relief(np.array([-5e-3, 5e-3]), points)
+        profile.table_relief(np.array([-5e-3, 5e-3]), points)
 
 
 @given(share=st.floats(-0.999, 0.999), other=st.floats(-0.999, 0.999))
@@ -134,9 +134,9 @@ def test_invariant_drops_grow_outward(share, other):
     near, far = sorted((abs(share), abs(other)))
     x = np.array([near, far]) * 0.5 * LENGTH
     for drop in (
-        hertz_line.logarithmic_relief(x, 9e-3, LENGTH),
-        hertz_line.logarithmic_relief(x, 2e-3, LENGTH),
-        hertz_line.crowned_relief(x, 1.0),
-        hertz_line.lundberg_relief(x, LENGTH, 1e3, STEEL),
+        profile.logarithmic_relief(x, 9e-3, LENGTH),
+        profile.logarithmic_relief(x, 2e-3, LENGTH),
+        profile.crowned_relief(x, 1.0),
+        profile.lundberg_relief(x, LENGTH, 1e3, STEEL),
     ):
         assert 0.0 <= drop[0] <= drop[1]

@@ -26,7 +26,7 @@ from doe.workflow.runs import with_remaining
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulation
-from rbdyn.mounting import NEARLY_K, OperatingClearance, RunningClearance
+from rbdyn.mounting.cage import NEARLY_K, OperatingClearance, RunningClearance
 from rbdyn.result import Quantity
 from rbdyn.scene import DrawnScene, Scene
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_bvp
 
 from rbdyn.base.faults import InputError, validated
-from rbdyn.mounting import MountedRings, Ring, interface_pressure, mounted_clearance
+from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted_clearance
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials, material_of

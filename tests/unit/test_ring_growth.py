@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.base.faults import InputError
-from rbdyn.mounting import Ring, groove_change, interface_pressure, loosening_speed, printed_growth
+from rbdyn.mounting.rings import Ring, groove_change, interface_pressure, loosening_speed, printed_growth
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene.fits import layer_changes, mounted_of, row_change
 

@@ -17,7 +17,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics import start as start_module
 from rbdyn.dynamics.parameters.start import ROUGHNESS, capacities, clearances_at, seats_of
-from rbdyn.mounting import Ring, interface_pressure
+from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 from rbdyn.result import SimulationResult, StartResult
 from rbdyn.scene.thermal import Temperatures, at_temperatures, part_temperatures

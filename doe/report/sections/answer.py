@@ -22,7 +22,7 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Role, Section, Table
 from rbdyn.base.identity import identity_line
 from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
-from rbdyn.mounting import CLEARANCES, other_ranges
+from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
 # Meaning of a clearance of the scene, by its key.

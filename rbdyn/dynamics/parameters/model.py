@@ -344,7 +344,7 @@ def race_contact_law(scene: Scene, which: str) -> Any:
         whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
     if scene.slices == 1:
         return whole
-    from rbdyn.contact.hertz_line import slice_centres
+    from rbdyn.contact.profile import slice_centres
 
     share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
     return slice_contact(
@@ -360,17 +360,17 @@ def roller_relief(scene: Scene, slices: int) -> Array:
     """Profile drop of the roller at its slice centres [m]."""
     if scene.bearing.roller_profile == "cylinder":
         return np.zeros(slices)
-    from rbdyn.contact import hertz_line
+    from rbdyn.contact import profile
 
     drawing, length = scene.bearing, scene.bearing.effective_length
-    position = hertz_line.slice_centres(slices, length)
+    position = profile.slice_centres(slices, length)
     if drawing.crown_radius is not None:
-        return hertz_line.crowned_relief(position, drawing.crown_radius)
+        return profile.crowned_relief(position, drawing.crown_radius)
     if drawing.lundberg_load_N is not None:
-        return hertz_line.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
+        return profile.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
     if drawing.profile_table is not None:
-        return hertz_line.table_relief(position, drawing.profile_table)
-    return hertz_line.logarithmic_relief(position, drawing.roller_diameter, length)
+        return profile.table_relief(position, drawing.profile_table)
+    return profile.logarithmic_relief(position, drawing.roller_diameter, length)
 
 
 def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:

@@ -9,7 +9,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM
 from rbdyn.dynamics.parameters.heat import cavity_of, ring_width
-from rbdyn.mounting import MountedRings, Ring, overlap
+from rbdyn.mounting.rings import MountedRings, Ring, overlap
 from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
 from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures

@@ -8,7 +8,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.contact.point_contact import PointContact, ball_on_race
-from rbdyn.mounting import UNCHANGED, GrooveChange
+from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.ring import Row, at_rest

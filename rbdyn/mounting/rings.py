@@ -1,8 +1,4 @@
-"""Clearances and what mounting, temperature and rotation make of them.
-
-``CLEARANCES`` has those of a roller bearing, each once: key of the drawing, words, and the step by which a study varies it.
-
-Growth of rings and cage by fits, rotation and temperature, and its effect on clearances and on the grooves of balls.
+"""Growth of rings by fits, rotation and temperature, and its effect on clearances and on the grooves of balls.
 
 Radii are those of the drawing; growths are radial, clearances and interferences diametral [m].
 
@@ -14,60 +10,16 @@ Hu et al. (paper on the contact angle of a double-decker bearing, eq 4) use a fr
 *pitch* diameter for that of the race, and the factor 1/(32 E) is missing in print. ``printed_growth`` keeps that form for
 comparison. It overestimates the growth, since pitch circles lie outside inner races. It has no growth of a bore either: their
 eq 18 lacks that of the middle ring's inner race.
-
-A cage has clearances in its guide, its pockets and at their lips. The land of a guiding ring has the displacement of the ring's
-free edge. The cage grows freely by temperature, and as a thin hoop by rotation.
 """
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.faults import MethodError
-from rbdyn.base.words import range_ends
 from rbdyn.properties.materials import Material
-
-
-class Clearance(NamedTuple):
-    """A clearance: its name, the key of a scene with its value on the drawing, and what it lies between.
-
-    ``step``: of a study, as a share of its value: the axial runs of a rotatable design lie 1.7 steps out, and none may touch zero.
-    ``words``: those of its changes in operation; empty for one whose changes no result reports.
-    """
-
-    name: str
-    key: str
-    meaning: str
-    step: float
-    words: str = ""
-
-
-CLEARANCES = (
-    Clearance("radial", "bearing.radial_clearance_mm", "diametral in the bearing", 0.25, "clearance"),
-    Clearance("guide", "cage.guide_clearance_mm", "diametral between cage and guide", 0.3, "guide clearance"),
-    Clearance(
-        "pocket", "cage.pocket_clearance_mm", "width of the pocket less the roller diameter", 0.2, "pocket clearance"
-    ),
-    Clearance("lip", "cage.pocket_radial_clearance_mm", "radial at the lips of the pocket", 0.25),
-)
-# Those whose changes in operation a result reports.
-REPORTED = tuple(clearance for clearance in CLEARANCES if clearance.words)
-DIFFERENCE = "inner_minus_outer_K"
-# Ranges of a heat balance beside those of its temperatures, in words and with their unit.
-OTHER_RANGES = {DIFFERENCE: ("inner ring over outer ring", "K")} | {
-    f"{clearance.name}_um": (clearance.words, "µm") for clearance in REPORTED
-}
-
-
-def other_ranges(ranges: Mapping[str, Sequence[float]]) -> str:
-    """What the inputs of a heat balance leave open of the difference of the rings and of the clearances in operation."""
-    parts = [
-        f"{words} {range_ends(ranges[name])} {unit}" for name, (words, unit) in OTHER_RANGES.items() if name in ranges
-    ]
-    return f"over these inputs (90 %): {', '.join(parts)}"
 
 
 @dataclass(frozen=True)
@@ -296,132 +248,3 @@ def groove_change(
         outer_heat = outer.thermal_growth(outer_radius)
         outer_centre = outer.growth(outer.inner_radius, outside=outer_pressure) - outer_heat * radially
     return GrooveChange(inner_centre - outer_centre, inner_heat - ball, outer_heat - ball)
-
-
-# Sign of the effect of the guiding ring's growth on the clearance; the cage has the opposite sign.
-SIDES = {"outer": 1.0, "inner": -1.0}
-
-
-class OperatingClearance(NamedTuple):
-    """A clearance on the drawing and its changes by fit, temperature and rotation [m], negative for a reduction."""
-
-    drawn: float
-    fit: float = 0.0
-    temperature: float = 0.0
-    rotation: float = 0.0
-
-    @property
-    def operating(self) -> float:
-        """The clearance in operation [m]."""
-        return self.drawn + self.fit + self.temperature + self.rotation
-
-
-# Temperature difference between two parts [K] that no drawing and no heat balance excludes: balances leave 5 K and more open, and
-# an inner ring that warms first is as much ahead of its housing for minutes. A clearance that it would use up is nearly lost.
-NEARLY_K = 5.0
-
-
-class RunningClearance(NamedTuple):
-    """A clearance in operation between two parts, and how little of it may be left, diametral [m].
-
-    ``key``: of its value on the drawing. ``touching``: at or below it the parts seize; minus infinity for one that may be a
-    preload. ``growth``: by which it would shrink, a kelvin of difference between its parts [m/K].
-    """
-
-    key: str
-    play: OperatingClearance
-    touching: float
-    growth: float
-
-    @property
-    def seizes(self) -> bool:
-        """Whether the parts seize."""
-        return self.play.operating <= self.touching
-
-    @property
-    def kelvins_left(self) -> float:
-        """Further difference of temperatures between the parts after which they touch [K]."""
-        return (self.play.operating - max(self.touching, 0.0)) / self.growth
-
-    @property
-    def floor(self) -> float:
-        """Clearance in operation below which it is nearly lost: parts `NEARLY_K` farther apart in temperature would touch [m]."""
-        return max(self.touching, 0.0) + NEARLY_K * self.growth
-
-
-class CageClearances(NamedTuple):
-    """Clearances of a cage [m]: diametral in its guide (None where no ring guides it), in its pockets, at their lips.
-
-    ``lip`` is None except under guidance by the rollers. ``shift``: radial growth of the circle of pocket centres relative to
-    that of the rollers [m].
-    """
-
-    guide: OperatingClearance | None
-    pocket: OperatingClearance
-    lip: OperatingClearance | None
-    shift: float
-
-
-class CageBody(NamedTuple):
-    """A cage as a free hoop.
-
-    ``modulus_share``: effective modulus of a hoop with pockets over that of the material. ``temperature_rise``: above the
-    drawing [K]. ``speed`` [rad/s].
-    """
-
-    material: Material
-    modulus_share: float
-    temperature_rise: float
-    speed: float
-
-    def thermal_growth(self, size: float) -> float:
-        """Growth of a length, radial or along the circumference, by free expansion [m]."""
-        return self.material.thermal_expansion * self.temperature_rise * size
-
-    def rotation_growth(self, radius: float) -> float:
-        """Radial growth at ``radius`` by rotation [m]: rho w^2 r^3/E of a thin hoop, whose stress is rho w^2 r^2.
-
-        A ring of wall thickness t differs by a share of about t/r.
-        """
-        modulus = self.modulus_share * self.material.elastic_modulus
-        return self.material.density * self.speed**2 * radius**3 / modulus
-
-
-def guide_clearance(
-    clearance: float, land_radius: float, guidance: str, rings: "MountedRings", cage: CageBody
-) -> OperatingClearance:
-    """Operating clearance between the cage and the land of the "outer" or "inner" ring, from that of the drawing [m].
-
-    Growth of an outer ring widens the clearance, growth of an inner ring narrows it.
-    """
-    side = SIDES[guidance]
-    if guidance == "outer":
-        ring, pressures = rings.outer_ring, (0.0, rings.outer_pressure)
-    else:
-        ring, pressures = rings.inner_ring, (rings.inner_pressure, 0.0)
-    radius = land_radius - 0.5 * side * clearance
-    return OperatingClearance(
-        clearance,
-        2.0 * side * ring.pressure_growth(land_radius, *pressures),
-        2.0 * side * (ring.thermal_growth(land_radius) - cage.thermal_growth(radius)),
-        2.0 * side * (ring.rotation_growth(land_radius) - cage.rotation_growth(radius)),
-    )
-
-
-def pocket_clearance(
-    clearance: float, roller_diameter: float, roller_material: Material, roller_rise: float, cage: CageBody
-) -> OperatingClearance:
-    """Operating clearance of a roller in its pocket or between its lips; roller and cage grow by their temperature rises [K].
-
-    Bending of the bars and stretching of the pockets by rotation are left out.
-    """
-    roller = roller_material.thermal_expansion * roller_rise * roller_diameter
-    return OperatingClearance(clearance, 0.0, cage.thermal_growth(roller_diameter + clearance) - roller)
-
-
-def pocket_circle_shift(pitch_radius: float, rings: "MountedRings", cage: CageBody) -> float:
-    """Radial growth of the circle of pocket centres relative to the circle midway between the races [m]."""
-    outer, inner = rings.outer_ring, rings.inner_ring
-    races = outer.growth(outer.inner_radius, outside=rings.outer_pressure)
-    races += inner.growth(inner.outer_radius, inside=rings.inner_pressure)
-    return cage.thermal_growth(pitch_radius) + cage.rotation_growth(pitch_radius) - 0.5 * races

@@ -1,0 +1,80 @@
+"""Roller profiles: how far a roller's surface drops below a cylinder at an axial position [m].
+
+A drop is a positive radial distance [m]; every function takes positions from the roller's middle [m].
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rbdyn.base.arrays import Array
+
+
+def slice_centres(slices: int, length: float) -> Array:
+    """Axial positions of the slice centres from the roller's middle [m] (Chen et al. 2022, eq 2)."""
+    return (-0.5 + (np.arange(1, slices + 1) - 0.5) / slices) * length
+
+
+def logarithmic_relief(position: Array, diameter: float, length: float) -> Array:
+    """Reference profile drop of ISO/TS 16281 at axial ``position`` [m], for rollers of l <= 2.5 D and longer.
+
+    P(x) = 0.00035 D ln[1/(1 - (2x/l)^2)]; longer rollers keep a flat middle of l - 2.5 D and 0.0005 D.
+    """
+    flat = max(length - 2.5 * diameter, 0.0)
+    factor = 0.0005 if flat > 0.0 else 0.00035
+    inside = np.clip((2.0 * np.abs(position) - flat) / (length - flat), 0.0, None)
+    return np.asarray(-factor * diameter * np.log1p(-(inside**2)))
+
+
+def crowned_relief(position: Array, crown_radius: float) -> Array:
+    """Drop of a full crown, an exact circle of ``crown_radius`` [m]: R - sqrt(R^2 - x^2).
+
+    Raises ValueError when the circle does not reach a position.
+    """
+    position = np.asarray(position, dtype=np.float64)
+    if not crown_radius > 0.0 or np.any(np.abs(position) > crown_radius):
+        raise ValueError(f"a crown of radius {crown_radius:g} m does not span the roller; make it larger")
+    # The difference R - sqrt(R^2 - x^2) would lose all digits where the drop is small compared with the radius.
+    squared = position**2
+    return np.asarray(squared / (crown_radius + np.sqrt(crown_radius**2 - squared)))
+
+
+def lundberg_relief(position: Array, length: float, design_load: float, equivalent_modulus: float) -> Array:
+    """Drop that presses uniformly along the contact at ``design_load`` [N] (Lundberg 1939).
+
+    P(x) = 2Q/(pi l E') ln[1/(1 - (2x/l)^2)] with E' of ``rbdyn.properties.materials.equivalent_modulus`` [Pa]: the surface
+    displacement of both half-spaces under a line load Q/l of length l, less that at its middle. It suits one contact of the
+    roller and is infinite at the very ends. Raises ValueError for a position off the contact.
+    """
+    inside = 2.0 * np.asarray(position, dtype=np.float64) / length
+    if np.any(np.abs(inside) > 1.0):
+        raise ValueError(f"a position lies off the contact of length {length:g} m; keep within half of it")
+    factor = 2.0 * design_load / (math.pi * length * equivalent_modulus)
+    with np.errstate(divide="ignore"):
+        return np.asarray(-factor * np.log1p(-(inside**2)))
+
+
+def table_relief(position: Array, points: Sequence[tuple[float, float]]) -> Array:
+    """Drop by straight lines between measured ``points`` = ((x, drop), ...) [m].
+
+    Points with all x >= 0 describe one half and are mirrored about the middle. Raises ValueError for less than two points, x that
+    do not rise, drops that are not finite and >= 0, and positions beyond the table.
+    """
+    table = np.asarray(points, dtype=np.float64)
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
+        raise ValueError("a profile needs at least two points (x, drop)")
+    if not np.all(np.isfinite(table)) or np.any(np.diff(table[:, 0]) <= 0.0) or np.any(table[:, 1] < 0.0):
+        raise ValueError("the points of a profile need rising x and finite drops that are not negative")
+    position = np.asarray(position, dtype=np.float64)
+    if table[0, 0] >= 0.0:
+        position = np.abs(position)
+        # Between the middle and the first point the mirrored table is level.
+        covered = position <= table[-1, 0]
+    else:
+        covered = (position >= table[0, 0]) & (position <= table[-1, 0])
+    if not np.all(covered):
+        raise ValueError(
+            f"the profile reaches from {table[0, 0]:g} to {table[-1, 0]:g} m, short of the contact; add points"
+        )
+    return np.asarray(np.interp(position, table[:, 0], table[:, 1]))
