@@ -53,7 +53,7 @@ class StiffnessPoint(Record):
 
 
 def stiffness_sheet(points: Sequence[StiffnessPoint]) -> Sheet[StiffnessPoint]:
-    """A row a point in SI, with the names of the arguments of ROSS's BearingElement."""
+    """One row per point in SI, with the names of the arguments of ROSS's BearingElement."""
 
     def coefficients(letter: str, field: str, factor: float, unit: str, meaning: str) -> list[Column[StiffnessPoint]]:
         def column(axes: str) -> Column[StiffnessPoint]:
@@ -74,7 +74,7 @@ def stiffness_sheet(points: Sequence[StiffnessPoint]) -> Sheet[StiffnessPoint]:
         Column[StiffnessPoint]("variable_compliance_um", meaning="travel of the shaft's centre over a pitch of the rollers"),
         Column[StiffnessPoint]("status", meaning="ok, or why the point failed"),
     )  # fmt: skip
-    content = "A row a speed and load of `rbdyn map --stiffness`, in SI for programs of rotors."
+    content = "One row per speed and load of `rbdyn map --stiffness`, in SI for programs of rotors."
     return Sheet("", columns, points, file="stiffness.csv", content=content)
 
 
