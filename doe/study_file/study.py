@@ -46,7 +46,7 @@ from rbdyn.base.faults import (
 )
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.tables.decimal_marks import is_like_number
-from rbdyn.base.tables.sheet import DATE, Column, Sheet, listed, quoted, read_sheet
+from rbdyn.base.tables.sheet import DATE, InputColumn, InputTable, listed, quoted, read_sheet
 from rbdyn.base.tables.workbook import split_path
 from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
@@ -440,7 +440,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     return Study(split_path(path)[0], validated(StudyFile, data, str(path))), tuple(notes)
 
 
-def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[Note]]:
+def _rest(sheet: InputTable, excluded: Collection[str], responses: Sequence[str]) -> tuple[list[str], list[Note]]:
     """Columns of numbers that are not in ``excluded``, and notes on other columns.
 
     Columns of errors belong to ``responses``, or else to the rest. A column of nearly numbers is one of them, and its
@@ -461,7 +461,7 @@ def _rest(sheet: Sheet, excluded: Collection[str], responses: Sequence[str]) -> 
     return numbers, [Note("table", sentence) for sentence in left_out]
 
 
-def _words(column: Column) -> str | None:
+def _words(column: InputColumn) -> str | None:
     """Name and first text of a column that is clearly not one of numbers; None for any other."""
     texts = [text for text in column.texts if text]
     if any(is_like_number(text) or (NEARLY_NUMBER.match(text) and not DATE.match(text)) for text in texts):

@@ -12,7 +12,7 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.tables.sheet import UNKNOWN, Limits, Sheet, listed, quoted, read_sheet
+from rbdyn.base.tables.sheet import UNKNOWN, InputTable, Limits, listed, quoted, read_sheet
 
 # Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")
@@ -53,7 +53,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     return table_of(done_rows(read_sheet(path)), factors, responses, named_in)
 
 
-def done_rows(sheet: Sheet) -> Sheet:
+def done_rows(sheet: InputTable) -> InputTable:
     """The table without its failed rows, which a note counts; any other table than one by ``doe run`` as it is.
 
     Raises InputError where no row is done.
@@ -63,15 +63,13 @@ def done_rows(sheet: Sheet) -> Sheet:
         return sheet
     kept = [place for place, text in enumerate(texts) if text == DONE]
     refuse([] if kept else [f"{sheet.path}: all its {len(texts)} rows failed; run it again, or name another table"])
-    numbers = [sheet.file.numbers[place] for place in kept] if sheet.file.numbers else ()
+    numbers = [sheet.numbers[place] for place in kept] if sheet.numbers else ()
     left_out = f"{len(texts) - len(kept)} of {len(texts)} rows failed and are left out"
-    manner = "; ".join(filter(None, (sheet.file.manner, left_out)))
-    return replace(
-        sheet, file=replace(sheet.file, rows=[sheet.rows[place] for place in kept], numbers=numbers, manner=manner)
-    )
+    manner = "; ".join(filter(None, (sheet.manner, left_out)))
+    return replace(sheet, rows=[sheet.rows[place] for place in kept], numbers=numbers, manner=manner)
 
 
-def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: Path) -> Table:
+def table_of(sheet: InputTable, factors: list[str], responses: list[str], named_in: Path) -> Table:
     """The table in a file that is already read. See ``read_table``."""
     path, errors = sheet.path, [f"{name}_error" for name in responses]
     limits = dict.fromkeys([*factors, *responses], RUN) | dict.fromkeys(errors, ERROR)

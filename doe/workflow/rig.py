@@ -17,7 +17,7 @@ from doe.study_file.table import gap_notes
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, Strict, refuse
 from rbdyn.base.notes import Notes
-from rbdyn.base.tables.sheet import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
+from rbdyn.base.tables.sheet import UNKNOWN, InputColumn, InputTable, Limits, listed, read_sheet
 from rbdyn.base.words import counted, quantity
 from rbdyn.dynamics.figures import FIGURES, Figure
 from rbdyn.result import TEMPERATURES
@@ -100,7 +100,7 @@ class _Cells:
     """Columns of a rig's table: all of them as texts, ``numbers`` (NaN where unknown), and values of scene ``keys``."""
 
     path: Path
-    columns: Mapping[str, Column]
+    columns: Mapping[str, InputColumn]
     numbers: Mapping[str, Array]
     keys: Mapping[str, Sequence[Any]]
 
@@ -124,7 +124,7 @@ class _Cells:
         return f"{self.path}: {name} in row {place + 1}: {words}"
 
 
-def _keys_and_outputs(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _keys_and_outputs(sheet: InputTable) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Scene keys and outputs among the columns. Raises InputError for any other column."""
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]
@@ -156,7 +156,7 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
     )
 
 
-def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
+def _cells(sheet: InputTable, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
     """The columns of the table, and a sentence for each cell without a value of its column."""
     columns = {name: sheet.column(name) for name in sheet.places}
     numbers, values, faults = dict[str, Array](), dict[str, list[Any]](), list[str]()
@@ -185,7 +185,7 @@ def _accuracies(cells: _Cells, outputs: Sequence[str]) -> tuple[dict[str, float]
     return shares, faults
 
 
-def _shifted(sheet: Sheet, faults: list[str]) -> list[str]:
+def _shifted(sheet: InputTable, faults: list[str]) -> list[str]:
     """The faults of cells, or a single sentence where most rows have values of other columns, as of shifted ones."""
     rows = [(fault, found[1]) for fault in faults if (found := ROW.search(fault))]
     alien = [(fault, row) for fault, row in rows if not ABSENT.search(fault)]

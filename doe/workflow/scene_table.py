@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
 from rbdyn.base.notes import Notes
-from rbdyn.base.tables.sheet import Sheet, listed, read_sheet, sheet_of_frame
+from rbdyn.base.tables.sheet import InputTable, listed, read_sheet, sheet_of_frame
 from rbdyn.scene import BallScene, Scene
 from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
@@ -93,7 +93,7 @@ def read_scene_table(table: "Path | pd.DataFrame", base: Path | None, overrides:
     return SceneTable(sheet.path, list(_rows(sheet, keys)), list(keys.values()), base, overrides, sheet.notes)
 
 
-def _keys(sheet: Sheet, overrides: Sequence[str]) -> dict[str, str]:
+def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
     """Scene key of each column that has one. Raises InputError for other columns, and for keys that are stated twice."""
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]
@@ -131,7 +131,7 @@ def dotted_keys() -> list[str]:
     return [key.key for key in keys({"scene": Scene}) if "[]" not in key.key]
 
 
-def _rows(sheet: Sheet, keys: Mapping[str, str]) -> Iterator[SceneRow]:
+def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:
     columns = {name: sheet.column(name) for name in (NAME, SCENE) if name in sheet}
     values, faults = dict[str, list[Any]](), dict[str, Iterator[str]]()
     for name, key in keys.items():

@@ -21,7 +21,7 @@ from rbdyn.base.faults import (
     refuse,
     validated,
 )
-from rbdyn.base.tables.sheet import Limits, Sheet, listed, read_sheet
+from rbdyn.base.tables.sheet import InputTable, Limits, listed, read_sheet
 from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
 from rbdyn.scene.keys import key_values, unknown_keys
@@ -110,7 +110,7 @@ def shares_of_time(points: Sequence[DutyPoint]) -> list[float]:
     return [point.share / total for point in points]
 
 
-def _points_of_table(sheet: Sheet) -> list[DutyPoint]:
+def _points_of_table(sheet: InputTable) -> list[DutyPoint]:
     """Points in the rows of a table; a cell without a value leaves that key at the scene's value.
 
     Raises InputError with all faults: columns that are neither name, share, hours nor keys, and bad cells.
@@ -135,7 +135,7 @@ def _points_of_table(sheet: Sheet) -> list[DutyPoint]:
     return points
 
 
-def _columns(sheet: Sheet) -> tuple[list[str], str]:
+def _columns(sheet: InputTable) -> tuple[list[str], str]:
     """Scene keys among the columns, and the column of times. Raises InputError for any other column but the name, and for missing ones."""
     sheet.refuse_nameless()
     names = [name for name in sheet.header if name]

@@ -25,7 +25,7 @@ from rbdyn.base.command import flag, print_json
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, one_line
 from rbdyn.base.records import plain
 from rbdyn.base.table import Sheet
-from rbdyn.base.tables.sheet import LONGEST_NUMBER, WHOLE, Column
+from rbdyn.base.tables.sheet import LONGEST_NUMBER, WHOLE, InputColumn
 from rbdyn.base.tables.sheet import is_number as is_numeral
 from rbdyn.base.words import quantity
 from rbdyn.scene import Scene
@@ -253,7 +253,7 @@ def _toml(value: Any) -> str:
 LARGEST_BITS = 63
 
 
-def key_values(column: Column, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
+def key_values(column: InputColumn, choices: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
     """Values (n,) of the scene's key that names a column, and a sentence for each cell without one.
 
     A cell that is one of the law's ``choices`` has that value. Otherwise the key's type in a scene decides between number,

@@ -43,47 +43,170 @@ MOST_ROWS_NAMED = 2
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 
+class Limits(NamedTuple):
+    """Numbers that a column may have: up to ``most`` in magnitude, 0 or at least ``least``, with a ``sign``, whole or not."""
+
+    most: float
+    least: float = 0.0
+    sign: Literal["any", "not negative", "positive"] = "any"
+    whole: bool = False
+
+    def fault(self, value: float) -> str:
+        """The fault of a value outside the limits, with its fix."""
+        if not math.isfinite(value) or (self.whole and value != round(value)):
+            return f"is not a {'whole' if self.whole else 'finite'} number; write a plain one"
+        if abs(value) > self.most:
+            return f"is beyond {self.most:g}; check the unit"
+        if value < 0.0 and self.sign == "not negative":
+            return "is below 0; check the sign"
+        if value <= 0.0 and self.sign == "positive":
+            return "is not above 0; check the sign"
+        return f"is nearer to 0 than {self.least:g}; check the unit"
+
+    def contains(self, value: float) -> bool:
+        """Whether a value is within the limits."""
+        return not self.broken(np.array([value]))
+
+    def broken(self, values: Array) -> list[int]:
+        """Places of the values (n,) outside the limits."""
+        size = np.abs(values)
+        valid = (size <= self.most) & ((size >= self.least) | (size == 0.0))
+        valid &= (values == np.round(values)) | (not self.whole)
+        valid &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
+        return np.flatnonzero(~valid).tolist()
+
+
 @dataclass(frozen=True)
-class TableFile:
-    """Header and rows of a file's fields, its marks, how it was read (no words: the usual way), and its rows' cells.
+class InputColumn:
+    """A column of a table: its ``name``, the stripped ``texts`` of its cells, and the ``marks`` of the table's numbers.
+
+    ``cells``: names of the cells in a workbook.
+    """
+
+    path: Path
+    name: str
+    texts: Sequence[str]
+    marks: Marks
+    cells: Sequence[str] = ()
+
+    @cached_property
+    def plain(self) -> list[str]:
+        """The texts with decimal points in numbers; empty for a number that may have two meanings."""
+        return ["" if doubt else text for text, doubt in map(self.marks.plain, self.texts)]
+
+    def doubt(self, row: int) -> str:
+        """The reason why the number in ``row`` may have two meanings; empty for any other text."""
+        return self.marks.plain(self.texts[row])[1]
+
+    def fault(self, row: int, words: str, value: bool = True) -> str:
+        """A sentence on the cell in ``row`` (from 0), with its text if ``value``; the sentence counts rows from 1."""
+        text = self.texts[row]
+        plain = bool(NUMBER.fullmatch(text)) and len(text) < LONGEST_NAME
+        cell = f" = {text if plain else quoted(text)}" if value else ""
+        place = f"row {row + 1} ({self.cells[row]})" if self.cells else f"row {row + 1}"
+        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in {place}{cell}: {words}"
+
+    def numbers(self, limits: Limits, unknown: Collection[str] = ()) -> tuple[Array, list[str]]:
+        """Numbers (n,) of the cells, and a sentence for each cell without a number within the ``limits``.
+
+        Cells whose text in lower case is in ``unknown`` are NaN, without a fault.
+        """
+        values = np.array([float(text) if is_number(text) else math.nan for text in self.plain])
+        faults, doubts = list[str](), Counter[str]()
+        for row in limits.broken(values):
+            if self.texts[row].lower() in unknown:
+                continue
+            if len(faults) > MOST_FAULTS:
+                # It is counted, but no message lists it.
+                faults.append("")
+                continue
+            doubt = self.doubt(row)
+            kind = doubt.partition(" ")[0]
+            doubts[kind] += 1
+            # One such cell shows how all of them are written.
+            if not doubt or doubts[kind] == 1:
+                faults.append(self.fault(row, doubt or _slip(self.texts[row]) or limits.fault(values[row])))
+        return values, faults
+
+
+@dataclass(frozen=True)
+class InputTable:
+    """A table as it is read: names of its columns, rows of fields as they are written, marks of its numbers, and how it was read
+    (no words: the usual way).
 
     ``numbers``: the row of a workbook's sheet that each row is; empty for text.
     """
 
+    path: Path
     header: list[str]
     rows: list[list[str]]
     marks: Marks
     manner: str
     numbers: Sequence[int] = ()
 
-    def cell(self, row: int, place: int) -> str:
-        """Name of a cell in its sheet; empty for text."""
-        return f"cell {letters(place)}{self.numbers[row]}" if self.numbers else ""
+    @property
+    def notes(self) -> Notes:
+        """A note on how the table was read, where that is not UTF-8 with commas and decimal points."""
+        return (Note("table", f"{self.path}: {self.manner}"),) if self.manner else ()
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Place of each column with a name."""
+        return {name: place for place, name in enumerate(self.header) if name}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.places
+
+    def column(self, name: str) -> InputColumn:
+        """The column of this name."""
+        place = self.places[name]
+        texts = [plain_cell(row[place].strip()) for row in self.rows]
+        cells = [f"cell {letters(place)}{number}" for number in self.numbers]
+        return InputColumn(self.path, name, texts, self.marks, cells)
+
+    @property
+    def nameless(self) -> list[int]:
+        """Numbers, from 1, of columns with cells and no name."""
+        places = [place for place, name in enumerate(self.header) if not name]
+        return [place + 1 for place in places if any(row[place].strip() for row in self.rows)]
+
+    def refuse_nameless(self) -> None:
+        """Raises InputError for columns with cells and no name."""
+        refuse(f"{self.path}: column {number} has no name; name it or remove it" for number in self.nameless)
 
 
-def read_table_file(path: Path) -> TableFile:
-    """Read a table of any of the formats. Raises InputError where none or more than one reading is possible."""
+def read_sheet(path: Path) -> InputTable:
+    """Header and rows of a table of any of the formats, without blank rows and empty columns at the end.
+
+    Raises InputError where it cannot be read in one way alone, has no rows, has a name twice, or a row has more or fewer fields
+    than the header.
+    """
     file, sheet = split_path(path)
     if file.suffix.lower() in PARQUET:
-        return _table_file(path, _frame_rows(_parquet(file)), POINT, "", "")
+        return _table(path, _frame_rows(_parquet(file)), POINT, "", "")
     if file.suffix.lower() in SUFFIXES:
         table = read_workbook(file, read_bytes(file), sheet)
         rows, numbers = table.rows, table.numbers
         width = max(map(len, rows), default=0)
         rows = [[*row, *[""] * (width - len(row))] for row in rows]
-        return _table_file(path, rows, None, "", table.note, numbers)
+        return _table(path, rows, None, "", table.note, numbers)
     data = read_bytes(file)
     if file.suffix.lower() == ".ods" or data.startswith((ARCHIVE, OLD)):
         raise InputError([f"{path}: is no table of text; save it as .xlsx or as CSV, with that ending of its name"])
     text, encoding = _decoded(path, data)
     separator, rows = _fields(path, text)
     words = "" if separator == "," else SEPARATORS.get(separator, "")
-    return _table_file(path, rows, POINT if separator == "," else None, words, encoding)
+    return _table(path, rows, POINT if separator == "," else None, words, encoding)
 
 
-def _table_file(
+def sheet_of_frame(frame: "pd.DataFrame", path: Path) -> InputTable:
+    """A frame as a table that messages call ``path``. Raises InputError as ``read_sheet``."""
+    return _table(path, _frame_rows(frame), POINT, "", "")
+
+
+def _table(
     path: Path, rows: list[list[str]], default: str | None, separator: str, origin: str, numbers: Sequence[int] = ()
-) -> TableFile:
+) -> InputTable:
     """The table of rows of fields, the first of which is its header; ``separator`` and ``origin`` in words."""
     header, body = rows[0] if rows else [], rows[1:]
     if not header:
@@ -95,7 +218,15 @@ def _table_file(
     signs = [*([separator] if separator else []), *points, *marks.words]
     together = " and ".join([*([", ".join(signs[:-1])] if signs[1:] else []), *signs[-1:]])
     words = [*([f"with {together}"] if signs else []), *([origin] if origin else [])]
-    return TableFile(header, body, marks, f"read {' '.join(words)}" if words else "", numbers[1:])
+    names = [plain_cell(name.strip()) for name in header]
+    if len(names) == 1 and "|" in names[0]:
+        raise InputError([f"{path}: has '|' between its fields; write commas there and points in numbers"])
+    repeated = {name: count for name, count in Counter(names).items() if count > 1 and name}
+    faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in repeated.items()]
+    if not body:
+        faults.append(f"{path}: has a header and no rows; add a row for each run")
+    refuse(faults)
+    return InputTable(path, names, body, marks, f"read {' '.join(words)}" if words else "", numbers[1:])
 
 
 def _parquet(path: Path) -> "pd.DataFrame":
@@ -270,162 +401,6 @@ MONTH = "(?:jan|feb|m[aä]r|apr|ma[iy]|ju[nl]|aug|sep|o[ck]t|nov|de[cz])[a-zä]*
 DAY_AND_MONTH = re.compile(rf"\d{{1,2}}[-. ]{{1,2}}{MONTH}\b|{MONTH}[-. ]{{1,2}}\d", re.IGNORECASE)
 # Most names that a message lists.
 MOST_NAMES = 20
-
-
-class Limits(NamedTuple):
-    """Numbers that a column may have: up to ``most`` in magnitude, 0 or at least ``least``, with a ``sign``, whole or not."""
-
-    most: float
-    least: float = 0.0
-    sign: Literal["any", "not negative", "positive"] = "any"
-    whole: bool = False
-
-    def fault(self, value: float) -> str:
-        """The fault of a value outside the limits, with its fix."""
-        if not math.isfinite(value) or (self.whole and value != round(value)):
-            return f"is not a {'whole' if self.whole else 'finite'} number; write a plain one"
-        if abs(value) > self.most:
-            return f"is beyond {self.most:g}; check the unit"
-        if value < 0.0 and self.sign == "not negative":
-            return "is below 0; check the sign"
-        if value <= 0.0 and self.sign == "positive":
-            return "is not above 0; check the sign"
-        return f"is nearer to 0 than {self.least:g}; check the unit"
-
-    def contains(self, value: float) -> bool:
-        """Whether a value is within the limits."""
-        return not self.broken(np.array([value]))
-
-    def broken(self, values: Array) -> list[int]:
-        """Places of the values (n,) outside the limits."""
-        size = np.abs(values)
-        valid = (size <= self.most) & ((size >= self.least) | (size == 0.0))
-        valid &= (values == np.round(values)) | (not self.whole)
-        valid &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
-        return np.flatnonzero(~valid).tolist()
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table: its ``name``, the stripped ``texts`` of its cells, and the ``marks`` of the table's numbers.
-
-    ``cells``: names of the cells in a workbook.
-    """
-
-    path: Path
-    name: str
-    texts: Sequence[str]
-    marks: Marks
-    cells: Sequence[str] = ()
-
-    @cached_property
-    def plain(self) -> list[str]:
-        """The texts with decimal points in numbers; empty for a number that may have two meanings."""
-        return ["" if doubt else text for text, doubt in map(self.marks.plain, self.texts)]
-
-    def doubt(self, row: int) -> str:
-        """The reason why the number in ``row`` may have two meanings; empty for any other text."""
-        return self.marks.plain(self.texts[row])[1]
-
-    def fault(self, row: int, words: str, value: bool = True) -> str:
-        """A sentence on the cell in ``row`` (from 0), with its text if ``value``; the sentence counts rows from 1."""
-        text = self.texts[row]
-        plain = bool(NUMBER.fullmatch(text)) and len(text) < LONGEST_NAME
-        cell = f" = {text if plain else quoted(text)}" if value else ""
-        place = f"row {row + 1} ({self.cells[row]})" if self.cells else f"row {row + 1}"
-        return f"{self.path}: {one_line(self.name, LONGEST_NAME)} in {place}{cell}: {words}"
-
-    def numbers(self, limits: Limits, unknown: Collection[str] = ()) -> tuple[Array, list[str]]:
-        """Numbers (n,) of the cells, and a sentence for each cell without a number within the ``limits``.
-
-        Cells whose text in lower case is in ``unknown`` are NaN, without a fault.
-        """
-        values = np.array([float(text) if is_number(text) else math.nan for text in self.plain])
-        faults, doubts = list[str](), Counter[str]()
-        for row in limits.broken(values):
-            if self.texts[row].lower() in unknown:
-                continue
-            if len(faults) > MOST_FAULTS:
-                # It is counted, but no message lists it.
-                faults.append("")
-                continue
-            doubt = self.doubt(row)
-            kind = doubt.partition(" ")[0]
-            doubts[kind] += 1
-            # One such cell shows how all of them are written.
-            if not doubt or doubts[kind] == 1:
-                faults.append(self.fault(row, doubt or _slip(self.texts[row]) or limits.fault(values[row])))
-        return values, faults
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """A table as it is read: names in its ``header``, and the ``file`` with its rows of fields."""
-
-    path: Path
-    header: list[str]
-    file: TableFile
-
-    @property
-    def rows(self) -> list[list[str]]:
-        """Rows of fields as they are written."""
-        return self.file.rows
-
-    @property
-    def notes(self) -> Notes:
-        """A note on how the table was read, where that is not UTF-8 with commas and decimal points."""
-        return (Note("table", f"{self.path}: {self.file.manner}"),) if self.file.manner else ()
-
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """Place of each column with a name."""
-        return {name: place for place, name in enumerate(self.header) if name}
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.places
-
-    def column(self, name: str) -> Column:
-        """The column of this name."""
-        place = self.places[name]
-        texts = [plain_cell(row[place].strip()) for row in self.rows]
-        cells = [self.file.cell(row, place) for row in range(len(texts))] if self.file.numbers else ()
-        return Column(self.path, name, texts, self.file.marks, cells)
-
-    @property
-    def nameless(self) -> list[int]:
-        """Numbers, from 1, of columns with cells and no name."""
-        places = [place for place, name in enumerate(self.header) if not name]
-        return [place + 1 for place in places if any(row[place].strip() for row in self.rows)]
-
-    def refuse_nameless(self) -> None:
-        """Raises InputError for columns with cells and no name."""
-        refuse(f"{self.path}: column {number} has no name; name it or remove it" for number in self.nameless)
-
-
-def read_sheet(path: Path) -> Sheet:
-    """Header and rows of a table of text or of a workbook, without blank rows and empty columns at the end.
-
-    Raises InputError where it cannot be read in one way alone, has no rows, has a name twice, or a row has more or fewer fields
-    than the header.
-    """
-    return _sheet(path, read_table_file(path))
-
-
-def sheet_of_frame(frame: "pd.DataFrame", path: Path) -> Sheet:
-    """A frame as a table that messages call ``path``. Raises InputError as ``read_sheet``."""
-    return _sheet(path, _table_file(path, _frame_rows(frame), POINT, "", ""))
-
-
-def _sheet(path: Path, file: TableFile) -> Sheet:
-    header = [plain_cell(name.strip()) for name in file.header]
-    if len(header) == 1 and "|" in header[0]:
-        raise InputError([f"{path}: has '|' between its fields; write commas there and points in numbers"])
-    repeated = {name: count for name, count in Counter(header).items() if count > 1 and name}
-    faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in repeated.items()]
-    if not file.rows:
-        faults.append(f"{path}: has a header and no rows; add a row for each run")
-    refuse(faults)
-    return Sheet(path, header, file)
 
 
 def is_number(text: str) -> bool:
