@@ -290,7 +290,7 @@ def _resolved(source: Any, overrides: Sequence[str]) -> Any:
         if not path.is_dir() and path.suffix.lower() != ".json":
             return scene_of(path, overrides)
         result = _saved(file_of(path))
-    elif _is_result(source):
+    elif isinstance(source, SimulationResult) or type(source).__name__ == "BallResult":
         result = source
     else:
         return scene_of(source, overrides)
@@ -314,10 +314,6 @@ def _saved(path: Path) -> Any:
 
         return BallResult.load(path)
     return SimulationResult.load(path)
-
-
-def _is_result(source: Any) -> bool:
-    return isinstance(source, SimulationResult) or type(source).__name__ == "BallResult"
 
 
 def _kind(source: Any) -> str:

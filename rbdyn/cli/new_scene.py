@@ -46,19 +46,19 @@ def mounting_values(sizes: catalogue.Envelope, rings: Rings, options: Options) -
     shaft, housing, tapered = options.shaft, options.housing, rings.tapered
     inner = DRIVEN_UP if tapered else shaft_interference(sizes.bore, shaft or USUAL_SHAFT, rings.ring_class)
     outer = housing_interference(sizes.outside, housing or USUAL_HOUSING, rings.ring_class)
-    return {
-        **_assumed_temperatures(options.oil_temperature),
+    values = _assumed_temperatures(options.oil_temperature) | {
         "mounted": sizes,
         "shaft_by": "tapered shaft" if tapered else f"shaft {shaft or f'{USUAL_SHAFT} (not stated, usual)'}",
         "housing_by": f"housing {housing or f'{USUAL_HOUSING} (not stated, usual)'}",
         "housing_diameter": round(HOUSING_SHARE * sizes.outside, 1),
-        "inner_interference": round(inner.mean, 2) + 0.0,
-        "inner_fit_by": "in the clearance, which is that of the bearing driven up" if tapered else _reason(inner),
-        "inner_law": _law(inner),
-        "outer_interference": round(outer.mean, 2) + 0.0,
-        "outer_fit_by": _reason(outer),
-        "outer_law": _law(outer),
     }
+    for ring, fit in (("inner", inner), ("outer", outer)):
+        values |= {
+            f"{ring}_interference": round(fit.mean, 2) + 0.0,
+            f"{ring}_fit_by": _reason(fit),
+            f"{ring}_law": _law(fit),
+        }
+    return values
 
 
 def _assumed_temperatures(oil: float | None) -> Values:
@@ -76,6 +76,8 @@ def _assumed_temperatures(oil: float | None) -> Values:
 
 
 def _reason(fit: Interference) -> str:
+    if fit == DRIVEN_UP:
+        return "in the clearance, which is that of the bearing driven up"
     less = f", less {fit.smoothing:.3g} of smoothing" if fit.smoothing else ""
     return f"mean of {fit.low + fit.smoothing:.3g} to {fit.high + fit.smoothing:.3g}{less}; negative is loose"
 
@@ -93,8 +95,6 @@ POLYAMIDE = (
     "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
 )
 POLYAMIDE_DENSITY = 1.3e-3
-# What a bearing of one's own is, next to its sizes.
-OWN = "a drawing of one's own."
 # Radii of the inner and the outer groove over the ball's diameter, as ISO 281 rates.
 USUAL_GROOVES = (0.52, 0.53)
 BLOCK_BETWEEN = f"{catalogue.WIDEST_BAR:g} roller diameters, for a block from pocket to pocket is no bar; it is stiffer"
@@ -123,33 +123,23 @@ USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 
 
 class CageKind(NamedTuple):
-    """What guides a cage and what it is made of, and where each comes from: "of suffix MA", "stated", "assumed"."""
+    """What guides a cage, what it is made of, and a sentence on where each comes from: "of suffix MA", "stated", "assumed"."""
 
     guidance: str
     material: str
-    guidance_by: str
-    material_by: str
-
-    @property
-    def sentence(self) -> str:
-        """Both with their sources."""
-        guides = f"guided by the {self.guidance}{'s' if self.guidance == 'roller' else ' ring'}"
-        if self.guidance_by == self.material_by:
-            return f"{self.guidance_by}: {self.material}, {guides}"
-        return f"{self.material_by}: {self.material}; {self.guidance_by}: {guides}"
+    sentence: str
 
 
 class Subject(NamedTuple):
     """The bearing that a scene is written of: by its designation, or by a drawing of one's own, whose ``boundary`` has sources.
 
-    ``title`` and ``reason`` make the heading. ``series`` is ``NO_SERIES`` of a drawing. ``cage`` is of rollers, ``grooves`` of balls:
+    ``title`` begins the heading. ``series`` is ``NO_SERIES`` of a drawing. ``cage`` is of rollers, ``grooves`` of balls:
     radii of the inner and the outer one over the ball's diameter, None where ISO 281's are taken. ``clearance``: class of ISO 5753-1, or diametral [mm].
     """
 
     kind: str
     name: str
     title: str
-    reason: str
     sizes: catalogue.Envelope
     inside: catalogue.RollerInterior | catalogue.BallInterior
     boundary: Boundary | None = None
@@ -179,7 +169,6 @@ def catalogue_subject(named: catalogue.Designation, sizes: catalogue.Envelope, o
         kind=named.kind,
         name=named.name,
         title=f"{named.name}, {sizes.bore:g} x {sizes.outside:g} x {sizes.width:g} mm",
-        reason="catalogues do not list what is inside.",
         sizes=sizes,
         inside=catalogue.roller_interior(sizes, named.series == "10")
         if rollers
@@ -212,7 +201,6 @@ def drawing_subject(drawing: RollerDrawing | BallDrawing, boundary: Boundary, op
         kind=kind,
         name="own",
         title=f"{elements} on a pitch diameter of {drawing.pitch_diameter:g} mm",
-        reason=OWN,
         sizes=boundary.envelope,
         inside=inside,
         boundary=boundary,
@@ -224,14 +212,13 @@ def drawing_subject(drawing: RollerDrawing | BallDrawing, boundary: Boundary, op
 
 def cage_kind(suffix: str | None, options: Options) -> CageKind:
     """A cage as typed, else as its suffix says, else the usual one."""
-    guidance, material = catalogue.CAGES[suffix or USUAL_CAGE]
+    usual_guidance, usual_material = catalogue.CAGES[suffix or USUAL_CAGE]
+    guidance, material = options.guidance or usual_guidance, options.cage_material or usual_material
     source = f"of suffix {suffix}" if suffix else "assumed"
-    return CageKind(
-        options.guidance or guidance,
-        options.cage_material or material,
-        STATED if options.guidance else source,
-        STATED if options.cage_material else source,
-    )
+    guidance_by, material_by = (STATED if typed else source for typed in (options.guidance, options.cage_material))
+    between = ", " if guidance_by == material_by else f"; {guidance_by}: "
+    guides = f"guided by the {guidance}{'s' if guidance == 'roller' else ' ring'}"
+    return CageKind(guidance, material, f"{material_by}: {material}{between}{guides}")
 
 
 def roller_values(subject: Subject, options: Options) -> Values:
@@ -319,6 +306,7 @@ def _common(subject: Subject, options: Options, reference: float, capacity: floa
         sizes=sizes,
         boundary=subject.boundary or Boundary(sizes.bore, sizes.outside, sizes.width, "", "", ""),
         own=subject.boundary,
+        reason="a drawing of one's own." if subject.boundary else "catalogues do not list what is inside.",
         oil=oil,
         oil_by="base oil of the grease" if grease else "",
         base_oil=(base or "mineral") if oil.startswith("ISO VG") else None,

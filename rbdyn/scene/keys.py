@@ -112,7 +112,8 @@ def schema(kinds: Mapping[str, type[BaseModel]]) -> dict[str, Any]:
     described: dict[str, dict[str, str]] = {}
     for model in _models(kinds.values()):
         # The schema prefixes a name that two modules use with the module.
-        name = next(n for n in (model.__name__, _long_name(model)) if n in whole["$defs"])
+        long_name = f"{model.__module__}__{model.__qualname__}".replace(".", "__")
+        name = model.__name__ if model.__name__ in whole["$defs"] else long_name
         described[name] = descriptions(model)
     for name, table in whole["$defs"].items():
         for key, node in table.get("properties", {}).items():
@@ -154,10 +155,6 @@ def descriptions(model: type[BaseModel]) -> dict[str, str]:
 def _classes(module: str) -> dict[str, ast.ClassDef]:
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-
-
-def _long_name(model: type[BaseModel]) -> str:
-    return f"{model.__module__}__{model.__qualname__}".replace(".", "__")
 
 
 def _models(roots: Any) -> list[type[BaseModel]]:

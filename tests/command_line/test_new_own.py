@@ -99,7 +99,7 @@ def test_unit_clearances_and_conformities():
         ((*BALLS, "--bore", "60"), ["--bore 60: leaves no inner ring under a raceway of 56.37 mm; make it smaller"]),
         ((*BALLS, "--contact-angle", "95"), ["--contact-angle 95: must be from 0 to 85 degrees; fix it"]),
         (("own", "--balls", "9", "--ball", "8", "--pitch", "40", "--clearance", "0.9"), ["--clearance 0.9: too large for grooves with centres 0.4 mm apart; make it less than 0.8"]),
-        (("NU210", "--pitch", "60"), ["--pitch 60: is of a bearing of one's own; leave it out, or write own in place of NU210"]),
+        (("NU210", "--pitch", "60"), ["--pitch 60: is of a bearing of one's own; leave it out, or write own instead of NU210"]),
         (("NU210MB", "--guidance", "outer"), ["--guidance outer: contradicts the cage MB of NU 210 MB; leave one out"]),
         (("NU210", "C3", "--clearance", "0.1"), ["--clearance 0.1: contradicts C3 of NU 210 C3; leave one out"]),
     ],

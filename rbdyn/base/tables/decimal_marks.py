@@ -108,12 +108,8 @@ def _shown(text: str) -> tuple[str | None, str]:
         group, decimal = grouped["group"], grouped["decimal"]
         if group == decimal:
             return None, ""
-        return decimal or (_other(group) if group in (POINT, COMMA) else None), group
+        return decimal or {POINT: COMMA, COMMA: POINT}.get(group), group
     return None, ""
-
-
-def _other(mark: str) -> str:
-    return COMMA if mark == POINT else POINT
 
 
 def _name(mark: str | None) -> str:
