@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 SIMULATION_FILES = (
     "result.json",
     "figures.csv",
+    "bearing.rexs",
     "history.csv",
     "roller_loads.png",
     "cage_orbit.png",

@@ -4,17 +4,20 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import Field
 from inspect import Parameter, Signature, signature
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 
-from rbdyn.base.command import ForceFile, Json, OutFile, fill_template, guarded, hand_out
+from rbdyn.base.command import ForceFile, Json, OutFile, fill_template, guarded, hand_out, valued
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 from rbdyn.cli.new_drawing import OF_DRAWINGS, OWN, own_subject
 from rbdyn.cli.new_options import TABLE, Options, dashed
 from rbdyn.cli.new_scene import Subject, ball_values, catalogue_subject, mounting_values, roller_values
 from rbdyn.properties.catalogue import ANGULAR, ROLLERS, Designation, Envelope, envelope, read_designation
+from rbdyn.properties.rexs import SIZES as REXS_SIZES
+from rbdyn.properties.rexs import RexsBearing, is_rexs, read_rexs
 from rbdyn.properties.tolerances import housing_interference, shaft_interference
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import heat_notes
@@ -24,18 +27,33 @@ SIZES = ("--bore", "--outside", "--width")
 Designations = Annotated[
     list[str],
     typer.Argument(
-        metavar="DESIGNATION|own", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B; own: a drawing of one's own."
+        metavar="DESIGNATION|own|FILE.rexs",
+        help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B; own: your drawing; or a bearing of a REXS file.",
     ),
+]
+
+BearingOfFile = Annotated[
+    str | None, valued("ID", "Bearing of a REXS file, by its number or name.", "the only one", "--bearing")
 ]
 
 
 def new(
-    designation: Designations, out: OutFile = None, force: ForceFile = False, as_json: Json = False, **texts: str | None
+    designation: Designations,
+    bearing: BearingOfFile = None,
+    out: OutFile = None,
+    force: ForceFile = False,
+    as_json: Json = False,
+    **texts: str | None,
 ) -> None:
-    """Write a commented scene of a catalogue bearing, or of one's own, its interior estimated."""
+    """Write a commented scene of a catalogue bearing, of a REXS file, or of one's own, its interior estimated."""
     with guarded(as_json):
-        options = Options({dashed(name): text for name, text in texts.items()})
-        text = scene_text(" ".join(designation), options)
+        words, typed = " ".join(designation), {dashed(name): text for name, text in texts.items()}
+        if is_rexs(words):
+            text = rexs_text(read_rexs(Path(words), bearing), typed)
+        elif bearing is not None:
+            raise InputError([f"--bearing {one_line(bearing, LONGEST_NAME)}: chooses one of a REXS file; leave it out"])
+        else:
+            text = scene_text(words, Options(typed))
         runs = "rbdyn simulate" if 'kind = "cylindrical_roller"' in text else "rbdyn ball"
         hand_out(text, as_json, out, force, runs)
 
@@ -49,6 +67,28 @@ def _parameter(entry: Field[Any]) -> Parameter:
 
 named, *output, _ = signature(new).parameters.values()
 new.__signature__ = Signature([named, *map(_parameter, TABLE.values()), *output])  # type: ignore[attr-defined]
+
+
+def rexs_text(found: RexsBearing, typed: dict[str, str | None]) -> str:
+    """The scene of a bearing in a REXS file, headed by what was taken; options that are typed replace those of the file.
+
+    Sizes of a listed designation are those of its catalogue. Raises InputError with all faults at once.
+    """
+    presets = {dashed(entry.name): entry.metadata.get("preset") for entry in TABLE.values()}
+    stated = {name: text for name, text in typed.items() if text != presets[name]}
+    without = {name: text for name, text in found.options.items() if name not in SIZES or found.words == OWN}
+    sizes = {name for option, names in REXS_SIZES.items() if option not in without for name in names}
+    for words, options in product((found.words, found.basic), (without, found.options)):
+        try:
+            text = scene_text(words, Options(presets | dict(options) | stated))
+            break
+        except InputError as error:
+            refused = error
+    else:
+        raise refused
+    taken = [name for name in dict.fromkeys(found.taken) if options is found.options or name not in sizes]
+    unread = f"# Not read: {', '.join(found.unread)}.\n" if found.unread else ""
+    return f"# From {found.title}. Taken: {', '.join(taken)}.\n{unread}{text}"
 
 
 def scene_text(words: str, options: Options) -> str:

@@ -4,18 +4,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Remarks, Table, Verdict
+from rbdyn.base.faults import RPM
 from rbdyn.base.records import save_table
 from rbdyn.base.words import counted, error_alone, label, range_ends, shown, value_alone, with_error
 from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
+from rbdyn.properties.rexs import Attributes, write_rexs
 from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet
 from rbdyn.scene import Scene
+from rbdyn.scene.notes import catalogue_entry
 
 if TYPE_CHECKING:
     from rbdyn.result import Quantity
 
 # Length of the history that --out draws.
 TRACE_TURNS = 10.0
+# Nodes of a heat balance by their names in REXS.
+REXS_NODES = {
+    "temperature_lubricant": "oil",
+    "mean_operating_temperature_inner_ring": "inner",
+    "mean_operating_temperature_outer_ring": "outer",
+}
 
 
 def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
@@ -51,7 +60,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
 
 
 def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, figures.csv, history.csv and pictures of loads and motion; returns the names of the files."""
+    """Write result.json, figures.csv, history.csv, bearing.rexs and pictures of loads and motion; returns the names of the files."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
@@ -64,11 +73,64 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     plots.roller_loads(motion, folder / "roller_loads.png")
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    names = ["result.json", "figures.csv", "history.csv", "roller_loads.png", "cage_orbit.png", "pocket_forces.png"]
+    names = [
+        "result.json",
+        "figures.csv",
+        _write_rexs(scene, result, folder),
+        "history.csv",
+        "roller_loads.png",
+        "cage_orbit.png",
+        "pocket_forces.png",
+    ]
     if result.stiffness_N_um is None:
         return names
     plots.stiffness_over_clearance(scene, folder / "stiffness.png")
     return [*names, "stiffness.png"]
+
+
+def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:
+    """Write what REXS has a name for: the bearing, its operating point, speeds, loss, clearances and pressures."""
+    bearing, operation, clearance = scene.bearing, scene.operation, result.clearance_um
+    speed_rpm = operation.inner_speed_rpm - operation.outer_speed_rpm
+    torque = result.power_loss_W.value / abs(speed_rpm * RPM) if speed_rpm else None
+    temperatures, stiffness = result.temperatures_C or {}, result.stiffness_N_um or {}
+    listed = catalogue_entry(bearing)
+    sizes = listed[1] if listed else None
+    nodes = {key: temperatures[node].value if node in temperatures else None for key, node in REXS_NODES.items()}
+    oil = nodes.pop("temperature_lubricant") or scene.lubricant.temperature_C
+    attributes: Attributes = {
+        "bearing_type": ("none", "radial_roller_bearing"),
+        "catalogue_designation": ("none", bearing.designation),
+        "inner_diameter": ("mm", sizes and sizes.bore),
+        "outer_diameter": ("mm", sizes and sizes.outside),
+        "width": ("mm", sizes and sizes.width),
+        "radial_bearing_clearance": ("mum", clearance["drawn"]),
+        "operating_radial_bearing_clearance": ("mum", clearance["operating"]),
+        "speed_inner_ring": ("1 / min", operation.inner_speed_rpm),
+        "speed_outer_ring": ("1 / min", operation.outer_speed_rpm),
+        "speed_rolling_element_set": ("1 / min", result.cage_speed_rpm.value),
+        "force_acting_on_inner_component_v": ("N", operation.radial_load_N),
+        "temperature_lubricant": ("C", oil),
+        **{key: ("C", value) for key, value in nodes.items()},
+        "total_frictional_power_loss": ("W", result.power_loss_W.value),
+        "total_frictional_torque": ("N m", torque),
+        "maximum_hertzian_pressure_inner_ring": ("MPa", result.races["inner"]["max_pressure_MPa"]),
+        "maximum_hertzian_pressure_outer_ring": ("MPa", result.races["outer"]["max_pressure_MPa"]),
+        "operating_point_stiffness_f_v_d_v": ("N / m", 1e6 * stiffness["xx"] if stiffness else None),
+        "operating_point_stiffness_f_w_d_w": ("N / m", 1e6 * stiffness["yy"] if stiffness else None),
+    }
+    row: Attributes = {
+        "number_of_rolling_elements": ("none", bearing.rollers),
+        "reference_diameter_rolling_bearing": ("mm", bearing.pitch_diameter_mm),
+        "pressure_angle": ("deg", 0.0),
+    }
+    element: Attributes = {
+        "diameter_of_rolling_element": ("mm", bearing.roller_diameter_mm),
+        "length_of_rolling_element": ("mm", bearing.roller_length_mm),
+    }
+    lubricant: Attributes = {"name": ("none", scene.lubricant.oil)}
+    name = bearing.designation or "cylindrical roller bearing"
+    return write_rexs(folder / "bearing.rexs", name, attributes, row, element, lubricant)
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":

@@ -4,7 +4,7 @@
 - ``oils``: grades and data sheets
 - ``tolerances``: limits of shafts, housings and rings (ISO 286, ISO 492), and the interference of a ring on its seat
 - ``catalogue``: designations, boundary dimensions, and the estimated interior of a bearing
-- ``drawing``: what a drawing of one's own leaves open
+- ``drawing``: what a drawing of one's own leaves open; ``rexs``: bearings of gearbox programs
 
 Tables of numbers are CSV and TOML files in this folder; ``table`` reads the CSV files.
 """
