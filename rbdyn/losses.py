@@ -74,7 +74,7 @@ LOSSES = (
 POWER_TERMS = tuple(dict.fromkeys(loss.power or loss.name for loss in LOSSES if loss.power is not None))
 # Their places in the power vector of a simulation. The input by the shafts and by loads without a potential follow, then the
 # inner race's part of the rolling resistance. At last come what damage sums: the force of all pockets [N], and the squeeze power of
-# their films.
+# their films. A force is no power: balances of power and energy leave it out.
 (
     OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
     LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POCKET_FORCE, POCKET_SQUEEZE, POWERS,

@@ -218,6 +218,7 @@ class SimulationResult(Brief, SavedRecord):
       first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
+    - ``pocket_impacts``: impacts of each pocket in turn, by the keys of their figures; None where they are not followed
     - ``verdict``: class of the cage by its orbit, None where the scene leaves it out
     - ``part_figures``: power terms, operating clearances, contact pressures and films, life and stiffness by name, each with its
       errors (``rbdyn.dynamics.figures``)
@@ -250,6 +251,7 @@ class SimulationResult(Brief, SavedRecord):
     thermal: dict[str, Any] | None = None
     part_figures: dict[str, Quantity] | None = None
     damage: dict[str, Quantity] | None = None
+    pocket_impacts: dict[str, list[float]] | None = None
     verdict: CageVerdict | None = nullable(default=None)
     stiffness_N_um: dict[str, float] | None = derived(lambda self: self._stiffness())  # noqa: N815
     start: StartResult | None = None

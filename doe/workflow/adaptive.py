@@ -87,7 +87,7 @@ class Evaluator:
 def check_adaptive(study: Problem) -> None:
     """Raises InputError for an impossible search."""
     border_of(study)
-    study.adaptive_scenes(study.baseline[None], [2], 0)
+    study.adaptive_scenes(study.baseline[None], [Plan.least], 0)
     try:
         check_budget(plan_of(study), len(study.design.coded))
     except MethodError as error:
@@ -186,7 +186,7 @@ def border_of(study: Problem) -> Border | None:
         try:
             for corner in corners:
                 numbers = study.centre + reach * corner
-                (run,) = study.adaptive_scenes(numbers[None], [2], 0)
+                (run,) = study.adaptive_scenes(numbers[None], [Plan.least], 0)
                 least_mm = min(scene.mounted_clearance_mm for scene in scenes_of(run))
                 if 1e3 * least_mm < study.file.adaptive.least_clearance_um:
                     return False

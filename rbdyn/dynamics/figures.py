@@ -5,7 +5,7 @@ They stand apart from compiled code so that a command can check a name without i
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -14,7 +14,24 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
-from rbdyn.dynamics.forces.state import EXPONENTS, NUMBER, PEAK_POWERS, POCKET_CONTACT_LOAD, POCKET_LOAD, SQUARES
+from rbdyn.dynamics.forces.state import (
+    ENTRY_ENERGIES,
+    ENTRY_SLIPS,
+    EXPONENTS,
+    INNER_DENSITIES,
+    INNER_FLASHES,
+    NUMBER,
+    OUTER_DENSITIES,
+    OUTER_FLASHES,
+    PEAK_POWERS,
+    POCKET_CONTACT_LOAD,
+    POCKET_LOAD,
+    SAMPLE_LOWEST,
+    SAMPLE_STEPS,
+    SAMPLES_NUMBER,
+    SAMPLES_TOTAL,
+    SQUARES,
+)
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.losses import (
@@ -71,7 +88,7 @@ class Figure:
     worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
     is_defined: Callable[[Sequence[Replicate]], bool] = lambda runs: True
     needs: str = ""
-    sums: Literal["", "impacts"] = ""
+    sums: Literal["", "impacts", "races"] = ""
     response: bool = True
     harmonic: bool = False
     accuracy: float = 0.0
@@ -217,6 +234,42 @@ def fatigue_force(sums: Array) -> Array:
     return np.where(defined, (powers / number) ** (number / exponents), 0.0)
 
 
+def quantile(sums: Array) -> Array:
+    """Value that 95 % of the samples stay below, from a histogram after two numbers on the last axis; 0 without samples."""
+    counts = sums[..., 2:]
+    shares = np.cumsum(counts, axis=-1) / np.maximum(sums[..., :1], 1.0)
+    place = np.argmax(shares >= LEVEL - 1e-12, axis=-1)[..., None]
+    own = np.maximum(np.take_along_axis(counts, place, -1) / np.maximum(sums[..., :1], 1.0), 1e-300)
+    inside = 1.0 - (np.take_along_axis(shares, place, -1) - LEVEL) / own
+    values = SAMPLE_LOWEST * 10.0 ** ((place + np.clip(inside, 0.0, 1.0)) / SAMPLE_STEPS)
+    # The first step holds all that is smaller.
+    return np.where((sums[..., 0] > 0.5) & (place[..., 0] > 0), values[..., 0], 0.0)
+
+
+def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: float = 1.0) -> "Figure":
+    """The mean of a sampled quantity, or the value that 95 % of its samples stay below."""
+    columns = [SAMPLES_NUMBER, SAMPLES_TOTAL]
+
+    def moments(run: Replicate) -> Array:
+        sums = run.races[run.first :, place]
+        # Their number twice: a second sum that is zero means that there is nothing to follow.
+        return np.column_stack((sums[:, :1], sums[:, :1], sums[:, 2:])) if level else sums[:, columns]
+
+    return Figure(
+        key,
+        meaning,
+        Statistic(moments, quantile if level else _mean_or_none),
+        scale,
+        kind="damage",
+        words=f"{meaning} [{unit}]",
+        sums="races",
+        is_defined=lambda runs: any(bool(run.races[run.first :, place, SAMPLES_NUMBER].any()) for run in runs),
+    )
+
+
+LEVEL = 0.95
+
+
 def _mean_or_none(sums: Array) -> Array:
     """Second sum over the first; 0 of no impacts."""
     return np.where(sums[..., 0] > 0.5, sums[..., 1] / np.maximum(sums[..., 0], 1.0), 0.0)
@@ -244,7 +297,7 @@ def _land_sliding(scene: "Scene") -> float | None:
 
 
 # Wear by Archard's law is in proportion to sliding: force times the speed of the surface on which it acts.
-DAMAGE = (
+CAGE_DAMAGE = (
     Figure(
         "pocket_sliding_N_m_s",
         "contact force of a pocket times the speed at which its roller slides on it, mean over time and pockets",
@@ -336,6 +389,37 @@ DAMAGE = (
         is_defined=is_fitted,
     ),
 )
+
+
+RACE_DAMAGE = (
+    *(
+        _sampled(place, f"{race}_{key}", f"{words} of {race} race, 95 % below", unit, True, scale)
+        for key, words, unit, scale, places in (
+            ("power_density_W_mm2", "power density", "W/mm2", 1e-6, (INNER_DENSITIES, OUTER_DENSITIES)),
+            ("flash_rise_K", "flash rise", "K", 1.0, (INNER_FLASHES, OUTER_FLASHES)),
+        )
+        for race, place in zip(("inner", "outer"), places, strict=True)
+    ),
+    _sampled(ENTRY_SLIPS, "entry_slip_m_s", "slip of a roller at its entry, mean", "m/s", False),
+    _sampled(ENTRY_SLIPS, "entry_slip_95_m_s", "slip at its entry, 95 % below", "m/s", True),
+    _sampled(ENTRY_ENERGIES, "entry_energy_J", "friction energy of its entry, mean", "J", False),
+    _sampled(ENTRY_ENERGIES, "entry_energy_95_J", "friction energy of it, 95 % below", "J", True),
+)
+DAMAGE = (*CAGE_DAMAGE, *RACE_DAMAGE)
+
+
+def pocket_impacts(scene: "Scene", runs: Sequence[Replicate]) -> dict[str, list[float]] | None:
+    """Figures of impacts of each pocket in turn, 0 of a pocket without any; None where impacts are not followed."""
+    found = {}
+    for figure in (figure for figure in DAMAGE if figure.sums == "impacts"):
+        scale, statistic = figure.scale_in(scene), figure.statistic
+        if scale is None or statistic is None:
+            return None
+        pockets = range(runs[0].impacts.shape[1])
+        alone = [[replace(run, impacts=run.impacts[:, [pocket]]) for run in runs] for pocket in pockets]
+        sums = [np.sum([statistic.moments(run).sum(axis=0) for run in each], axis=0) for each in alone]
+        found[figure.key] = [scale * float(statistic.of_sums(total)) for total in sums]
+    return found
 
 
 def why_missing(scene: "Scene", key: str) -> str | None:

@@ -107,7 +107,7 @@ class Recording:
             if self._batches == self.batches.first:
                 run.forget()
             self._go(float(end))
-            for sums in (tally.whirl, tally.work, tally.largest, tally.impacts):
+            for sums in (tally.whirl, tally.work, tally.largest, tally.impacts, tally.races):
                 self._booked.frombytes(sums.tobytes())
                 sums[:] = 0.0
             if run.carry.trace.components.size:
@@ -136,8 +136,10 @@ class Recording:
         """The record so far, counted from the end of the warm-up."""
         run, scale, tally = self.run, scales(self.run.scene), self.run.tally
         booked = np.array(self._booked).reshape(self._batches, -1)
-        parts = np.split(booked, np.cumsum((tally.whirl.size, tally.work.size, tally.largest.size)), axis=1)
-        motion, work, largest, impacts = (np.ascontiguousarray(part) for part in parts)
+        parts = np.split(
+            booked, np.cumsum([sums.size for sums in (tally.whirl, tally.work, tally.largest, tally.impacts)]), axis=1
+        )
+        motion, work, largest, impacts, races = (np.ascontiguousarray(part) for part in parts)
         # Contiguous too: the order of memory decides the last bit of sums.
         speeds, places = (np.ascontiguousarray(motion[:, columns]) for columns in (SPEED_SUMS, PLACE_SUMS))
         cage, rolling, energy = np.array(self._looks).T
@@ -150,6 +152,7 @@ class Recording:
             work=work,
             largest=largest,
             impacts=impacts.reshape(-1, *tally.impacts.shape),
+            races=races.reshape(-1, *tally.races.shape),
             cage_angle=np.diff(cage),
             kinematic_angle=np.diff(rolling),
             energy=energy,

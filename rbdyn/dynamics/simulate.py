@@ -14,7 +14,7 @@ from rbdyn.base.words import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
-from rbdyn.dynamics.figures import BEARING, DAMAGE
+from rbdyn.dynamics.figures import BEARING, DAMAGE, pocket_impacts
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -194,6 +194,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         scene=scene.model_dump(mode="json"),
         part_figures=part_figures(scene, runs, figures),
         damage={figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures},
+        pocket_impacts=pocket_impacts(scene, runs),
         verdict=verdict_of(scene, runs),
     )
 

@@ -143,6 +143,7 @@ class Damage(Sparse):
 
     UNSAVED: ClassVar[Mapping[str, Any]] = {
         "impacts": True,
+        "races": True,
         "impact_speed_m_s": 0.01,
         "fatigue_exponent": 8.0,
         "stress_concentration": 2.0,
@@ -151,6 +152,9 @@ class Damage(Sparse):
     impacts: bool = True
     """Follow impacts in the pockets one by one for impacts_per_turn, impact_energy_J and impact_fatigue_force_N, which false leaves
     out. A study follows them only where it names one of these."""
+    races: bool = True
+    """Sample the race contacts 24 times in a shaft turn for inner_power_density_W_mm2, entry_slip_m_s and their fellows, which
+    false leaves out. A study samples them only where it names one of these."""
     impact_speed_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.01
     """Speed of the first approach above which the contact of a roller and a pocket wall is an impact."""
     fatigue_exponent: Annotated[float, Field(ge=1.0, le=20.0)] = 8.0

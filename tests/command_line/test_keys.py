@@ -133,7 +133,7 @@ UNITS = {
     "deg": "contact_angle gravity_direction phase tilt_direction",
     "mrad": "tilt tilt_x tilt_y",
     "rpm": "inner_speed outer_speed speed",
-    "m_s": "blend_speed land_restitution_speed pocket_restitution_speed u_m",
+    "m_s": "blend_speed impact_speed land_restitution_speed pocket_restitution_speed u_m",
     "s_m": "land_damping_alpha pocket_damping_alpha race_damping_alpha",
     "GPa": "bore_modulus elastic_modulus shaft_modulus",
     "l_min": "oil_flow", "hz": "whirl_cutoff whirl_notches",

@@ -161,6 +161,7 @@ def test_invariant_energy_without_friction(conservative, replicate):
         for turn in range(10):
             run.to(turn + 1.0)
             worst = max(worst, abs(sum(mechanical_energy(run.bearing, run.carry.y)) - start))
+        # The sum of the pockets' forces is an impulse, not a work.
         assert (np.delete(run.tally.work, POCKET_FORCE) == 0.0).all()
         assert worst < 1e-6 * (kinetic + elastic)
         drift[rtol] = worst / elastic

@@ -15,7 +15,11 @@ from doe.clearance import responses_of
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.contact.cage_bar import CageSection, clamped_stress
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import DAMAGE
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, ENTRY_SLIPS, SAMPLES_NUMBER
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.extremes import LARGEST_DISTANCE, RETURN_WINDOWS, distance, moments_of, return_level
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -99,8 +103,10 @@ def test_other_laws_are_refused():
 
 def test_return_force_needs_windows_and_exceeds_their_mean():
     """Eight windows of a turn bear no return force; 36 of them bear one above their mean, with an error."""
-    fewer = result("numerics.impact_window_turns=1", "numerics.replicates=2").damage
-    assert "impact_return_force_N" not in fewer
+    fewer = result("numerics.impact_window_turns=1", "numerics.replicates=2")
+    assert "impact_return_force_N" not in fewer.damage
+    assert any("8 impact windows are fewer than 30" in note for note in fewer.notes)
+    assert not any("return force" in note for note in result("model.pocket=off").notes)
     run = result("numerics.impact_window_turns=1", "numerics.replicates=9", "numerics.seed=3")
     force = run.damage["impact_return_force_N"]
     assert force.value > run.impact_force_N.value and force.statistical_error > 0.0
@@ -134,6 +140,7 @@ def test_stress_follows_the_return_force_and_its_concentration():
         ("land_sliding_N_m_s", "model.guide_land=off", "leaves out the guide land"),
         ("impact_energy_J", "damage.impacts=false", "damage.impacts = false"),
         ("impacts_per_turn", "model.pocket=off", "leaves out pockets"),
+        ("entry_slip_m_s", "damage.races=false", "damage.races = false"),
         ("wear_life_h", "model.drag_coefficient=1.0", "wear needs K/H of a rig"),
     ],
 )
@@ -165,7 +172,7 @@ def test_a_study_follows_impacts_only_where_it_names_them(tmp_path):
     """Scenes of a study leave the sums out unless a response needs them; figures that remain keep their bits without them."""
     problem = Problem.load(short_study(tmp_path))
     scene = problem.scene_at(problem.baseline, 1)
-    assert not scene.damage.impacts
+    assert not scene.damage.impacts and not scene.damage.races
     text = problem.path.read_text(encoding="utf-8").replace("power_loss_W", "impact_fatigue_force_N")
     path = tmp_path / "named.toml"
     path.write_text(text, encoding="utf-8")
@@ -187,3 +194,60 @@ def test_impacts_are_fewer_the_faster_they_must_be():
     none = result("damage.impact_speed_m_s=50").damage
     assert none["impacts_per_turn"].value == 0.0
     assert "impact_energy_J" not in none and "impact_fatigue_force_N" not in none
+
+
+def test_samples_of_the_races_change_no_motion():
+    """Without the samples every other figure keeps its bits; with them power density is largest at the inner race."""
+    full, bare = result(), result("damage.races=false")
+    sampled = [figure.key for figure in DAMAGE if figure.sums == "races"]
+    assert len(sampled) == 8 and set(full.damage) - set(bare.damage) == set(sampled)
+    assert bare.figures == full.figures and bare.power_terms_W == full.power_terms_W
+    damage = full.damage
+    assert damage["inner_power_density_W_mm2"].value > damage["outer_power_density_W_mm2"].value > 0.0
+    assert damage["entry_slip_95_m_s"].value > damage["entry_slip_m_s"].value > 0.0
+
+
+def test_light_loads_enter_with_more_slip():
+    """A tenth of the load leaves the rollers slower outside the load zone: more slip and more energy at each entry."""
+    loaded, light = result().damage, result("operation.radial_load_N=130").damage
+    assert light["entry_slip_m_s"].value > 3.0 * loaded["entry_slip_m_s"].value
+    assert light["entry_energy_J"].value > loaded["entry_energy_J"].value
+
+
+def test_each_roller_enters_once_a_turn_of_the_cage():
+    """Entries of all rollers are as many as passes of rollers through the load zone, within the two at the ends."""
+    scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", ["damage.impacts=false"])
+    run = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
+    run.to(3.0)
+    run.forget()
+    begin = run.carry.y[run.layout.first_body + CAGE_ANGLE]
+    run.to(33.0)
+    passes = (run.carry.y[run.layout.first_body + CAGE_ANGLE] - begin) / (2.0 * np.pi) * scene.bearing.rollers
+    assert run.tally.races[ENTRY_SLIPS, SAMPLES_NUMBER] == pytest.approx(passes, abs=2.0)
+
+
+def test_net_force_of_the_pockets_drives_the_cage_against_its_land():
+    """Mean moments on the cage balance: net pocket force times pitch radius is the torque of the land (43.2 W at 981 rad/s)."""
+    path = ROOT / "examples" / "cylindrical_roller.toml"
+    motion, scene = rbdyn.history(path, 40, notice=None), Scene.load(path)
+    parts = motion.pocket_load.sum(axis=1).reshape(8, -1).mean(axis=1)
+    powers, speed = result().power_terms_W, float(motion.cage_speed.mean())
+    land = (powers["land_film"] + powers["land_friction"]) / speed / (0.5e-3 * scene.bearing.pitch_diameter_mm)
+    assert land == pytest.approx(2.0, abs=0.05)
+    # Student's t of 7 degrees of freedom for 99 %.
+    assert abs(parts.mean() - land) < 3.5 * parts.std(ddof=1) / np.sqrt(8.0)
+
+
+def test_pockets_share_the_impacts():
+    """Impacts of the pockets add up to those of all, with their energies and forces."""
+    run = result()
+    pockets = run.pocket_impacts
+    assert pockets is not None and len(pockets["impacts_per_turn"]) == 10
+    numbers, energies = np.array(pockets["impacts_per_turn"]), np.array(pockets["impact_energy_J"])
+    assert numbers.sum() == pytest.approx(run.damage["impacts_per_turn"].value)
+    assert numbers @ energies / numbers.sum() == pytest.approx(run.damage["impact_energy_J"].value)
+    forces = np.array(pockets["impact_fatigue_force_N"])
+    whole = (numbers @ forces**8 / numbers.sum()) ** 0.125
+    assert whole == pytest.approx(run.damage["impact_fatigue_force_N"].value)
+    assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).pocket_impacts == pockets
+    assert result("damage.impacts=false").pocket_impacts is None

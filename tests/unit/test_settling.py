@@ -26,6 +26,7 @@ from rbdyn.dynamics.forces.state import (
     LOADS,
     POCKET_CONTACT_LOAD,
     POCKET_LOAD,
+    SAMPLED,
 )
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import (
@@ -65,7 +66,7 @@ def made_of(loss, first=0, per_window=1, impact=None):
     largest[:, POCKET_LOAD] = largest[:, POCKET_CONTACT_LOAD] = loss if impact is None else impact
     whirl[:, 0] = 10.0
     ones = np.ones(count)
-    impacts = np.zeros((count, 1, IMPACT_SUMS))
+    impacts, races = np.zeros((count, 1, IMPACT_SUMS)), np.zeros((count, SAMPLED, 3))
     return Replicate(
         first,
         per_window,
@@ -82,6 +83,7 @@ def made_of(loss, first=0, per_window=1, impact=None):
         1,
         0.0,
         impacts=impacts,
+        races=races,
     )
 
 

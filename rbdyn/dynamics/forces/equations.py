@@ -76,6 +76,7 @@ class RollerBearing(NamedTuple):
     drive: Any
     gravity: Any
     impacts: Any
+    samples: Any
 
 
 @kernel

@@ -49,9 +49,15 @@ TIME, INNER_ANGLE, OUTER_ANGLE = range(len(CLOCK))
 # Places of the largest loads in their vector. On a pocket wall: contact and film together, and contact alone.
 POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 # Rows of impacts under way, by roller: speed of the first approach [m/s], 0 without contact, and largest load since then [N].
-APPROACH, PEAK, FOLLOWED = range(3)
+# Then entries into the load zone: state, samples since the last one, slip [m/s] and energy [J] of one that has not ended.
+APPROACH, PEAK, ENTRY_OUTSIDE, ENTRY_SAMPLES, ENTRY_SLIP, ENTRY_ENERGY, FOLLOWED = range(7)
 # Sums over the impacts of a pocket: number, squared speeds [m2/s2], peaks to the power of the exponent, and the exponent.
 NUMBER, SQUARES, PEAK_POWERS, EXPONENTS, IMPACT_SUMS = range(5)
+# Sums of samples of the races and of entries: power density [W/m2] and flash temperature [K] of each race, slip [m/s] and energy [J]
+# of entries. Each has number, total, and a histogram of steps of a sixteenth of a decade from the lowest value on.
+INNER_DENSITIES, OUTER_DENSITIES, INNER_FLASHES, OUTER_FLASHES, ENTRY_SLIPS, ENTRY_ENERGIES, SAMPLED = range(7)
+SAMPLES_NUMBER, SAMPLES_TOTAL = range(2)
+SAMPLE_LOWEST, SAMPLE_STEPS, SAMPLE_BINS = 1e-9, 16, 16 * 22
 
 
 class Layout(NamedTuple):

@@ -25,6 +25,7 @@ from rbdyn.compiled.kernel import entry, kernel, law, routine
 from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
 from rbdyn.dynamics.forces.impacts import book_impacts
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
+from rbdyn.dynamics.forces.race_samples import book_races
 from rbdyn.dynamics.forces.state import (
     CAGE_VX,
     CAGE_VY,
@@ -37,12 +38,15 @@ from rbdyn.dynamics.forces.state import (
     POCKET_CONTACT_LOAD,
     POCKET_LOAD,
     ROLLER_STATES,
+    SAMPLE_BINS,
+    SAMPLED,
+    SAMPLES_TOTAL,
 )
 from rbdyn.losses import POWERS
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
-# frame [rad/s], next time of the trace [s].
-NOW, STEP, ERROR, SAMPLE, FRAME, TRACED, CLOCK = range(7)
+# frame [rad/s], next time of the trace and of the samples of the races [s].
+NOW, STEP, ERROR, SAMPLE, FRAME, TRACED, RACES, CLOCK = range(8)
 # In ``Carry.counts``: steps, right-hand sides, and the component that made the last step impossible.
 ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
 # In ``Carry.stiffness``: steps tested, those that stability limits, sum of their |eigenvalue| [1/s].
@@ -113,7 +117,7 @@ class Carry(NamedTuple):
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
     stiffness: NDArray[np.float64]
-    followed: NDArray[np.float64]  # (FOLLOWED, rollers) impacts under way
+    followed: NDArray[np.float64]  # (FOLLOWED, rollers) impacts and entries under way
     method: Any  # the implicit one with its work space
     trace: Trace  # begins at the time in the clock, infinite for never
 
@@ -126,6 +130,7 @@ class Tally(NamedTuple):
     largest_time: NDArray[np.float64]  # (LOADS,) and when [s]
     whirl: NDArray[np.float64]
     impacts: NDArray[np.float64]  # (rollers, IMPACT_SUMS)
+    races: NDArray[np.float64]  # (SAMPLED, 2 + SAMPLE_BINS)
 
 
 def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: Any) -> Carry:
@@ -142,8 +147,8 @@ def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: 
 
 def empty_tally(rollers: int) -> Tally:
     """A tally of nothing of so many rollers."""
-    impacts = np.zeros((rollers, IMPACT_SUMS))
-    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL), impacts)
+    impacts, races = np.zeros((rollers, IMPACT_SUMS)), np.zeros((SAMPLED, SAMPLES_TOTAL + 1 + SAMPLE_BINS))
+    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL), impacts, races)
 
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -360,6 +365,9 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 refine_peak(bearing, carry, h, tally)
             if clock[TRACED] <= clock[NOW] + h:
                 book_trace(carry, h)
+            clock[RACES] = book_races(
+                bearing.samples, bearing, stage, clock[NOW] + h, clock[RACES], followed, tally.races
+            )
             counts[ACCEPTED] += 1
             clock[NOW] = t_end if cut else clock[NOW] + h
             end_to_start(method, y, stage, k, power, loads)

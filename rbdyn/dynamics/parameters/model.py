@@ -53,6 +53,7 @@ from rbdyn.dynamics.forces.cage import (
 )
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
+from rbdyn.dynamics.forces.race_samples import NoRaceSamples, RaceSamples, RaceScale
 from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
 from rbdyn.dynamics.parameters.state import contact_approach, layout_of, load_distribution
 from rbdyn.properties.materials import Oil, equivalent_modulus
@@ -246,7 +247,9 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         drive=_drive(scene),
         gravity=_gravity(scene),
         impacts=_impacts(scene),
+        samples=NoRaceSamples(),
     )
+    bearing = bearing._replace(samples=_race_samples(scene, bearing))
     if not isinstance(bearing.open_film, LayerFilm):
         return bearing
     # The loads that lay the oil do not depend on its film.
@@ -269,10 +272,16 @@ def oil_layer(scene: Scene, bearing: RollerBearing | None = None) -> float:
     return scene.once("oil_layer", lambda: _oil_layer(scene, bearing or roller_bearing(scene)))
 
 
-def _oil_layer(scene: Scene, bearing: RollerBearing) -> float:
-    operation, distance = scene.operation, scene.lubricant.inlet_distance
+def _mean_load(scene: Scene) -> float:
+    """Root mean square over a turn of steady and rotating load [N]."""
+    operation = scene.operation
     turning = operation.rotating_load_N + operation.unbalance * operation.speeds[0] ** 2
-    inner = load_distribution(scene, bearing, math.hypot(operation.radial_load_N, turning)).inner
+    return math.hypot(operation.radial_load_N, turning)
+
+
+def _oil_layer(scene: Scene, bearing: RollerBearing) -> float:
+    distance = scene.lubricant.inlet_distance
+    inner = load_distribution(scene, bearing, _mean_load(scene)).inner
     if distance is None or not np.any(inner > 0.0):
         return 0.0
     load, contact, film = float(inner[inner > 0.0].mean()), rolling_contacts(scene)["inner"], 0.0
@@ -456,6 +465,33 @@ def _impacts(scene: Scene) -> NoImpacts | Impacts:
     if scene.model.pocket == "off" or not damage.impacts:
         return NoImpacts()
     return Impacts(damage.impact_speed_m_s, damage.fatigue_exponent)
+
+
+# Factor of Blok's flash temperature for a parabolic distribution of heat.
+BLOK = 1.11
+# Samples of the races in a shaft turn; an entry begins at a tenth of the load, and ends at 2 % of the rolling speed.
+RACE_SAMPLES, ENTRY_LOAD, ENTRY_SLIP = 24, 0.1, 0.02
+
+
+def _race_samples(scene: Scene, bearing: RollerBearing) -> NoRaceSamples | RaceSamples:
+    contacts, motion = rolling_contacts(scene), scene.geometry.motion
+    speed = abs(motion.entrainment)
+    if not scene.damage.races or speed == 0.0:
+        return NoRaceSamples()
+    effusivity = 0.5 * (scene.material("rings").effusivity + scene.material("roller").effusivity)
+
+    def scale(contact: film_thickness.RollingContact) -> RaceScale:
+        per_root = float(film_thickness.half_width(contact, 1.0))
+        flash = BLOK / (contact.length * effusivity * math.sqrt(2.0 * per_root))
+        return RaceScale(0.5 / (contact.length * per_root), flash, speed)
+
+    inner = load_distribution(scene, bearing, _mean_load(scene)).inner
+    load = ENTRY_LOAD * float(inner.max(axis=1).mean())
+    spacing = scene.turn_s / RACE_SAMPLES
+    pause = math.pi / (spacing * max(abs(motion.cage_speed), 1e-9 / spacing))
+    return RaceSamples(
+        spacing, scale(contacts["inner"]), scale(contacts["outer"]), load or math.inf, ENTRY_SLIP * speed, pause
+    )
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:

@@ -65,12 +65,18 @@ def least_windows(turns: float, window: float, replicates: int) -> int:
 
 
 def return_force_notes(runs: Sequence[Replicate]) -> Notes:
-    """A note where there are enough windows and no return force."""
-    windows = sum(len(run.windows(POCKET_LOAD)) for run in runs)
-    if windows < FEWEST_WINDOWS or is_fitted(runs):
+    """A note where pockets are hit and there is no return force: too few windows, or another law than Gumbel's."""
+    windows, hit = (
+        sum(len(run.windows(POCKET_LOAD)) for run in runs),
+        any(run.largest_load(POCKET_LOAD) for run in runs),
+    )
+    if is_fitted(runs) or not hit:
         return ()
     sentence = (
-        f"impact return force: not given, for the largest forces of {windows} windows do not follow Gumbel's law; lengthen "
-        "numerics.impact_window_turns"
+        f"impact return force: not given, because {windows} impact windows are fewer than {FEWEST_WINDOWS}; raise numerics.turns "
+        "or numerics.replicates, or shorten numerics.impact_window_turns"
+        if windows < FEWEST_WINDOWS
+        else f"impact return force: not given, because the largest forces of {windows} windows do not follow Gumbel's law; "
+        "lengthen numerics.impact_window_turns"
     )
     return (Note("remark", sentence),)

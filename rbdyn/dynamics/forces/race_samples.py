@@ -1,0 +1,135 @@
+"""Samples of the race contacts at even times: heat of sliding, flash temperature, and entries into the load zone.
+
+Power density of a contact: mu Q |s| over the area 2 b l of the Hertz contact. Flash temperature: 1.11 mu (Q/l) |sqrt u1 -
+sqrt u2|/(e sqrt(2 b)) (Blok 1937, as in AGMA 925 and ISO/TS 6336-20) with the mean effusivity e of both bodies; u1 is the speed
+at which the race passes the contact, u2 = u1 - s that of the roller.
+
+Entry: the load of a roller on the inner race passes a tenth of the largest static load. Its energy is the sum of mu Q |s|
+until |s| is below 2 % of the rolling speed, or until the load falls below half that tenth. A roller enters once in half a turn
+of the cage at most, since a load that vibrates passes a limit many times.
+"""
+
+import math
+from typing import NamedTuple
+
+from rbdyn.compiled.kernel import kernel, law, routine
+from rbdyn.dynamics.forces.equations import motions
+from rbdyn.dynamics.forces.observe import race_observed
+from rbdyn.dynamics.forces.state import (
+    ENTRY_ENERGIES,
+    ENTRY_ENERGY,
+    ENTRY_OUTSIDE,
+    ENTRY_SAMPLES,
+    ENTRY_SLIP,
+    ENTRY_SLIPS,
+    INNER_DENSITIES,
+    INNER_FLASHES,
+    OUTER_DENSITIES,
+    OUTER_FLASHES,
+    SAMPLE_BINS,
+    SAMPLE_LOWEST,
+    SAMPLE_STEPS,
+    SAMPLES_NUMBER,
+    SAMPLES_TOTAL,
+)
+
+
+class NoRaceSamples(NamedTuple):
+    """Race contacts are not sampled."""
+
+
+class RaceScale(NamedTuple):
+    """Constants of the contacts of a race."""
+
+    density: float  # power density times area, over the root of the load: 1/(2 l b/sqrt Q) [sqrt(N)/m2]
+    flash: float  # flash temperature over friction force, difference of the roots of speeds, and Q^(-1/4)
+    speed: float  # at which the race passes the contact, without slip of the cage [m/s]
+
+
+class RaceSamples(NamedTuple):
+    """When and how race contacts are sampled."""
+
+    spacing: float  # [s]
+    inner: RaceScale
+    outer: RaceScale
+    entry_load: float  # on the inner race, from which a roller is in the load zone [N]
+    rolling_slip: float  # below which an entry has ended [m/s]
+    pause: float  # fewest samples between two entries of a roller
+
+
+@law
+def book_races(samples, bearing, y, time, next_time, followed, sums):
+    """Sample all race contacts in state ``y`` where it is ``time`` [s] for it; returns when the next sample is due [s].
+
+    ``followed`` (FOLLOWED, rollers) and ``sums`` (SAMPLED, columns) change in place.
+    """
+
+
+@book_races.body(NoRaceSamples)
+def _(samples, bearing, y, time, next_time, followed, sums):
+    return math.inf
+
+
+@book_races.body(RaceSamples)
+def _(samples, bearing, y, time, next_time, followed, sums):
+    if time < next_time:
+        return next_time
+    sample_races(samples, bearing, y, followed, sums)
+    return max(next_time + samples.spacing, time)
+
+
+@routine
+def sample_races(samples, bearing, y, followed, sums):
+    """``book_races`` at a time of a sample."""
+    _, _, inner, outer = motions(bearing, y)
+    for j in range(bearing.rollers):
+        contact = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
+        book_contact(samples.outer, contact, OUTER_DENSITIES, OUTER_FLASHES, sums)
+        contact = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
+        book_contact(samples.inner, contact, INNER_DENSITIES, INNER_FLASHES, sums)
+        follow_entry(samples, contact, j, followed, sums)
+
+
+@kernel
+def book_value(sums, row, value):
+    """Add a value to number, total and logarithmic histogram in row ``row`` of ``sums``."""
+    place = SAMPLE_STEPS * math.log10(max(value, SAMPLE_LOWEST) / SAMPLE_LOWEST)
+    sums[row, SAMPLES_NUMBER] += 1.0
+    sums[row, SAMPLES_TOTAL] += value
+    sums[row, SAMPLES_TOTAL + 1 + min(int(place), SAMPLE_BINS - 1)] += 1.0
+
+
+@kernel
+def book_contact(scale, contact, density, flash, sums):
+    """Add power density [W/m2] and flash temperature [K] of a loaded contact to the rows of ``sums``."""
+    if contact.load <= 0.0:
+        return
+    slip = abs(contact.slip)
+    book_value(sums, density, contact.traction * scale.density / math.sqrt(contact.load))
+    friction = contact.traction / slip if slip > 0.0 else 0.0
+    roots = abs(math.sqrt(scale.speed) - math.sqrt(max(scale.speed - slip, 0.0)))
+    book_value(sums, flash, scale.flash * friction * roots / math.sqrt(math.sqrt(contact.load)))
+
+
+@kernel
+def follow_entry(samples, contact, j, followed, sums):
+    """Follow roller ``j`` into the load zone by its contact with the inner race, and book entries that end.
+
+    ``ENTRY_OUTSIDE``: whether its load was below the limit since. ``ENTRY_SAMPLES``: samples since its last entry. ``ENTRY_SLIP``:
+    its slip there, 0 where that entry has ended.
+    """
+    followed[ENTRY_SAMPLES, j] += 1.0
+    slip = abs(contact.slip)
+    if followed[ENTRY_SLIP, j] == 0.0:
+        outside, rested = followed[ENTRY_OUTSIDE, j] > 0.0, followed[ENTRY_SAMPLES, j] > samples.pause
+        followed[ENTRY_OUTSIDE, j] = 1.0 if contact.load < samples.entry_load else 0.0
+        if outside and rested and contact.load >= samples.entry_load:
+            followed[ENTRY_SLIP, j], followed[ENTRY_ENERGY, j] = max(slip, SAMPLE_LOWEST), 0.0
+            followed[ENTRY_SAMPLES, j] = 0.0
+    if followed[ENTRY_SLIP, j] > 0.0:
+        if slip < samples.rolling_slip or contact.load < 0.5 * samples.entry_load:
+            book_value(sums, ENTRY_SLIPS, followed[ENTRY_SLIP, j])
+            book_value(sums, ENTRY_ENERGIES, followed[ENTRY_ENERGY, j])
+            followed[ENTRY_SLIP, j] = 0.0
+        else:
+            followed[ENTRY_ENERGY, j] += contact.traction * samples.spacing
