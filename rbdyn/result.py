@@ -97,6 +97,33 @@ def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]
     )
 
 
+def start_sheet(start: "StartResult | None" = None) -> Sheet[Mapping[str, float]]:
+    """A row a moment of a start: operating point, temperatures, heat of the nodes, clearances, and their ranges."""
+    columns = dict[str, list[float]]()
+    if start is not None:
+        path = start.path
+        columns = {name: path[name] for name in ("time_s", "speed_rpm", "load_N")}
+        columns |= {f"{node}_temperature_C": column for node, column in path["temperatures_C"].items()}
+        columns |= {f"{node}_heat_W": column for node, column in path["heat_W"].items()}
+        columns |= {name.replace("_um", "_clearance_um"): column for name, column in path["figures"].items()}
+        ends = dict(zip(("low", "high"), (0, 1), strict=True))
+        columns |= {
+            f"{end}_{name.replace('_um', '_clearance_um') if name in path['figures'] else f'{name}_temperature_C'}": rows[
+                place
+            ]
+            for name, rows in path["ranges"].items()
+            for end, place in ends.items()
+        }
+    listed = [Column[Mapping[str, float]](name) for name in columns] or [
+        Column[Mapping[str, float]]("time_s", meaning="time from the start of the machine"),
+        Column[Mapping[str, float]]("{figure}", meaning="speed, load, temperatures, heat and clearances then"),
+        Column[Mapping[str, float]]("low_{figure}, high_{figure}", meaning="5 and 95 % over the inputs of the balance"),
+    ]
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    content = "One row per moment of a start ([thermal.start]), of `rbdyn simulate`."
+    return Sheet("", listed, rows, file="start.csv", content=content)
+
+
 def figure_columns(names: Iterable[str]) -> tuple[Column[Any], ...]:
     """Columns of files with each figure and its two errors, of rows that have ``figures`` by name."""
     quantity_columns = columns_of(Quantity)[:3]
@@ -138,6 +165,15 @@ TEMPERATURES = {
     "outer_temperature_C": "outer",
     "inner_temperature_C": "inner",
     "roller_temperature_C": "rollers",
+}
+
+
+# Figures of a start, and the part of it that each is of.
+START_FIGURES = {
+    "start_radial_clearance_um": "radial_um",
+    "start_guide_clearance_um": "guide_um",
+    "start_pocket_clearance_um": "pocket_um",
+    "start_inner_minus_outer_K": "temperature_difference_K",
 }
 
 
@@ -184,6 +220,12 @@ class StartResult(Record, kw_only=True):
     boundaries_C: dict[str, float]  # noqa: N815
     moments: tuple[StartMoment, ...]
     path: dict[str, Any]
+
+    @property
+    def figures(self) -> dict[str, Quantity]:
+        """Figures that a study may name, by ``START_FIGURES``."""
+        parts = {key: getattr(self, name) for key, name in START_FIGURES.items()}
+        return {key: getattr(part, "least", part) for key, part in parts.items() if part is not None}
 
 
 class FigureOf:
@@ -281,8 +323,8 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def responses(self) -> dict[str, Quantity]:
-        """All figures with errors that a study may name: those of the whole bearing and of its parts."""
-        return self.quantities | (self.part_figures or {})
+        """All figures with errors that a study may name: those of the whole bearing, of its parts and of its start."""
+        return self.quantities | (self.part_figures or {}) | ({} if self.start is None else self.start.figures)
 
     @property
     def jitters(self) -> bool:

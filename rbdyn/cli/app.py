@@ -38,6 +38,8 @@ SIMULATION_FILES = (
     "cage_orbit.png",
     "pocket_forces.png",
     "stiffness.png",
+    "start.csv",
+    "start.png",
 )
 DUTY_FILES = ("duty.json", "points.csv")
 MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_points.jsonl"

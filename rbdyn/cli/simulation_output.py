@@ -10,7 +10,7 @@ from rbdyn.base.words import counted, error_alone, label, range_ends, shown, val
 from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
 from rbdyn.properties.rexs import Attributes, write_rexs
-from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet
+from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet, start_sheet
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 
@@ -60,7 +60,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
 
 
 def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, figures.csv, history.csv, bearing.rexs and pictures of loads and motion; returns the names of the files."""
+    """Write result.json, figures.csv, history.csv, bearing.rexs and pictures, of a start too; returns the names of the files."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
@@ -73,7 +73,7 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     plots.roller_loads(motion, folder / "roller_loads.png")
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    names = [
+    files = [
         "result.json",
         "figures.csv",
         _write_rexs(scene, result, folder),
@@ -82,10 +82,14 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
         "cage_orbit.png",
         "pocket_forces.png",
     ]
-    if result.stiffness_N_um is None:
-        return names
-    plots.stiffness_over_clearance(scene, folder / "stiffness.png")
-    return [*names, "stiffness.png"]
+    if result.stiffness_N_um is not None:
+        plots.stiffness_over_clearance(scene, folder / "stiffness.png")
+        files.append("stiffness.png")
+    if result.start is not None:
+        start_sheet(result.start).save(folder)
+        plots.start(result.start, folder / "start.png")
+        files += ["start.csv", "start.png"]
+    return files
 
 
 def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:

@@ -43,7 +43,7 @@ from rbdyn.losses import (
     POWER_TERMS,
     SHAFT,
 )
-from rbdyn.result import TEMPERATURES
+from rbdyn.result import START_FIGURES, TEMPERATURES
 from rbdyn.scene.laws import SLOWEST_CAGE
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Figure:
 
     - ``statistic``: how it follows from batches; None for what follows from the scene, the largest loads or the heat balance.
       ``scale``: factor of its unit, or that of a scene, None where the scene has no such figure
-    - ``kind``: of the whole "bearing", of its "damage", of a node ("temperature"), or of one of its parts. ``source``: of a part, the loss, clearance,
+    - ``kind``: of the whole "bearing", of its "damage", of a node ("temperature"), of its "start", or of one of its parts. ``source``: of a part, the loss, clearance,
       or race and key of its report, that it is; of a temperature, its node
     - ``tested``: whether it must settle before a run ends. ``slow``: whether slow change counts in its error; ``balanced``: whether
       the gap of the power balance does
@@ -76,7 +76,9 @@ class Figure:
     meaning: str
     statistic: Statistic | None = None
     scale: "float | Callable[[Scene], float | None]" = 1.0
-    kind: Literal["bearing", "damage", "temperature", "power", "clearance", "life", "stiffness", "contact"] = "bearing"
+    kind: Literal["bearing", "damage", "temperature", "power", "start", "clearance", "life", "stiffness", "contact"] = (
+        "bearing"
+    )
     source: tuple[str, ...] = ()
     tested: bool = False
     slow: bool = True
@@ -423,7 +425,11 @@ def pocket_impacts(scene: "Scene", runs: Sequence[Replicate]) -> dict[str, list[
 
 
 def why_missing(scene: "Scene", key: str) -> str | None:
-    """Why a scene has no such figure of damage or stiffness, with the fix; None where it has."""
+    """Why a scene has no such figure of damage, stiffness or a start, with the fix; None where it has."""
+    if key in START_FIGURES and (scene.thermal is None or scene.thermal.start is None):
+        return "the scene has no [thermal.start]; add that table to its file or choose another figure"
+    if START_FIGURES.get(key) == "guide_um" and scene.cage.guidance == "roller":
+        return "no ring guides the cage; choose another figure"
     stiff = key in {figure.key for figure in of_kind("stiffness")}
     if stiff and scene.thermal is None and scene.operation.largest_load_N == 0.0 and scene.geometry.clearance >= 0.0:
         return "the scene has no load and no preload; raise operation.radial_load_N or choose another figure"
@@ -455,6 +461,18 @@ HEAT = tuple(
     # The accuracy is that of a thermocouple of class 1 at 100 C (IEC 60584-1: 1.5 K).
     Figure(key, f"temperature of the {_PLACES[node]}", kind="temperature", source=(node,), accuracy=1.5)
     for key, node in TEMPERATURES.items()
+)
+START = tuple(
+    Figure(
+        key,
+        "largest lead of the inner ring over the outer one while the cold machine warms"
+        if key.endswith("_K")
+        else f"least {name.partition('_')[0]} clearance while the cold machine warms",
+        kind="start",
+        source=(name,),
+        worst="largest" if key.endswith("_K") else "least",
+    )
+    for key, name in START_FIGURES.items()
 )
 _CONTACTS = ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
 PARTS = (
@@ -510,7 +528,7 @@ PARTS = (
         for key in _CONTACTS
     ),
 )
-FIGURES = (*BEARING, *DAMAGE, *HEAT, *PARTS)
+FIGURES = (*BEARING, *DAMAGE, *HEAT, *START, *PARTS)
 # In the order of their places on a map.
 PANELS = sorted((figure for figure in FIGURES if figure.panel), key=lambda figure: figure.panel or ())
 

@@ -1,12 +1,13 @@
 """A cold roller bearing that warms: short simulations of a few moments, and temperatures and clearances over time between them.
 
 The first moments are the cold machine and its steady state. Another is simulated where a film is 15 K, a clearance 10 % of the
-drawing, or speed or load a factor from the nearest one, at the point of the course that is farthest from all; each makes the
-course anew (``rbdyn.thermal.start``). Errors: the scatter of each moment's power loss moves the figures, as root sum of squares;
-so much as they move without one of the moments in between counts as error of the interpolation. Ranges over the inputs of the
-balance, with the masses of housing and shaft, are those of as many courses.
+cold one, or speed or load a factor from the nearest one, at the point of the course that is farthest from all; each makes the
+course anew (``rbdyn.thermal.start``). Errors are root sums of squares: of what the scatter of each moment's power loss moves, and,
+for the interpolation, of what leaving out each moment in between moves. Ranges over the inputs of the balance, with the masses of
+housing and shaft, are those of as many courses.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -19,15 +20,7 @@ from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
-from rbdyn.dynamics.parameters.start import (
-    NAMES,
-    at_point,
-    capacities,
-    clearances_at,
-    course_of,
-    seats_of,
-    turning_speed,
-)
+from rbdyn.dynamics.parameters.start import at_point, capacities, clearances_at, course_of, seats_of, turning_speed
 from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
@@ -59,9 +52,10 @@ from rbdyn.thermal.start import (
     warming_network,
 )
 
-# Short simulations at most, and failures of them: next to a seizure they take long and fail. Distances from a simulated moment at most: of a film [K], of a clearance over that of the drawing and
-# at least [um], of the logarithms of speed and load.
+# Short simulations at most, and failures of them: next to a seizure they take long and fail.
 MOST_SIMULATIONS, MOST_FAILURES = 10, 2
+# Distances from a simulated moment at most: of a film [K], of a clearance over the cold one and at least [um], of the logarithms of
+# speed and load.
 FILM_REACH, CLEARANCE_REACH, LEAST_REACH, POINT_REACH = 15.0, 0.1, 1.0, 0.35
 # Speed over the largest below which the power laws serve without a simulation: such heat is a tenth and less.
 SLOW = 0.25
@@ -94,7 +88,10 @@ class Failure(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """What stays over a start: scene, scene at temperatures, capacities (6,) [J/K], course, temperatures at the start (6,), state."""
+    """What stays over a start: scene, scene at temperatures, capacities (6,) [J/K], course, temperatures at the start (6,), state.
+
+    ``end``: time after which the slowest node is steady [s].
+    """
 
     scene: Scene
     hot: Scene
@@ -104,6 +101,7 @@ class Machine(NamedTuple):
     cold: Array
     state: State
     boundaries: Boundaries
+    end: float
 
     def clearances(self, rows: Warming, thermal: Thermal | None = None) -> tuple[dict[str, Array], dict[str, Array]]:
         """Clearances [um] by name over time, and what is left of those that may not be lost."""
@@ -185,8 +183,10 @@ def _machine(scene: Scene, state: State) -> Machine:
     assert thermal is not None and thermal.start is not None
     start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
     cold = np.full(len(WARMING_NODES), float(start))
-    course = course_of(scene)
-    return Machine(scene, hot, thermal, capacities(hot, thermal), course, cold, state, state.model.boundaries)
+    course, parts, boundaries = course_of(scene), capacities(hot, thermal), state.model.boundaries
+    whole, _ = warming_network(warming_conductances(state.model.conductances, seats_of(hot)), boundaries)
+    end = float(course.times[-1]) + SETTLED * slowest(parts, whole)
+    return Machine(scene, hot, thermal, parts, course, cold, state, boundaries, end)
 
 
 def _first_time(course: Course) -> float:
@@ -244,25 +244,19 @@ def _padded(of_nodes: Array) -> Array:
 
 def _reach(machine: Machine, films: Array) -> tuple[Array, Array]:
     """Changes of films and clearances by a kelvin of each node over how far a moment reaches, and the reach of speed and load."""
-    drawn = {NAMES[name]: play.drawn for name, play in machine.hot.clearances.items() if play is not None}
     middle = np.append(machine.state.temperatures, machine.state.temperatures[[OUTER, INNER]])
-    nodes = middle + np.vstack((np.zeros(len(middle)), np.eye(len(middle))))
+    nodes = np.vstack((machine.cold, middle, middle + np.eye(len(middle))))
     plays, _ = clearances_at(machine.hot, machine.thermal, nodes)
-    slopes = [
-        (play[1:] - play[0]) / max(1e6 * CLEARANCE_REACH * abs(drawn[name]), LEAST_REACH)
-        for name, play in plays.items()
-    ]
+    slopes = [(play[2:] - play[1]) / max(CLEARANCE_REACH * abs(play[0]), LEAST_REACH) for play in plays.values()]
     rows = films[np.abs(films).sum(axis=1) > 0.0]
     return np.vstack((np.unique(rows, axis=0) / FILM_REACH, slopes)), np.full(2, POINT_REACH)
 
 
 def _course_of(machine: Machine, law: Law, capacities: Array, tolerance: float) -> Warming:
     """Temperatures from the cold machine until the slowest node is steady, of many machines where the law has more axes."""
-    breaks = machine.course.times.tolist()
-    steady = law.matrices[..., 0, :, :].reshape(-1, *law.matrices.shape[-2:])[0]
-    end = breaks[-1] + SETTLED * slowest(machine.capacities, steady)
     start = np.broadcast_to(machine.cold, np.shape(capacities))
-    return warming(capacities, law.net_heat(machine.course), start, end, breaks, tolerance)
+    breaks = machine.course.times.tolist()
+    return warming(capacities, law.net_heat(machine.course), start, machine.end, breaks, tolerance)
 
 
 def _path(machine: Machine, law: Law) -> Path:
@@ -368,7 +362,7 @@ def _errors(
     errors = dict[str, tuple[float | None, float | None]]()
     for name, value in base.items():
         statistical = float(np.sqrt(((moved[name] - value) ** 2).sum()))
-        errors[name] = statistical, max((abs(float(other[name] - value)) for other in fewer), default=0.0)
+        errors[name] = statistical, math.hypot(*(float(other[name] - value) for other in fewer))
     return errors
 
 

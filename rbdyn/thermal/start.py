@@ -5,8 +5,8 @@ steady state is that of ``network``. The mechanics settles in milliseconds, so t
 
     P = sum_k w_k P_k (eta/eta_k)^p (n/n_k)^q (F/F_k)^r
 
-over the moments k that were simulated, with viscosity eta of the film, speed n and load F. The weights w_k fall with the fourth
-power of the distance from a moment, and sum to 1. Conductances have the same weights. Nothing here knows a bearing.
+over the moments k that were simulated, with viscosity eta of the film, speed n and load F. The weights w_k, exp(-(d/2)^2)/d of the
+distance d from a moment, sum to 1. Conductances have the same weights. Nothing here knows a bearing.
 """
 
 from collections.abc import Callable, Sequence
@@ -164,7 +164,9 @@ class Law(NamedTuple):
     def weights(self, temperatures: Array, course: Array) -> Array:
         """Weights of the moments (..., k)."""
         warmer, other = ((part**2).sum(axis=-1) for part in self._apart(temperatures, course))
-        near = 1.0 / (1e-12 + warmer + other) ** 2
+        squares = 1e-12 + warmer + other
+        # Next to linear between two moments; beyond twice the reach the nearer ones count alone.
+        near = np.exp(0.25 * (squares.min(axis=-1, keepdims=True) - squares)) / np.sqrt(squares)
         return np.asarray(near / near.sum(axis=-1, keepdims=True))
 
     def _apart(self, temperatures: Array, course: Array) -> tuple[Array, Array]:

@@ -12,14 +12,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
-from rbdyn import Scene, simulate
+from doe.clearance import responses_of
+from rbdyn import Scene, plots, simulate
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics import start as start_module
+from rbdyn.dynamics.figures import FIGURES, why_missing
 from rbdyn.dynamics.parameters.start import ROUGHNESS, capacities, clearances_at, seats_of
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
-from rbdyn.result import SimulationResult, StartResult
+from rbdyn.result import START_FIGURES, SimulationResult, StartResult, start_sheet
 from rbdyn.scene.thermal import Temperatures, at_temperatures, part_temperatures
 from rbdyn.thermal.start import WARMING_NODES
 
@@ -69,6 +71,7 @@ def test_unit_least_clearance_of_nu_308(cold):
     lead = start.temperature_difference_K.value
     assert lead > cold.temperatures_C["inner"].value - cold.temperatures_C["outer"].value + 2.0
     assert len(start.moments) <= 11 and start.moments[1].temperatures_C == dict.fromkeys(WARMING_NODES, 20.0)
+    assert {len(row) for rows in start.path["ranges"].values() for row in rows} == {len(start.path["time_s"])}
     low, median, high = start.ranges["radial_um"]
     assert low < least < high and low < median < high
     assert start.time_to_steady_s == pytest.approx(1150.0, rel=0.15)
@@ -124,6 +127,35 @@ def test_oracle_course_by_an_integration_of_its_own(cold):
         hot = at_temperatures(scene, Temperatures(*nodes[:4].tolist()), tuple(nodes[4:].tolist()))
         for name, play in hot.clearances.items():
             assert path["figures"][f"{name}_um"][row] == pytest.approx(1e6 * play.operating, abs=1e-3)
+
+
+def test_unit_figures_of_a_start_are_responses(cold):
+    """Unit: a study may name least clearances and the lead of the inner ring; a scene without the table says what is missing."""
+    start, responses = cold.start, cold.responses
+    assert responses["start_radial_clearance_um"] == start.radial_um.least
+    assert responses["start_inner_minus_outer_K"] == start.temperature_difference_K
+    listed = {figure.key for figure in FIGURES if figure.kind == "start"}
+    assert listed == set(START_FIGURES) <= set(responses_of(heats=False))
+    assert all(why_missing(_scene(start={}), key) is None for key in listed)
+    assert why_missing(_scene(), "start_radial_clearance_um") == (
+        "the scene has no [thermal.start]; add that table to its file or choose another figure"
+    )
+    by_rollers = {"guidance": "roller", "guide_clearance_mm": None, "pocket_radial_clearance_mm": 0.3}
+    tables = _tables(start={}, cage=by_rollers)
+    tables["cage"] = {key: value for key, value in tables["cage"].items() if value is not None and "land" not in key}
+    scene = Scene.from_dict(tables)
+    assert why_missing(scene, "start_guide_clearance_um") == "no ring guides the cage; choose another figure"
+
+
+def test_unit_table_and_picture_of_a_start(cold, tmp_path):
+    """Unit: start.csv has a row a moment with ranges about the course; the picture has a panel of temperatures and three of clearances."""
+    frame = start_sheet(cold.start).frame
+    assert list(frame["time_s"]) == cold.start.path["time_s"]
+    assert frame["radial_clearance_um"].min() == pytest.approx(cold.start.radial_um.least.value, abs=0.05)
+    assert (frame["low_radial_clearance_um"] <= frame["radial_clearance_um"] + 1e-6).all()
+    assert (frame["low_inner_temperature_C"] <= frame["high_inner_temperature_C"]).all()
+    plots.start(cold.start, tmp_path / "start.png")
+    assert (tmp_path / "start.png").stat().st_size > 20_000
 
 
 @pytest.mark.slow
@@ -256,7 +288,8 @@ def test_unit_nothing_without_a_start(cold):
     assert before == after
     code = """
 import sys
-from rbdyn import Scene, simulate
+from doe.clearance import responses_of
+from rbdyn import Scene, plots, simulate
 import tomllib
 simulate(Scene.from_dict(tomllib.loads(sys.stdin.read())), workers=1, notice=None)
 loaded = [name for name in sys.modules if name in ("rbdyn.thermal.start", "rbdyn.dynamics.start", "rbdyn.dynamics.parameters.start")]

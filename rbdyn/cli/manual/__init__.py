@@ -71,12 +71,12 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     from rbdyn.quasistatic.result import ball_sheet
     from rbdyn.quasistatic.runout.turn import RUNOUT
     from rbdyn.quasistatic.sweep import SWEEPS
-    from rbdyn.result import figure_sheet
+    from rbdyn.result import figure_sheet, start_sheet
 
     figures = ("{figure}",)
     named = [Column[Any](figure.key, meaning=figure.meaning) for figure in FIGURES]
     sheets: list[Sheet[Any]] = [
-        figure_sheet({}), history_sheet(("{j}",)), map_sheet((), figures), life_sheet(()), points_sheet((), figures), stiffness_sheet(()), input_sheet(()),
+        figure_sheet({}), history_sheet(("{j}",)), start_sheet(), map_sheet((), figures), life_sheet(()), points_sheet((), figures), stiffness_sheet(()), input_sheet(()),
         difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, limit_sheet({}),
     ]  # fmt: skip
     return {
