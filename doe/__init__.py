@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from doe.library.answer import Answer
     from doe.library.scene_runs import RunsAnswer, run, run_answer
     from doe.library.steps import ChainAnswer, DesignAnswer, FitAnswer, FrontAnswer, chain, design, fit, front
-    from doe.library.unknown import CalibrationAnswer, UncertaintyAnswer, calibrate, uncertainty
-    from doe.library.whole import StudyAnswer, study
+    from doe.library.studies import CalibrationAnswer, StudyAnswer, UncertaintyAnswer, calibrate, study, uncertainty
     from rbdyn.base.faults import InputError, RunError
 
 _HOMES = {
@@ -27,8 +26,14 @@ _HOMES = {
     "doe.library.answer": ("Answer",),
     "doe.library.scene_runs": ("RunsAnswer", "run", "run_answer"),
     "doe.library.steps": ("ChainAnswer", "DesignAnswer", "FitAnswer", "FrontAnswer", "chain", "design", "fit", "front"),
-    "doe.library.unknown": ("CalibrationAnswer", "UncertaintyAnswer", "calibrate", "uncertainty"),
-    "doe.library.whole": ("StudyAnswer", "study"),
+    "doe.library.studies": (
+        "CalibrationAnswer",
+        "StudyAnswer",
+        "UncertaintyAnswer",
+        "calibrate",
+        "study",
+        "uncertainty",
+    ),
 }
 
 __all__ = [

@@ -34,8 +34,7 @@ from rbdyn.quasistatic.runout.lots import (
     readings,
     runouts,
 )
-from rbdyn.quasistatic.runout.measures import running_accuracy
-from rbdyn.quasistatic.runout.turn import RaceErrors, RingPath, ball_path, follow, perfect, waviness
+from rbdyn.quasistatic.runout.turn import RaceErrors, RingPath, ball_path, follow, perfect, running_accuracy, waviness
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"

@@ -13,11 +13,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.notes import Level, Note, Notes, merged
 from rbdyn.base.records import Record, finite, shown, written
-from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import (
     Brief,
     Figure,
@@ -38,7 +38,7 @@ from rbdyn.scene.keys import default_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rbdyn.dynamics.ensemble import Reporter
+    from rbdyn.dynamics.run import Reporter
     from rbdyn.quasistatic.result import BallResult
 
 # Smaller differences of figures without scatter come from the accuracy of the solver: relative, and in the unit of the figure.
@@ -323,7 +323,7 @@ def _kind(source: Any) -> str:
 
 def _result(source: Any, workers: int | None, progress: "Reporter", notice: Notice) -> Any:
     if isinstance(source, Scene):
-        from rbdyn.dynamics.ensemble import plan_of, threads_of
+        from rbdyn.dynamics.run import plan_of, threads_of
         from rbdyn.dynamics.simulate import simulate
 
         if notice is not None:

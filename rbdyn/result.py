@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
+from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, derived, nullable, shown, spread, written
-from rbdyn.base.table import Column, Sheet, columns_of, within
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 from rbdyn.verdict.replicates import CageVerdict
 

@@ -1,7 +1,7 @@
 """The front of a noisy simulator in few runs: emulators learn it, and each run goes where it is expected to gain most.
 
-- ``emulators``: runs, and an emulator of each response with its predictions of costs and limits
-- ``acquisition``: candidate points, and the expected gain in hypervolume as an integral over levels that are not yet dominated
+- ``emulators``: runs, and an emulator of each response with its predictions of costs and limits; candidate points and the
+  expected gain in hypervolume as an integral over levels that are not yet dominated
 - ``search``: design, batches, fresh runs; when to move a face of the region, when to stop, and the result
 """
 

@@ -17,21 +17,34 @@ import numpy as np
 from scipy import special
 from scipy.stats import qmc
 
-from doe.adaptive.acquisition import (
+from doe.adaptive.emulators import (
     FRONT_DRAWS,
     SCATTER_SHARE,
+    Emulators,
+    Evaluate,
     Levels,
     Region,
+    Runs,
     batch,
     candidates,
     dominance_of,
+    fit_emulators,
     front_rows,
     levels_of,
+    shares_of,
 )
-from doe.adaptive.emulators import Emulators, Evaluate, Runs, fit_emulators, shares_of
 from doe.pareto.front import Samples, SimulatedFront
-from doe.pareto.goals import NAMES, Goals, Rule, pick_all
-from doe.pareto.search import InfeasibleError, best_for_hypervolume, dominates, hypervolume, spread
+from doe.pareto.search import (
+    NAMES,
+    Goals,
+    InfeasibleError,
+    Rule,
+    best_for_hypervolume,
+    dominates,
+    hypervolume,
+    pick_all,
+    spread,
+)
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, keyed, outside_json

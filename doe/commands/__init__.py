@@ -3,5 +3,4 @@
 - ``functions``: those that are functions of ``doe.library``, where a study stands, and the meaning of keys
 - ``new``: a new study with its limits and points of operation; ``new_parts``: tolerances and dimension chains of the parts that
   make its clearances
-- ``options``: options of several commands, with the runs, agenda and record that follow from them
 """

@@ -17,7 +17,7 @@ from rbdyn.base.words import Notice, counted
 if TYPE_CHECKING:
     import pandas as pd
 
-    from doe.workflow.scene_runs import RowRun
+    from doe.workflow.scene_table import RowRun
 
 RUN_FILES = ("runs.csv", "runs.json")
 # Typical wall time [s] of what is no run, and what makes the runs shorter.
@@ -101,9 +101,8 @@ def run_answer(
     force: bool = False,
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
-    from doe.workflow.queue import gather, part_folder, refuse_other_parts, rows_of
-    from doe.workflow.scene_runs import rows_stage, run_rows, table_digest
-    from doe.workflow.scene_table import read_scene_table
+    from doe.workflow.scene_table import read_scene_table, rows_stage, run_rows, table_digest
+    from doe.workflow.whole import gather, part_folder, refuse_other_parts, rows_of
     from rbdyn.base.identity import identity_of
     from rbdyn.base.page import REPORT_FILES, write_with_report
 

@@ -16,7 +16,7 @@ from doe.report.sections.duty import DUTY_POINTS
 from doe.report.sections.fit import ANOVA, RUNS, TERMS
 from doe.report.sections.unknown import DECIDERS, input_sheet, range_sheet, set_sheet, share_sheet
 from doe.workflow.parts import clearance_parts
-from rbdyn.base.table import Column, Sheet
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.plots.sketches import WIDTH, Canvas, Sketch
 from rbdyn.scene.keys import Part
 

@@ -19,23 +19,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from doe.pareto.goals import NAMES, Goals, Rule, knee_depth, pick_all, thinning
 from doe.pareto.manufacture import ToleranceAware
 from doe.pareto.search import (
+    NAMES,
     Archive,
     Barred,
     Doubt,
+    Goals,
     InfeasibleError,
     Judge,
     Judged,
     Objectives,
+    Rule,
     Search,
     barring,
     check_search,
     dominates,
     growth,
     hypervolume,
+    knee_depth,
+    pick_all,
     search,
+    thinning,
 )
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError

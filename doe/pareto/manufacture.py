@@ -27,8 +27,21 @@ import numpy as np
 from scipy import special
 from scipy.stats import norm, qmc
 
-from doe.pareto.goals import NAMES, Goals, Rule, thinning
-from doe.pareto.search import Archive, Barred, Doubt, Judged, barring, check_search, dominates, hypervolume, search
+from doe.pareto.search import (
+    NAMES,
+    Archive,
+    Barred,
+    Doubt,
+    Goals,
+    Judged,
+    Rule,
+    barring,
+    check_search,
+    dominates,
+    hypervolume,
+    search,
+    thinning,
+)
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
 from rbdyn.base.records import Record

@@ -15,7 +15,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.pareto.goals import NAMES, Goals, Rule, pick_all
 from doe.pareto.manufacture import (
     SURVIVAL_PARTS,
     Distribution,
@@ -28,7 +27,7 @@ from doe.pareto.manufacture import (
     percent,
     random_offsets,
 )
-from doe.pareto.search import dominates, non_dominated
+from doe.pareto.search import NAMES, Goals, Rule, dominates, non_dominated, pick_all
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
 

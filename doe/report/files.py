@@ -35,10 +35,9 @@ from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Detail, Verdict
+from rbdyn.base.blocks import Block, Column, Detail, Sheet, Verdict
 from rbdyn.base.files import digest_of, sign, versions, write_json
 from rbdyn.base.records import save_table
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import label, quantity
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.base.workbook import write_workbook

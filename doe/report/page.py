@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from doe.clearance import DrawnMotion
-from doe.report.sections import answer, bearing, chain, design, duty, fit, front, unknown
+from doe.report.sections import answer, chain, design, duty, fit, front, unknown
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
@@ -252,8 +252,8 @@ CHAPTERS = (
     answer.confirmation,
     unknown.robustness,
     chain.chains,
-    bearing.power,
-    bearing.motion,
+    answer.power,
+    answer.motion,
     reference,
     settings,
     notes,

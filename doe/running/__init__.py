@@ -1,6 +1,5 @@
 """Runs and their store; knows no bearing.
 
 - ``store``: finished runs and failures on disk, the lock of a store, and which study runs where
-- ``runner``: points on an engine, the agenda of a command with its stages, and the time of its runs
-- ``cluster``: the engine of a dask cluster
+- ``runner``: points on an engine, threads or a dask cluster, the agenda of a command with its stages, and the time of its runs
 """

@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from doe import clearance
 from doe.adaptive import AdaptiveFront, Batch, Border, Plan, adaptive_front
 from doe.adaptive import Runs as SearchRuns
-from doe.adaptive.acquisition import Region
+from doe.adaptive.emulators import Region
 from doe.adaptive.search import NEAR, Face, check_budget
 from doe.clearance import Simulations
 from doe.duty import Run, main_scene, scenes_of

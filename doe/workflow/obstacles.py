@@ -2,25 +2,42 @@
 
 A missed limit is judged at the best point by simulation. It may be relaxed to what that point keeps with the demanded
 probability, or factors may move beyond their bounds: the surfaces, shifted to the simulated point, are extrapolated there.
+
+Before the design ends, the original design, simulated first, and then the corners of the region say what is known of the limits.
+The runs are those of the confirmation and of the design, which find them in the store. That the original misses a limit says
+nothing of the region; that all corners miss it too, also extrapolated to the bounds of the search, makes it likely that no
+point keeps it.
+
+A simulated point may be better than the pick in every response: the pick is chosen before it is simulated, by predicted responses,
+at the ends of its tolerances where the study asks for that.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from doe.pareto import ParetoFront
+from doe import clearance
+from doe.duty import DutyResult
+from doe.pareto import Goals, ParetoFront
+from doe.running.runner import Progress
+from doe.running.store import Failure
 from doe.study_file.study import PointResponse
-from doe.workflow.confirmation import Confirmed, Limit, Verdict, every_limit
+from doe.workflow.adaptive import Adaptive
+from doe.workflow.confirmation import ORDER, Confirmed, Limit, Verdict, every_limit, limits_of, point_words, verdict_of
 from doe.workflow.front import tolerances_out_of_reach
-from doe.workflow.pick import place_of, sides_of
+from doe.workflow.pick import SearchedPick, place_of, sides_of
 from doe.workflow.problem import Problem
-from doe.workflow.surfaces import predict_all
+from doe.workflow.surfaces import predict_all, quadratics, standard_errors
 from doe.workflow.tolerances import PickTolerances
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite
-from rbdyn.base.words import quantity, shown, with_error
+from rbdyn.base.words import Notice, counted, improvement, quantity, shown, with_error
+from rbdyn.result import SimulationResult
 
 # Steps beyond a bound, up to half the width of the region again, at which the surfaces are asked.
 STEPS = 20
@@ -228,3 +245,197 @@ def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]
             return None
         return np.asarray(point)
     return None
+
+
+Outcome = SimulationResult | DutyResult | Failure
+
+
+def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
+    """Figures of the original at each point of the duty, and the limits that it misses."""
+    responses = zip(study.responses, baseline.values.tolist(), baseline.error.tolist(), strict=True)
+    figures: Mapping[str, Mapping[str, tuple[float, float | None]]] = {
+        f" at {point}": {name: (figure.value, figure.stated_error) for name, figure in at_point.items()}
+        for point, at_point in baseline.at_points.items()
+    } or {"": {name: (value, error) for name, value, error in responses}}
+    sentences = [
+        f"original design{point}: {', '.join(_figure(name, *figure) for name, figure in row.items())}"
+        for point, row in figures.items()
+    ]
+    missed = [limit for limit in every_limit(study, baseline) if limit.verdict != "kept"]
+    words = ", ".join(f"{limit.bound_words} by {limit.excess_words}" for limit in missed if limit.room < 0.0)
+    open_words = ", ".join(limit.bound_words for limit in missed if limit.room >= 0.0)
+    return [
+        *sentences,
+        *([f"the original misses {words}: the study looks for points that do not"] if words else []),
+        *([f"the original keeps {open_words} by less than its error"] if open_words else []),
+    ]
+
+
+def _figure(name: str, value: float, error: float | None) -> str:
+    words, unit = quantity(name)
+    return f"{words} {with_error(value, error)} {unit}".rstrip()
+
+
+def first_look(study: Problem, folder: Path, original: Confirmed, progress: Progress, notice: Notice) -> Progress:
+    """Show the original at once. Returns the same progress of the design runs, which shows what its corners say of the limits."""
+    if notice is None:
+        return progress
+    for sentence in original_sentences(study, original):
+        notice(sentence)
+    missed = [limit for limit in every_limit(study, original) if limit.verdict == "broken"]
+    if not missed:
+        return progress
+    ordered = study.plan
+    rows = [row for row, kind in enumerate(ordered.design.kind) if kind == "cube"]
+    runs, labels = [ordered.scenes[row] for row in rows], [ordered.labels[row] for row in rows]
+    waiting = bool(rows)
+
+    def watch(done: int, total: int) -> None:
+        nonlocal waiting
+        progress(done, total)
+        if waiting and len(rows) <= done < total and (results := clearance.stored(folder, runs, labels)) is not None:
+            waiting = False
+            for sentence in unlikely(study, missed, ordered.design.coded[rows], results):
+                notice(sentence)
+
+    return watch
+
+
+def unlikely(study: Problem, missed: Sequence[Limit], coded: Array, results: Sequence[Outcome]) -> list[str]:
+    """Sentences on the limits that the original and all corners miss, and a plane through these too.
+
+    ``results`` (n) at ``coded`` corners (n, k); failed ones are left out. The plane is followed to the bounds of the search; it
+    counts where it is beyond the limit by twice the standard error of a run.
+    """
+    sound = [(place, result) for place, result in zip(coded, results, strict=True) if not isinstance(result, Failure)]
+    values, halves, number = clearance.figures(study.responses, [result for _, result in sound])
+    errors = np.nan_to_num(standard_errors(halves, number))
+    terms = np.array([[1.0, *place] for place, _ in sound])
+    if len(sound) <= coded.shape[1] or np.linalg.matrix_rank(terms) < terms.shape[1]:
+        return []
+    sentences = []
+    for limit in missed:
+        column, sign = study.responses.index(limit.response), 1.0 if limit.sense == "<=" else -1.0
+        excess = sign * (values[:, column] - limit.bound)
+        plane = np.linalg.lstsq(terms, excess, rcond=None)[0]
+        least = float(plane[0] - np.abs(plane[1:]) @ study.reach)
+        if min(excess.min(), least) > 2.0 * errors[:, column].max():
+            nearest, end = (shown(limit.bound + sign * value, 3) for value in (float(excess.min()), least))
+            sentences.append(
+                f"likely no point keeps {limit.bound_words}: the nearest of {counted(len(sound), 'corner')} has {nearest}, and a plane "
+                f"through them {end} at the bounds of the region; to change the limit, stop by Ctrl-C (finished runs are kept)"
+            )
+    return sentences
+
+
+class Prediction(NamedTuple):
+    """Costs (q,) that count in the choice of the pick, and whether the point keeps all limits there."""
+
+    costs: Array
+    keeps: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Predictions by which the pick of a study was chosen, and the ``source`` of these in words.
+
+    ``searched`` and ``searched_pick`` are None where the pick is one of the front on the surfaces.
+    """
+
+    study: Problem
+    front: ParetoFront
+    searched: Adaptive | None
+    searched_pick: SearchedPick | None
+
+    @property
+    def with_tolerances(self) -> bool:
+        """Whether the ends of the tolerances count in the choice."""
+        if self.searched_pick is not None:
+            return self.searched_pick.aware is not None
+        return self.front.tolerance_aware is not None
+
+    @property
+    def source(self) -> str:
+        """What predicts the responses."""
+        return "the surfaces predict" if self.searched is None else f"the runs of the {self.searched.name} front have"
+
+    def at(self, point: Array) -> Prediction | None:
+        """The prediction at a point (k,) in factor units; None for a point that was no candidate."""
+        goals = self.study.goals
+        if self.searched is None or self.searched_pick is None:
+            return self._on_surfaces(goals, self.study.coded(point)[None])
+        front, aware = self.searched.front, self.searched_pick.aware
+        same = [np.array_equal(self.study.rounded_within(row), point) for row in front.points]
+        if not any(same):
+            return None
+        costs, violations = (front.costs, goals.violations(front.values, front.values))
+        if aware is not None:
+            costs, violations = aware.costs, aware.violations
+        row = same.index(True)
+        return Prediction(costs[row], not (violations[row] > 0.0).any())
+
+    def _on_surfaces(self, goals: Goals, coded: Array) -> Prediction:
+        if (aware := self.front.tolerance_aware) is not None:
+            judged = aware.box.judge(quadratics(self.study.surfaces, len(self.study.factors)), goals, coded)
+            return Prediction(judged.costs[0], not (judged.violations[0] > 0.0).any())
+        values = predict_all(self.study.surfaces, coded)
+        return Prediction(goals.costs(values)[0], not (goals.violations(values, values)[0] > 0.0).any())
+
+
+def better_points(study: Problem, confirmed: Mapping[str, Confirmed]) -> list[str]:
+    """Names of the simulated points that are better than the pick in every response with a goal."""
+    goals = study.goals
+    costs = {name: goals.costs(point.values) for name, point in confirmed.items()}
+    return [name for name in confirmed if name not in ("baseline", "pick") and (costs[name] < costs["pick"]).all()]
+
+
+def rivals_sentences(forecast: Forecast, confirmed: Mapping[str, Confirmed]) -> list[str]:
+    """For each point that is better than the pick in every response as simulated: why it is not the pick, in one sentence."""
+    return [
+        f"Point {point_words(name)} is better than the pick in every response as simulated"
+        f"{_uncertain(forecast.study, confirmed[name], confirmed['pick'])}, {_reason(forecast, confirmed[name], confirmed['pick'])}."
+        for name in better_points(forecast.study, confirmed)
+    ]
+
+
+def _uncertain(study: Problem, rival: Confirmed, pick: Confirmed) -> str:
+    """The responses whose difference is within its error."""
+    goals = study.goals
+    apart = np.abs(rival.values - pick.values) <= np.nan_to_num((rival.estimate - pick.estimate).half_width, nan=np.inf)
+    names = [quantity(study.responses[index])[0] for index in goals.objectives if apart[index]]
+    return f" ({' and '.join(names)} only within the error)" if names else ""
+
+
+def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
+    """Why a point is not the pick, by what was known of both when the pick was chosen."""
+    study = forecast.study
+    limits = limits_of(study, rival)
+    if ORDER.index(verdict_of(limits)) > ORDER.index(verdict_of(limits_of(study, pick))):
+        worst = max(limits, key=lambda limit: ORDER.index(limit.verdict))
+        bound = f"{quantity(worst.response)[0]} {worst.sense} {worst.bound:g}"
+        return (
+            f"but it breaks the limit {bound}" if worst.verdict == "broken" else f"but its limit {bound} is undecided"
+        )
+    here, there = forecast.at(rival.point), forecast.at(pick.point)
+    if here is None and forecast.searched is not None:
+        return f"but it is no point of the {forecast.searched.name} front, from which the pick is chosen"
+    where = " at the ends of its tolerances" if forecast.with_tolerances else ""
+    if here is not None and there is not None:
+        if there.keeps and not here.keeps:
+            return f"but {forecast.source} a broken limit{where}"
+        if (worse := here.costs > there.costs).any():
+            return (
+                f"but{where} {forecast.source} {_losses(study, here.costs, there.costs, worse, pick)} than at the pick"
+            )
+    return "and nothing that the study knows speaks against it: consider it"
+
+
+def _losses(study: Problem, costs: Array, pick_costs: Array, worse: Mask, pick: Confirmed) -> str:
+    """'power loss 1.2 % more' of the responses in which a point is predicted worse than the pick."""
+    goals = study.goals
+    percent = 100.0 * (pick_costs - costs) / np.abs(pick.values[goals.objectives])
+    return " and ".join(
+        f"{quantity(study.responses[index])[0]} {improvement(float(change), None, study.file.response[index].goal)}"
+        for index, change, loss in zip(goals.objectives, percent, worse, strict=True)
+        if loss
+    )

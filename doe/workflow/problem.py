@@ -62,7 +62,7 @@ class Problem(Study):
     @cached_property
     def goals(self) -> "Goals":
         """Goals and limits of the responses."""
-        from doe.pareto.goals import BLANK, Goals
+        from doe.pareto.search import BLANK, Goals
 
         responses = self.file.response
         settings = {key: [getattr(response, key) for response in responses] for key in BLANK}

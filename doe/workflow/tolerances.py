@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from doe.pareto.goals import Goals
 from doe.pareto.manufacture import random_offsets
+from doe.pareto.search import Goals
 from doe.pareto.tolerance import RIM, Neighbourhood, WidestTolerances, widest_tolerances
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains

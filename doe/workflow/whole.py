@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.clearance import Simulations
+from doe.clearance import Simulations, every_scene, points_of, work_of
 from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
-from doe.duty import Duty, scene_at
+from doe.duty import Duty, DutyResult, scene_at
 from doe.pareto import ParetoFront
-from doe.running.runner import ANSWER, AgendaKeeper
-from doe.running.store import Failure
+from doe.running.runner import ANSWER, AgendaKeeper, Stage, agendas_of
+from doe.running.store import STORE, Failure, Store
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
     EVERYWHERE,
@@ -39,14 +39,12 @@ from doe.workflow.confirmation import (
 from doe.workflow.design import check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.effort import Effort
-from doe.workflow.first_look import first_look
 from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
-from doe.workflow.obstacles import Obstacles, obstacles_of, without_broken
+from doe.workflow.obstacles import Forecast, Obstacles, first_look, obstacles_of, rivals_sentences, without_broken
 from doe.workflow.parts import Made, grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
-from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.robust import Robust, check_robust, judge
 from doe.workflow.runs import Runs, run_design, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
@@ -59,6 +57,7 @@ from rbdyn.base.records import Record
 from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
 from rbdyn.properties.catalogue import classes_at
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 
@@ -495,3 +494,59 @@ class _Clock:
     def total(self) -> dict[str, float]:
         """Wall times [s] of all stages by name, and of the whole."""
         return {**self._laps, "total_s": time.perf_counter() - self._started}
+
+
+# Part k of n: every n-th run from the k-th.
+Part = tuple[int, int]
+
+
+def rows_of(part: Part | None) -> slice:
+    """Places of the runs of a part; those of all runs without one."""
+    return slice(None) if part is None else slice(part[0] - 1, None, part[1])
+
+
+def part_folder(folder: Path, part: Part | None) -> Path:
+    """Folder of the store of a part within that of its table."""
+    return folder if part is None else folder / f"part-{part[0]}-of-{part[1]}"
+
+
+def part_stores(folder: Path) -> list[Path]:
+    """Stores of all parts in the folder of a table or a study."""
+    return sorted(folder.glob(f"part-*-of-*/{STORE}"))
+
+
+def refuse_other_parts(folder: Path, question: str) -> None:
+    """Raises InputError where the folder has a part of another table or study than that of this digest."""
+    for path in part_stores(folder):
+        with Store(path, read_only=True) as store:
+            questions = {agenda.question for agenda, _ in agendas_of(store)}
+        if questions - {question}:
+            raise InputError(
+                [f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"]
+            )
+
+
+def gather(folder: Path) -> None:
+    """Take over the runs of all parts into the store of their folder. Raises as ``Store``."""
+    if stores := part_stores(folder):
+        with Store(folder / STORE) as store:
+            for path in stores:
+                store.adopt(path)
+
+
+def run_part(
+    study: Problem, folder: Path, effort: Effort, part: Part, agenda: AgendaKeeper
+) -> list[SimulationResult | DutyResult | Failure]:
+    """Simulate the design runs of a part of a study, with their store in ``folder``. Raises as ``run_study``."""
+
+    study, _ = region_that_runs(study, folder, effort)
+    check_study(study)
+    ordered, rows = study.plan, rows_of(part)
+    scenes, labels = ordered.scenes[rows], ordered.labels[rows]
+    points = points_of(scenes, labels)
+    works = {point.key: work_of(scene) for point, scene in zip(points, every_scene(scenes), strict=True)}
+    if not works:
+        raise InputError([f"--part {part[0]}/{part[1]}: has no run of {len(ordered.scenes)}; name fewer parts"])
+    agenda.plan([Stage(DESIGN, (DESIGN,), len(works), sum(works.values()))])
+    with effort.simulations(folder, study.path, agenda) as simulations:
+        return simulations.run(scenes, labels, simulations.progress(DESIGN), ordered.factors[rows])

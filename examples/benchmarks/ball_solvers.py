@@ -26,9 +26,8 @@ from rbdyn.accuracy.ball_solvers import (
     work_precision,
 )
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
-from rbdyn.base.blocks import Table
+from rbdyn.base.blocks import Column, Sheet, Table, columns_of
 from rbdyn.base.records import Record, shown
-from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.equilibrium import Solution

@@ -15,8 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
-from doe.pareto.goals import NAMES, Goals, Rule, pick_all
-from doe.pareto.search import check_search, dominance, error_aware_dominance, non_dominated, order, ranks, spread
+from doe.pareto.search import (
+    NAMES,
+    Goals,
+    Rule,
+    check_search,
+    dominance,
+    error_aware_dominance,
+    non_dominated,
+    order,
+    pick_all,
+    ranks,
+    spread,
+)
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import signed_with_error

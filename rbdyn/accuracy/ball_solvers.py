@@ -14,10 +14,9 @@ import numpy as np
 
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Table
+from rbdyn.base.blocks import Sheet, Table, columns_of
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
-from rbdyn.base.table import Sheet, columns_of
 from rbdyn.base.words import counted
 from rbdyn.quasistatic import full_system
 from rbdyn.quasistatic.row import equilibrium

@@ -47,7 +47,7 @@ def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Li
 
 
 def shown(heading: str, form: Any = 4, **options: Any) -> Any:
-    """A field with its column in tables; ``options`` as of ``rbdyn.base.table.Column`` and ``dataclasses.field``."""
+    """A field with its column in tables; ``options`` as of ``rbdyn.base.blocks.Column`` and ``dataclasses.field``."""
     column = {key: options.pop(key) for key in COLUMN_OPTIONS & options.keys()}
     return field(metadata={"column": {"words": heading, "form": form, **column}}, **options)
 

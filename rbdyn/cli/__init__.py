@@ -1,7 +1,7 @@
 """The command ``rbdyn``. Physics is imported inside the commands, so that help comes at once.
 
 - ``app``: simulate, map, accuracy and show; ``simulation_output``, ``show``: what simulate and show print and write
-- ``compare``: two bearings; ``duty``: points of a duty, printed and on a map; ``stiffness``: over speed, for programs of rotors
+- ``compare``: two bearings; ``stiffness``: over speed, for programs of rotors
 - ``ball``: the command of ball bearings; ``ball_studies``: its equilibria, studies and sweeps
 - ``manual``: keys of a scene, and the manual as one page: keys, commands, equations and the prose between them
 - ``new``: the command; ``new_options``: the table of its options; ``new_drawing``: a bearing of one's own

@@ -25,7 +25,7 @@ from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import AXES
 
 if TYPE_CHECKING:
-    from rbdyn.cli.duty import MapDuty
+    from rbdyn.cli.simulation_output import MapDuty
     from rbdyn.dynamics.slip_map import SlipMap
 
 # Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
@@ -104,7 +104,7 @@ def simulate(
     if duty is not None:
         return _over_duty(console, loaded, (scene, duty), aim, workers)
     console.folder.claim(scene)
-    from rbdyn.dynamics.ensemble import plan_of, threads_of
+    from rbdyn.dynamics.run import plan_of, threads_of
     from rbdyn.dynamics.simulate import simulate as run_scene
 
     if (say := console.notice) is not None and aim is None:
@@ -134,7 +134,7 @@ def _over_duty(
     points = read_duty(files[1])
     duty_scenes(scene, points, str(files[1]))
     console.folder.claim(*files)
-    from rbdyn.cli.duty import simulated_blocks, write_simulated
+    from rbdyn.cli.simulation_output import simulated_blocks, write_simulated
     from rbdyn.dynamics.duty_simulation import simulate_duty
 
     with console.progress("simulating") as progress:
@@ -286,7 +286,7 @@ def _map_duty(
     """The duty of a file on a map; None without a file. Raises InputError."""
     if path is None:
         return None
-    from rbdyn.cli.duty import map_duty
+    from rbdyn.cli.simulation_output import map_duty
 
     return map_duty(scene, path, speeds_rpm, loads_N)
 

@@ -7,14 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-from rbdyn.base.blocks import Block, Detail, Heading, Paragraph, Table, with_notes
+from rbdyn.base.blocks import Block, Column, Detail, Heading, Paragraph, Sheet, Table, with_notes
 from rbdyn.base.command import Console, Delivery, checkpoint_message
 from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.files import write_json
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import status_notes
 from rbdyn.base.records import plain, save_table
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, label, range_ends, shown, with_error
 from rbdyn.clearances import other_ranges
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
@@ -30,8 +29,7 @@ from rbdyn.quasistatic.result import (
     tipping,
 )
 from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
-from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
-from rbdyn.quasistatic.runout.turn import RingPath
+from rbdyn.quasistatic.runout.turn import RingPath, ToleranceClass, running_accuracy
 from rbdyn.quasistatic.sweep import PointRecord, SweepResult, keys_of_texts, result_of, sweep
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene

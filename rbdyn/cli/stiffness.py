@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Block, Paragraph, Table, with_notes
+from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, Table, with_notes
 from rbdyn.base.command import Console, Delivery
 from rbdyn.base.faults import MOST_VALUES, RPM, InputError, MethodError, RunError
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.life.rollers import turned
 from rbdyn.scene import BallScene, Scene, scene_of

@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.records import Record, derived, finite, keyed
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import Notice, counted, named, part_of
 from rbdyn.dynamics.duty import load_case
-from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
+from rbdyn.dynamics.run import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status

@@ -13,21 +13,32 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.records import Record, derived, keyed, spread
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import Notice, counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
-from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
 from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import (
+    Outcome,
+    Pace,
+    Reporter,
+    Stop,
+    in_turn,
+    keys_of,
+    log,
+    plan_of,
+    prepare,
+    run_all,
+    threads_of,
+)
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of

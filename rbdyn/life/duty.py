@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, finite, shown
-from rbdyn.base.table import Sheet, columns_of
 from rbdyn.life import Life
 
 BALL_EXPONENT, ROLLER_EXPONENT = 3.0, 10.0 / 3.0

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, outside_json, spread
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio

@@ -21,11 +21,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import InputError, number_list, refuse, validated
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (

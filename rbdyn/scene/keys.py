@@ -21,10 +21,10 @@ import typer
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from rbdyn.base.blocks import Sheet
 from rbdyn.base.command import flag, print_json
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, one_line
 from rbdyn.base.records import plain
-from rbdyn.base.table import Sheet
 from rbdyn.base.tables.sheet import LONGEST_NUMBER, WHOLE, InputColumn
 from rbdyn.base.tables.sheet import is_number as is_numeral
 from rbdyn.base.words import quantity

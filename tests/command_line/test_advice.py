@@ -14,12 +14,12 @@ import doe as library
 from doe.dimension_chain import Chain, solve
 from doe.dimension_chain.reading import chain_from
 from doe.library.answer import Answer, texts_given
-from doe.library.unknown import _points_faults
+from doe.library.studies import _points_faults
 from doe.workflow.problem import Problem
 from rbdyn.base.command import plain_number
 from rbdyn.base.faults import InputError, MethodError, read_toml
 from rbdyn.cli.new_options import clearance_of, roller_size
-from rbdyn.dynamics.ensemble import threads_of
+from rbdyn.dynamics.run import threads_of
 from rbdyn.scene import Scene
 
 EXAMPLES = ROOT / "examples"

@@ -112,7 +112,7 @@ def test_map_marks_a_point_that_adds_heat_at_its_temperatures(scene):
     """Command line: a point of a duty that adds the balance to a scene without it is computed with it."""
     from pathlib import Path
 
-    from rbdyn.cli.duty import map_duty
+    from rbdyn.cli.simulation_output import map_duty
     from rbdyn.dynamics.duty import static_life
     from rbdyn.dynamics.simulate import steady_scene
     from rbdyn.scene import Scene

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from doe.adaptive import acquisition, search
+from doe.adaptive import emulators, search
 
 FEWER: tuple[tuple[Any, dict[str, int]], ...] = (
-    (acquisition, {"EVERYWHERE": 7, "CHILDREN": 32}),
-    (acquisition, {"LEVELS": 10, "MOST_LEVELS": 200}),
+    (emulators, {"EVERYWHERE": 7, "CHILDREN": 32}),
+    (emulators, {"LEVELS": 10, "MOST_LEVELS": 200}),
     (search, {"FRONT_DRAWS": 8, "ROUNDS": 1, "SHOWN": 50, "FEW": 256}),
 )
 

@@ -102,8 +102,8 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     """The program."""
     from short_studies import run_design
 
+    from doe.commands.functions import keeping_runs
     from doe.commands.functions import study as doe_study
-    from doe.commands.options import keeping_runs
     from doe.library.answer import registered
     from doe.workflow.problem import Problem
     from rbdyn.base.command import guarded, print_json

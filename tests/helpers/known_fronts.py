@@ -15,9 +15,8 @@ from scipy import ndimage
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, Runs, adaptive_front
-from doe.adaptive.acquisition import Region
-from doe.pareto.goals import Goals
-from doe.pareto.search import best_for_hypervolume, hypervolume, non_dominated, spread
+from doe.adaptive.emulators import Region
+from doe.pareto.search import Goals, best_for_hypervolume, hypervolume, non_dominated, spread
 
 THREE = Goals.of(["min"] * 3)
 FACTORS, NOISE = 4, 0.02  # of the ranges of the fronts, which are 0 to 1

@@ -111,7 +111,7 @@ def clearance() -> dict[str, bool]:
     from doe.report.sections.answer import MEANINGS
     from doe.workflow.whole import NAMES
     from rbdyn.clearances import other_ranges
-    from rbdyn.cli.duty import CLEARANCES
+    from rbdyn.cli.simulation_output import CLEARANCES
 
     tables = {"bearing": {"axial_clearance_mm": 0.2}, "cage": {"guidance": "outer"}}
     return {

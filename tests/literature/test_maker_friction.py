@@ -8,7 +8,7 @@ from conftest import ROOT
 from synthetic_study import summary
 from typer.testing import CliRunner
 
-from doe.report.sections.bearing import power
+from doe.report.sections.answer import power
 from doe.report.summary import Summary
 from rbdyn import Scene
 from rbdyn.base.faults import InputError

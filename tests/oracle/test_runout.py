@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.quasistatic.runout.measures import (
+from rbdyn.quasistatic.runout.turn import (
     convex_hull,
     diameter,
     error_motion,

@@ -13,7 +13,7 @@ from short_studies import EXAMPLES
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, searched, summary
 
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
-from doe.pareto.goals import Goals
+from doe.pareto.search import Goals
 from doe.report.page import html_report
 from doe.report.summary import Summary
 from doe.workflow.problem import Problem

@@ -21,8 +21,8 @@ from doe.report.sections.answer import first_screen
 from doe.report.summary import Summary
 from doe.workflow.confirmation import LOSS, NOISE, REAL, Choice, Confirmed
 from doe.workflow.front import find_front
+from doe.workflow.obstacles import Forecast, rivals_sentences
 from doe.workflow.pick import choices
-from doe.workflow.rivals import Forecast, rivals_sentences
 from doe.workflow.runs import _distinct_notes
 from doe.workflow.surfaces import predict_all
 from rbdyn.base import terminal

@@ -17,7 +17,7 @@ from matplotlib.image import imread
 from synthetic_study import RESPONSES, motion, summary
 
 from doe.report.page import sections
-from doe.report.sections.bearing import power_bars
+from doe.report.sections.answer import power_bars
 from doe.report.sections.chain import FILLS, contributions
 from doe.report.sections.fit import diagnostic_plots
 from doe.report.still import COLOURS, Still, name_marks, save

@@ -12,11 +12,21 @@ from known_fronts import box, first_runs, noisy, search
 from scipy import special
 
 from doe.adaptive import Batch, Border, Plan, adaptive_front
-from doe.adaptive.acquisition import Dominance, Region, batch, candidates, dominated, levels_of, proper_rows
-from doe.adaptive.emulators import Runs, coordinates, fit_emulators, shares_of
+from doe.adaptive.emulators import (
+    Dominance,
+    Region,
+    Runs,
+    batch,
+    candidates,
+    coordinates,
+    dominated,
+    fit_emulators,
+    levels_of,
+    proper_rows,
+    shares_of,
+)
 from doe.adaptive.search import as_predicted, nothing_gained, residuals_of
-from doe.pareto.goals import Goals
-from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
+from doe.pareto.search import Goals, InfeasibleError, best_for_hypervolume, hypervolume, spread
 
 TWO = Goals.of(["min", "min"])
 POINTS = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 2))

@@ -19,8 +19,7 @@ from known_fronts import (
 )
 
 from doe.adaptive import Plan, adaptive_front
-from doe.adaptive.acquisition import Region
-from doe.adaptive.emulators import Runs
+from doe.adaptive.emulators import Region, Runs
 from doe.designs import central_composite
 
 

@@ -20,7 +20,7 @@ import pytest
 from doe_command import doe
 from short_studies import SHORT, run_design, short_study, silent
 
-from doe.running import cluster
+from doe.running import runner
 from doe.running.runner import RunOutcome
 from doe.running.store import STORE, Store
 from doe.workflow.problem import Problem
@@ -96,7 +96,7 @@ def collected(
         if ended is not None:
             ended(place, ran)
 
-    cluster.run_on_cluster(address, slow_echo, texts, take)
+    runner.run_on_cluster(address, slow_echo, texts, take)
     return found
 
 
@@ -144,7 +144,7 @@ def test_only_what_a_worker_of_a_cluster_runs_is_under_way(tmp_path, monkeypatch
         ends.append((ran.result or {})["end"])
 
     with started(tmp_path, 2) as there:
-        cluster.run_on_cluster(
+        runner.run_on_cluster(
             there.address, slow_echo, ["0.4"] * 10, on_end, lambda place: begun.append((place, time.time()))
         )
     assert sorted(place for place, _ in begun) == list(range(10)) and begun_before_end == [True] * 10
@@ -154,12 +154,12 @@ def test_only_what_a_worker_of_a_cluster_runs_is_under_way(tmp_path, monkeypatch
 
 @pytest.mark.slow
 def test_cluster_gives_each_place_its_own_and_tells_what_is_gone(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "WORKERS_S", 0.5)
-    monkeypatch.setattr(cluster, "DESERTED_S", 2.0)
+    monkeypatch.setattr(runner, "WORKERS_S", 0.5)
+    monkeypatch.setattr(runner, "DESERTED_S", 2.0)
     with started(tmp_path, 0) as empty, pytest.raises(InputError, match="has no workers; start some with"):
         collected(empty.address, ["0"])
     (tmp_path / "scheduler.json").unlink()
-    monkeypatch.setattr(cluster, "WORKERS_S", 60.0)
+    monkeypatch.setattr(runner, "WORKERS_S", 60.0)
     with started(tmp_path, 2) as there:
         texts = [f"0.0{number}" for number in range(1, 8)]
         ran = collected(there.address, texts)

@@ -12,7 +12,7 @@ import pytest
 import rbdyn
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.terminal import text
-from rbdyn.cli.duty import simulated_blocks
+from rbdyn.cli.simulation_output import simulated_blocks
 from rbdyn.dynamics import duty_simulation
 from rbdyn.dynamics.duty import roller_duty_life
 from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty, worst_of

@@ -12,7 +12,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text as terminal_text
 from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.app import map_blocks
-from rbdyn.cli.duty import map_duty
+from rbdyn.cli.simulation_output import map_duty
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import PANELS, Point, SlipMap
 from rbdyn.life.duty import life_notes

@@ -5,7 +5,7 @@ import pytest
 from pareto_cases import LOWER, UPPER, bowls
 
 from doe.pareto import Goals, InfeasibleError, front
-from doe.pareto.goals import RULES, desirability, pick_all, tchebycheff
+from doe.pareto.search import RULES, desirability, pick_all, tchebycheff
 
 SMALL = {"population": 40, "generations": 30}
 LINE = np.column_stack([np.linspace(0, 1, 101)] * 2) * [1, -1] + [0, 1]  # costs x and 1 - x

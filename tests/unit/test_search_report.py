@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from short_studies import EXAMPLES, SHORT, run_study, short_study, silent
 
 from doe import clearance
-from doe.adaptive.acquisition import Region
+from doe.adaptive.emulators import Region
 from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
 from doe.report.files import write

@@ -13,7 +13,6 @@ from instant_runs import with_figures
 from rbdyn.accuracy import coverage
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics import figures
-from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.forces.state import (
     CAGE_ANGLE,
@@ -38,9 +37,8 @@ from rbdyn.dynamics.parameters.state import (
     start_state,
     wall_of,
 )
-from rbdyn.dynamics.recording import Recording, record
-from rbdyn.dynamics.run import Run, explicit_method, with_numerics
-from rbdyn.dynamics.settling import run_until_settled, whole_windows
+from rbdyn.dynamics.recording import Recording, record, run_until_settled, whole_windows
+from rbdyn.dynamics.run import Run, Stop, explicit_method, with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import (
     FALSE_ALARMS,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from rbdyn.base.blocks import Column, Sheet, columns_of
 from rbdyn.base.records import Record, shown
-from rbdyn.base.table import Column, Sheet, columns_of
 from rbdyn.base.words import value_alone
 
 

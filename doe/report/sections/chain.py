@@ -12,8 +12,19 @@ from doe.dimension_chain.yields import SelectiveAssembly
 from doe.report.sections.record import record_table
 from doe.report.still import COLOURS, FONT, Still, name_marks
 from doe.report.summary import Summary
-from rbdyn.base.blocks import Block, Detail, Figures, Heading, Paragraph, Section, Table
-from rbdyn.base.table import Column, Sheet, columns_of, within
+from rbdyn.base.blocks import (
+    Block,
+    Column,
+    Detail,
+    Figures,
+    Heading,
+    Paragraph,
+    Section,
+    Sheet,
+    Table,
+    columns_of,
+    within,
+)
 from rbdyn.base.words import counted, label, with_error
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from doe.running.store import Cause
 from doe.workflow.design import DesignResult, DesignRun, StandardRun
 from doe.workflow.problem import Asked
 from doe.workflow.runs import StudyDesign, StudyRun
-from rbdyn.base.blocks import Block, Detail, Figures, Paragraph, Section, Table
+from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table
 from rbdyn.base.records import quoted_cell
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, shown
 
 if TYPE_CHECKING:

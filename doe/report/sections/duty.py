@@ -13,9 +13,8 @@ from doe.workflow.confirmation import ORDER, Gain, PickLimit, SimulatedValue
 from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty
 from doe.workflow.problem import Factor
 from doe.workflow.surfaces import PredictedGain
-from rbdyn.base.blocks import Block, Detail, Figures, Paragraph, Section, Table
+from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table
 from rbdyn.base.faults import one_line
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import label, quantity, shown, with_error
 
 if TYPE_CHECKING:

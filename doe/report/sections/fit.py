@@ -13,9 +13,8 @@ from doe.report.summary import Summary
 from doe.response_surface.adequacy import AnovaRow, RunDiagnostics
 from doe.response_surface.statistics import Fit, Term
 from doe.workflow.problem import Factor
-from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Section, Table, Widget
+from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Heading, Paragraph, Section, Sheet, Table, Widget
 from rbdyn.base.records import plain
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, label, quantity, shown, with_error
 
 if TYPE_CHECKING:

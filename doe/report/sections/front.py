@@ -22,8 +22,7 @@ from doe.workflow.surface_front import (
     ToleranceFront,
 )
 from doe.workflow.surfaces import PredictedGain
-from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Paragraph, Section, Table, Widget
-from rbdyn.base.table import Column, Sheet
+from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Paragraph, Section, Sheet, Table, Widget
 from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.

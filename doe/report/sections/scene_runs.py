@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from doe.running.store import Cause
-from doe.workflow.scene_runs import RowRun, causes_of
-from rbdyn.base.blocks import Block, Paragraph, with_notes
+from doe.workflow.scene_table import RowRun, causes_of
+from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, with_notes
 from rbdyn.base.notes import Notes
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.words import counted, quantity
 from rbdyn.dynamics.figures import FIGURES
 

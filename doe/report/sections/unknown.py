@@ -10,9 +10,8 @@ from doe.report.summary import Summary
 from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.judgement import Decider, Robust
 from doe.workflow.uncertainty import OutputRange, Uncertainty
-from rbdyn.base.blocks import Block, Bullets, Paragraph, Section, Table, with_notes
+from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet, Table, with_notes
 from rbdyn.base.files import write_json
-from rbdyn.base.table import Column, Sheet
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.scene.unknown import UnknownInput

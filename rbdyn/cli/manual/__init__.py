@@ -13,9 +13,9 @@ from typing import Annotated, Any
 import typer
 from pydantic import BaseModel
 
+from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.command import Force, Json, folder_option, guarded, hand_over
 from rbdyn.base.folder import output_folder
-from rbdyn.base.table import Column, Sheet
 from rbdyn.scene.keys import AsSchema, Word, run
 
 # Entry points of such packages: functions that return a ``Part``.

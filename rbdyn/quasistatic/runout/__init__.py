@@ -1,6 +1,6 @@
 """Runout of a turning ring.
 
-- ``turn``: form errors of grooves and balls, and the path of the ring that turns over them
-- ``measures``: measures of a path, and their limits by tolerance class
+- ``turn``: form errors of grooves and balls, and the path of the ring that turns over them, its measures and
+  their limits by tolerance class
 - ``lots``: path of a scene; runout of many bearings at once by a linear response, and race limits that meet a tolerance class
 """

@@ -11,25 +11,307 @@ ball, with the origin at the centre of curvature of the outer groove, positions 
   one part in ten thousand for a micrometre.
 - ball: half its diameter error, and its sphericity w at the contact, reduce both reaches. The contacts are opposite (eqs
   11-12): even orders add up and odd orders cancel. The ball rolls on a great circle, about an axis fixed in the ball.
+
+The runout of a path has limits by tolerance class (ISO 492). Three independent measures describe the radial motion:
+
+- ``indicator``: reading of a fixed indicator, its largest range over all directions, as in the class limits K_ia. An
+  eccentric groove shows as twice its eccentricity.
+- ``minimum_zone``, ``least_squares``: distance between two concentric circles around the orbit of the ring's centre. The
+  first is the minimum zone of ISO 1101, the "distance between the maximum and minimum envelope circles" of Zhou et al. 2024.
+  An eccentric groove moves the centre on a circle and does not show.
+- ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as for spindles.
+
+``tolerance_classes.csv`` has the limits of radial ball bearings with their sources.
 """
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
+from scipy.optimize import linprog
 
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.blocks import Column, Sheet, frame_of
 from rbdyn.base.faults import MethodError, RunError
-from rbdyn.base.table import Column, Sheet, frame_of
 from rbdyn.base.words import counted
+from rbdyn.properties import table
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.newton import FIGURES, LARGEST_LOAD, RESIDUAL, Task, boundary_conditions, space, walk
 from rbdyn.quasistatic.row.ring import RING, Row, component_lengths
-from rbdyn.quasistatic.runout.measures import Runout, runout
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
+
+
+@dataclass(frozen=True)
+class RunningAccuracy:
+    """Largest permitted runouts [m]; None where the class sets no limit or no source is known.
+
+    ``radial``: K_ia, of the assembled bearing's inner ring; ``face``: S_d, of its side face with the bore; ``axial``:
+    S_ia, of the assembled bearing's inner ring; ``outer_radial``: K_ea, of the assembled bearing's outer ring.
+    """
+
+    radial: float
+    face: float | None
+    axial: float | None
+    outer_radial: float | None
+
+
+def running_accuracy(
+    tolerance_class: ToleranceClass, bore: float, outside_diameter: float | None = None
+) -> RunningAccuracy:
+    """Limits of a class for a bore and, for K_ea, an outside diameter [m].
+
+    Raises MethodError for a class or a bore outside the tables.
+    """
+    if tolerance_class not in get_args(ToleranceClass):
+        choices = ", ".join(get_args(ToleranceClass))
+        raise MethodError(f"tolerance class {tolerance_class!r} is unknown; choose one of {choices}")
+    row = _row(tolerance_class, "bore", 1e3 * bore)
+    if row is None:
+        rows = _rows(tolerance_class, "bore")
+        raise MethodError(
+            f"a bore of {1e3 * bore:g} mm is outside the table of class {tolerance_class}; give one above "
+            f"{rows[0]['above']} mm and up to {rows[-1]['up_to']} mm"
+        )
+    outer = None if outside_diameter is None else _row(tolerance_class, "outside", 1e3 * outside_diameter)
+    limits = (*(row[name] for name in ("K_ia", "S_d", "S_ia")), outer["K_ea"] if outer else "")
+    return RunningAccuracy(*(1e-6 * float(limit) if limit else None for limit in limits))  # type: ignore[arg-type]
+
+
+def _rows(tolerance_class: str, of: str) -> list[dict[str, str]]:
+    return [row for row in table("tolerance_classes") if (row["class"], row["of"]) == (tolerance_class, of)]
+
+
+def _row(tolerance_class: str, of: str, millimetres: float) -> dict[str, str] | None:
+    """The row of a class for a bore, or an outside diameter."""
+    rows = _rows(tolerance_class, of)
+    if not rows or millimetres <= float(rows[0]["above"]):
+        return None
+    return next((row for row in rows if millimetres <= float(row["up_to"]) * (1.0 + 1e-12)), None)
+
+
+# Number of positions of the axial indicator round the face.
+PLACES = 72
+STEPS = 60
+
+
+@dataclass(frozen=True)
+class Runout:
+    """Runout [m] of a path of whole turns.
+
+    ``axial``: range of the axial displacement. ``face``: range of an axial indicator at the worst position on the ring's
+    face, tilt included. Synchronous: indicator reading of the mean over turns at equal ring angle. Asynchronous: largest
+    spread between turns at equal ring angle, zero for one turn.
+    """
+
+    indicator: float
+    minimum_zone: float
+    least_squares: float
+    error_motion: float
+    axial: float
+    face: float
+    synchronous_radial: float
+    asynchronous_radial: float
+    synchronous_axial: float
+    asynchronous_axial: float
+    turns: int
+
+
+def runout(path: Array, turns: int, face_radius: float) -> Runout:
+    """Runout of a path (turns * steps, 5) of displacements x, y, z [m], theta_x, theta_y [rad].
+
+    ``face_radius``: radius at which an axial indicator touches the ring [m]. Raises MethodError unless the steps fill whole
+    turns.
+    """
+    steps, remainder = divmod(len(path), turns)
+    if remainder or steps < 3:
+        raise MethodError(
+            f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps; fix the "
+            "number of turns"
+        )
+    orbit, axial = path[:, :2], path[:, 2]
+    # About the mean, the small motion loses no digits.
+    orbit = orbit - orbit.mean(axis=0)
+    by_turn, axial_by_turn = orbit.reshape(turns, steps, 2), axial.reshape(turns, steps)
+    angle = 2.0 * math.pi * np.arange(len(path)) / steps
+    return Runout(
+        indicator=diameter(orbit),
+        minimum_zone=minimum_zone(orbit).width,
+        least_squares=least_squares_circle(orbit).width,
+        error_motion=max(error_motion(angle, reading) for reading in orbit.T),
+        axial=float(np.ptp(axial)),
+        face=face_runout(path, face_radius),
+        synchronous_radial=diameter(by_turn.mean(axis=0)),
+        asynchronous_radial=max(diameter(by_turn[:, step]) for step in range(steps)),
+        synchronous_axial=float(np.ptp(axial_by_turn.mean(axis=0))),
+        asynchronous_axial=float(np.ptp(axial_by_turn, axis=0).max()),
+        turns=turns,
+    )
+
+
+def face_runout(path: Array, radius: float, places: int = PLACES) -> float:
+    """Largest range [m] of an axial indicator at ``radius`` [m] over ``places`` fixed positions round the face."""
+    place = 2.0 * math.pi * np.arange(places) / places
+    lift = path[:, 3:4] * np.sin(place) - path[:, 4:5] * np.cos(place)
+    return float(np.ptp(path[:, 2:3] + radius * lift, axis=0).max())
+
+
+def error_motion(angle: Array, reading: Array) -> float:
+    """Least range [m] of readings less a once-per-turn part c cos(angle) + s sin(angle).
+
+    A linear programme gives the minimum zone of the polar plot of the readings (ANSI B89.3.4), in the limit of a large
+    base circle.
+    """
+    scale = float(np.ptp(reading))
+    if scale == 0.0:
+        return 0.0
+    wave = np.column_stack((np.cos(angle), np.sin(angle)))
+    ones, none = np.ones((len(angle), 1)), np.zeros((len(angle), 1))
+    level = (reading - reading.mean()) / scale
+    optimum = linprog(
+        [0.0, 0.0, 1.0, -1.0],
+        A_ub=np.vstack((np.hstack((-wave, -ones, none)), np.hstack((wave, none, ones)))),
+        b_ub=np.concatenate((-level, level)),
+        bounds=[(None, None)] * 4,
+        method="highs",
+    )
+    return scale * float(np.ptp(level - wave @ optimum.x[:2]))
+
+
+class Zone(NamedTuple):
+    """Two circles about one centre (x, y) with all points between them; radii in the unit of the points."""
+
+    x: float
+    y: float
+    inner: float
+    outer: float
+
+    @property
+    def width(self) -> float:
+        """Difference of the radii."""
+        return self.outer - self.inner
+
+
+def convex_hull(points: Array) -> Array:
+    """Corners of the convex hull of (n, 2) points, anticlockwise; of points on a line its ends, of equal points one."""
+    ordered = np.unique(points, axis=0)
+    if len(ordered) < 3:
+        return ordered
+
+    def chain(places: Array) -> list[tuple[float, float]]:
+        corners: list[tuple[float, float]] = []
+        for x, y in places.tolist():
+            while len(corners) > 1:
+                (ax, ay), (bx, by) = corners[-2], corners[-1]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                corners.pop()
+            corners.append((x, y))
+        return corners
+
+    return np.array(chain(ordered)[:-1] + chain(ordered[::-1])[:-1])
+
+
+def diameter(points: Array) -> float:
+    """Largest distance between two of (n, 2) points: the largest reading of an indicator in any fixed direction."""
+    corners = convex_hull(points)
+    if len(corners) < 2:
+        return 0.0
+    apart = corners[:, np.newaxis] - corners
+    return float(np.sqrt((apart**2).sum(axis=2).max()))
+
+
+def least_squares_circle(points: Array) -> Zone:
+    """Zone about the centre of the least-squares circle (Gauss-Newton on the distances, from the mean)."""
+    centre = points.mean(axis=0)
+    for _ in range(STEPS):
+        away = points - centre
+        distance = np.hypot(*away.T)
+        if distance.min() == 0.0:
+            break
+        # r - u.d = R: unknown step d of the centre and radius R.
+        directions = away / distance[:, np.newaxis]
+        system = np.column_stack((directions, np.ones(len(points))))
+        step = np.linalg.lstsq(system, distance, rcond=1e-10)[0][:2]
+        # The best circle of nearly flat points is far away: the centre must stay near the points.
+        limit = np.ptp(points, axis=0).max()
+        if np.hypot(*step) > limit:
+            break
+        centre = centre + step
+        if np.hypot(*step) <= 1e-14 * limit:
+            break
+    return zone_about(points, *centre)
+
+
+def zone_about(points: Array, x: float, y: float) -> Zone:
+    """The zone of (n, 2) points about the centre (x, y)."""
+    distance = np.hypot(points[:, 0] - x, points[:, 1] - y)
+    return Zone(float(x), float(y), float(distance.min()), float(distance.max()))
+
+
+def minimum_zone(points: Array) -> Zone:
+    """Narrowest zone with its centre within the convex hull of (n, 2) points.
+
+    Without that bound an elongated orbit would be between circles of infinite radius. Starting from the least-squares
+    centre, linear programmes with linearised distances minimise the width over steps within a trust region. At the optimum
+    four points touch the circles, where the method converges quadratically. The minimum is local; for points round a
+    centre it is the minimum zone.
+    """
+    corners = convex_hull(points)
+    size = float(np.ptp(points, axis=0).max())
+    if len(corners) < 3:
+        return zone_about(points, *corners.mean(axis=0))
+    along = np.roll(corners, -1, axis=0) - corners
+    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
+    offset = (normal * corners).sum(axis=1)
+    best = least_squares_circle(points)
+    if np.any(normal @ (best.x, best.y) > offset):
+        best = zone_about(points, *points.mean(axis=0))
+    # Distances below this are rounding.
+    rounding = 8.0 * np.finfo(float).eps * float(np.abs(points).max())
+    trust = size
+    for _ in range(STEPS):
+        step, width = _best_step(points, best, normal, offset, trust)
+        gain = best.width - width
+        if gain <= max(1e-10 * best.width, rounding):
+            return best
+        trial = zone_about(points, best.x + step[0], best.y + step[1])
+        if best.width - trial.width < 0.25 * gain:
+            trust = 0.25 * min(trust, max(float(np.abs(step).max()), 1e-12 * size))
+        if trial.width < best.width:
+            best = trial
+    return best
+
+
+def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: float) -> tuple[Array, float]:
+    """Step of the centre to the narrowest linearised zone, and the width of that zone."""
+    away = points - (zone.x, zone.y)
+    distance = np.hypot(*away.T)
+    # For a centre at a point, any direction is valid.
+    directions = away / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
+    middle, scale = 0.5 * (zone.inner + zone.outer), max(zone.width, math.ulp(zone.outer))
+    ones = np.ones((len(points), 1))
+    # Unknowns in units of the width: step (2), outer and inner radius above the middle of the zone.
+    reading = (distance - middle)[:, np.newaxis] / scale
+    inside = np.hstack((-directions, -ones, 0.0 * ones))
+    outside = np.hstack((directions, 0.0 * ones, ones))
+    within = np.hstack((normal, np.zeros((len(normal), 2))))
+    room = (offset - normal @ (zone.x, zone.y)) / scale
+    optimum = linprog(
+        [0.0, 0.0, 1.0, -1.0],
+        A_ub=np.vstack((inside, outside, within)),
+        b_ub=np.concatenate((-reading[:, 0], reading[:, 0], np.maximum(room, 0.0))),
+        bounds=[(-trust / scale, trust / scale)] * 2 + [(None, None)] * 2,
+        method="highs",
+    )
+    if not optimum.success:
+        return np.zeros(2), zone.width
+    return scale * optimum.x[:2], float(scale * optimum.fun)
 
 
 @dataclass(frozen=True)
