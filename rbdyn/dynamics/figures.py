@@ -228,6 +228,33 @@ def _impacts(run: Replicate) -> Array:
     return run.impacts[run.first :].sum(axis=1)
 
 
+def _pocket_track(run: Replicate) -> Array:
+    """Of each batch: duration, friction work, samples and squared places of the cage, force of all pockets and width over time."""
+    work, orbit, durations = run.work[run.first :], run.orbit[run.first :], run.durations[run.first :]
+    return np.column_stack(
+        (
+            durations,
+            work[:, POCKET_FRICTION],
+            orbit[:, 0],
+            orbit[:, 3],
+            work[:, POCKET_FORCE],
+            run.pocket_width * durations,
+        )
+    )
+
+
+def sliding_over_track(sums: Array) -> Array:
+    """Friction power over the width of the track on a pocket wall [W/m], 0 without a track; sums as in ``_pocket_track``.
+
+    A cage off the middle by e moves radially past a roller by e cos(phi): its variance is e^2/2. The track has the Hertz width of
+    the mean force, and 2 sqrt(3) standard deviations, which is the range of a uniform law.
+    """
+    duration, work, samples, squares, force, width = np.moveaxis(sums, -1, 0)
+    hertz = width / duration * np.sqrt(np.maximum(force, 0.0) / duration)
+    track = hertz + 2.0 * np.sqrt(1.5 * np.maximum(squares, 0.0) / np.maximum(samples, 1.0))
+    return np.where(track > 0.0, work / duration / np.where(track > 0.0, track, 1.0), 0.0)
+
+
 def fatigue_force(sums: Array) -> Array:
     """(sum F^m/n)^(1/m) from n, sum F^m and n m on the last axis; 0 of no impacts."""
     number, powers, exponents = np.moveaxis(sums, -1, 0)
@@ -292,6 +319,11 @@ def _any_impacts(runs: Sequence[Replicate]) -> bool:
     return any(bool(_impacts(run)[:, NUMBER].any()) for run in runs)
 
 
+def _pocket_length(scene: "Scene") -> float:
+    """Length of the contact of a roller and a pocket wall [m]."""
+    return float(scene.cage.pocket_contact_length or scene.bearing.effective_length)
+
+
 def _land_sliding(scene: "Scene") -> float | None:
     """Sliding on the guide land over its friction power; none without a land or its friction."""
     guided = scene.cage.guidance != "roller" and scene.model.guide_land != "off"
@@ -307,6 +339,16 @@ CAGE_DAMAGE = (
         _pocket_sliding,
         kind="damage",
         words="force times sliding speed in a pocket [N m/s]",
+        needs="pockets or model.pocket_friction",
+    ),
+    # Archard's depth is in proportion to it: of two designs of the same materials the ratio is that of their wear.
+    Figure(
+        "pocket_sliding_density_W_mm2",
+        "force times sliding speed in a pocket over the area of its track; its ratio to a baseline is that of the depth of wear",
+        Statistic(_pocket_track, sliding_over_track),
+        lambda scene: (sliding := _pocket_sliding(scene)) and 1e-6 * sliding / _pocket_length(scene),
+        kind="damage",
+        words="force times sliding speed over its track [W/mm2]",
         needs="pockets or model.pocket_friction",
     ),
     Figure(

@@ -33,6 +33,7 @@ from rbdyn.dynamics.integrators.advance import (
     SPEEDS,
     SQUARES,
 )
+from rbdyn.dynamics.parameters.model import pocket_width
 from rbdyn.dynamics.parameters.state import group_of, scales
 from rbdyn.dynamics.run import Outcome, Pace, Reporter, Run, Stop, in_turn, run_all, threads_of, with_numerics
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
@@ -158,6 +159,7 @@ class Recording:
             durations=np.diff(self._ends) * run.scene.turn_s,
             whirl=self._filtered_whirl() if self._places else speeds,
             orbit=places,
+            pocket_width=pocket_width(run.scene),
             work=work,
             largest=largest,
             impacts=impacts.reshape(-1, *tally.impacts.shape),

@@ -153,7 +153,7 @@ class Damage(Sparse):
     """Follow impacts in the pockets one by one for impacts_per_turn, impact_energy_J and impact_fatigue_force_N, which false leaves
     out. A study follows them only where it names one of these."""
     races: bool = True
-    """Sample the race contacts 24 times in a shaft turn for inner_power_density_W_mm2, entry_slip_m_s and their fellows, which
+    """Sample the race contacts 24 times in a shaft turn for the figures of power density, flash temperature and entry, which
     false leaves out. A study samples them only where it names one of these."""
     impact_speed_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.01
     """Speed of the first approach above which the contact of a roller and a pocket wall is an impact."""

@@ -15,7 +15,7 @@ from doe.clearance import responses_of
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.contact.cage_bar import CageSection, clamped_stress
-from rbdyn.dynamics.figures import DAMAGE
+from rbdyn.dynamics.figures import DAMAGE, sliding_over_track
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, ENTRY_SLIPS, SAMPLES_NUMBER
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run, Stop
@@ -250,3 +250,20 @@ def test_pockets_share_the_impacts():
     assert whole == pytest.approx(run.damage["impact_fatigue_force_N"].value)
     assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).pocket_impacts == pockets
     assert result("damage.impacts=false").pocket_impacts is None
+
+
+def test_wear_follows_sliding_over_its_track():
+    """The same sliding on a track twice as wide wears half; a cage that rests in the middle leaves the Hertz width alone."""
+    still = np.array([2.0, 8.0, 5.0, 0.0, 18.0, 2.0 * 1e-5])
+    assert sliding_over_track(still) == pytest.approx(4.0 / (1e-5 * 3.0))
+    moving = np.array([2.0, 8.0, 5.0, 5.0 * (1e-4) ** 2, 0.0, 0.0])
+    assert sliding_over_track(moving) == pytest.approx(4.0 / (2.0 * np.sqrt(3.0) * 1e-4 / np.sqrt(2.0)))
+    wider = moving * np.array([1.0, 1.0, 1.0, 4.0, 1.0, 1.0])
+    assert sliding_over_track(wider) == pytest.approx(0.5 * sliding_over_track(moving))
+    assert sliding_over_track(np.zeros(6) + np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])) == 0.0
+    run = result()
+    scene = Scene.from_dict(run.scene)
+    area = run.damage["pocket_sliding_N_m_s"].value / run.damage["pocket_sliding_density_W_mm2"].value
+    # Between the Hertz width alone and a cage that goes round its whole clearance.
+    widest = 2.0 * np.sqrt(1.5) * scene.guide_clearance_m + 1e-4
+    assert 0.0 < area * 1e-6 / scene.bearing.effective_length < widest

@@ -460,6 +460,15 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     return LippedPocket(pocket, circle, 0.5 * lip, radius, contact, damping, friction)
 
 
+def pocket_width(scene: Scene) -> float:
+    """Full Hertz width of a roller on a plane pocket wall [m] over the root of the force of all pockets [N]."""
+    length = scene.cage.pocket_contact_length or scene.bearing.effective_length
+    contact = film_thickness.RollingContact(
+        scene.geometry.roller_radius, length, _modulus(scene, "roller", "cage"), 0.0
+    )
+    return 2.0 * float(film_thickness.half_width(contact, 1.0 / scene.bearing.rollers))
+
+
 def _impacts(scene: Scene) -> NoImpacts | Impacts:
     damage = scene.damage
     if scene.model.pocket == "off" or not damage.impacts:

@@ -21,6 +21,7 @@ class Replicate:
     - ``orbit``: samples, sums of the places x, y of the cage's centre and of x^2 + y^2
     - ``work``: integrals of the powers in the order of ``POWER_TERMS`` and what follows there
     - ``largest``: loads in the order of ``forces.state``
+    - ``pocket_width``: full Hertz width of a pocket's contact over the root of the force of all pockets [m/sqrt N]
     - ``impacts``: sums of each pocket (batches, rollers, sums) in the order of ``forces.state``
     - ``races``: samples of the races and entries (batches, quantities, sums), as there
     - ``energy``: kinetic, elastic and potential energy together, at the ends of batches
@@ -50,6 +51,7 @@ class Replicate:
     orbit: Array = field(default_factory=lambda: np.zeros((0, 4)))
     impacts: Array = field(default_factory=lambda: np.zeros((0, 0, 4)))
     races: Array = field(default_factory=lambda: np.zeros((0, 0, 2)))
+    pocket_width: float = 0.0
     group: int = 0
     cage_path: Complex = field(default_factory=lambda: np.zeros(0, complex))
     traced: Array = field(default_factory=lambda: np.zeros((0, 2)))
