@@ -306,6 +306,11 @@ def duty_faults(
             if key in response.model_fields_set
         )
         return
+    yield from (
+        f"duty.from of {point.name}: a study has each point steady; leave it out, or state [thermal.start] in the scene"
+        for point in points
+        if point.origin is not None
+    )
     if not has_scene:
         yield "duty: there is no scene whose keys it can set; add [scene]"
     yield from point_faults(points, normalise, claims)

@@ -475,6 +475,7 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
+        *_point_starts(found),
         *duty_blocks(found.points, found.life or {}),
         Paragraph("" if found.life else f"Life over the duty: unknown, for there is none at {', '.join(lifeless)}."),
     ]
@@ -490,6 +491,24 @@ def _point_table(caption: str, found: "DutySimulation", figures: Mapping[str, tu
     point_name: Column[SimulatedPoint] = Column("name", words="point", cell=_marked)
     columns = [point_name, *(column(heading, *figure) for heading, figure in figures.items())]
     return Sheet(caption, columns, [point for point in found.points if point.figures]).block.without_empty_columns()
+
+
+def _point_starts(found: "DutySimulation") -> list[Block]:
+    """How the machine comes to points; nothing where the duty states no state before any."""
+    rows = [
+        (
+            point.name,
+            start.origin,
+            with_error(start.radial_um.least.value, start.radial_um.least.stated_error),
+            "at an end" if start.radial_um.time_s is None else shown(start.radial_um.time_s, 3),
+            with_error(start.temperature_difference_K.value, start.temperature_difference_K.stated_error),
+            start.status,
+        )
+        for point in found.points
+        if (start := point.start) is not None
+    ]
+    header = ("point", "from", "least radial clearance [µm]", "after [s]", "inner less outer ring [K]", "then")
+    return [Table("On the way to the points", header, rows, text_columns=(1, 5))] if rows else []
 
 
 def _marked(point: "SimulatedPoint") -> str:

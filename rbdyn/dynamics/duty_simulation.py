@@ -5,6 +5,7 @@ A point that cannot go on is a record with the reason, and the others go on.
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +21,11 @@ from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.run import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
-from rbdyn.result import Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status
+from rbdyn.result import LeastClearance, Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.duty import DutyPoint, duty_scenes, read_duty, shares_of_time
+from rbdyn.scene.duty import AMBIENT, DutyPoint, duty_scenes, read_duty, shares_of_time, starting
 from rbdyn.scene.thermal import simulated_scene
+from rbdyn.thermal.network import NODES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,12 +36,24 @@ BADNESS: dict[str, Callable[[float], float]] = {"largest": float, "least": lambd
 WORST = {figure.key: BADNESS[figure.worst] for figure in FIGURES if figure.worst in BADNESS}
 
 
+class PointStart(Record):
+    """How the machine comes to a point from an ``origin``, "ambient" or another point; other fields as of ``StartResult``."""
+
+    origin: str = keyed("from")
+    status: str
+    radial_um: LeastClearance
+    guide_um: LeastClearance | None
+    pocket_um: LeastClearance
+    temperature_difference_K: Quantity  # noqa: N815
+    time_to_steady_s: float | None
+
+
 class SimulatedPoint(Record):
     """A point of the duty: its share of the time, speed and load, and what came of it.
 
     ``figures``: by name, those of the parts included; empty where ``status`` says why there are none. ``L10_h``: life of ISO/TS 16281
     if the machine ran at this point alone, None where it has no end or is unknown. ``damage_share``: share of the damage over the
-    duty.
+    duty. ``start``: how the machine comes to the point, where the duty states from which state.
     """
 
     name: str
@@ -50,6 +64,7 @@ class SimulatedPoint(Record):
     figures: dict[str, Quantity]
     L10_h: float | None
     damage_share: float | None
+    start: PointStart | None = None
 
 
 class Worst(Record):
@@ -92,11 +107,23 @@ class DutySimulation(SavedRecord, kw_only=True):
         return self.sheet.frame
 
 
+# Columns of points that a machine comes to from a stated state.
+START_COLUMNS: tuple[Column[Any], ...] = (
+    Column(
+        "start_from",
+        at=("start", "origin"),
+        meaning="state from which the machine comes to the point, and how that ends",
+    ),
+    Column("start_status", at=("start", "status")),
+)
+
+
 def points_sheet(points: Sequence[SimulatedPoint], figures: Iterable[str]) -> Sheet[SimulatedPoint]:
     """A row a point, with its ``figures``."""
     status: Column[Any] = Column("status", meaning="ok, or why the point failed")
     place, life = (life_sheet(points).columns[part] for part in (slice(4), slice(4, None)))
-    columns = (*place, status, *life, *figure_columns(figures))
+    starts = START_COLUMNS if not points or any(point.start for point in points) else ()
+    columns = (*place, status, *life, *starts, *figure_columns(figures))
     return Sheet(
         "", columns, points, file="points.csv", content="One row per point of the duty, of `rbdyn simulate --duty`."
     )
@@ -119,17 +146,9 @@ def simulate_duty(
     if isinstance(duty, str | Path):
         source, duty = str(duty), read_duty(Path(duty))
     scenes, started = duty_scenes(scene, duty, source), time.perf_counter()
-    results: dict[str, SimulationResult | str] = {}
     if notice is not None and target is None:
         notice(plan_of(scenes[0], threads_of(workers), len(scenes)))
-    for place, (point, at_point) in enumerate(zip(duty, scenes, strict=True)):
-        # The time of the first point tells that of the others.
-        words = named(notice, f"{point.name}, 1 of {len(duty)} points") if place == 0 else None
-        steps = part_of(progress, place, len(duty))
-        try:
-            results[point.name] = simulate(at_point, workers, steps, target=target, notice=words)
-        except (InputError, RunError) as error:
-            results[point.name] = f"failed: {error}"
+    results = _results(duty, scenes, partial(simulate, workers=workers, target=target), progress, notice)
     shares = shares_of_time(duty)
     hot = [_hot(at_point, result) for at_point, result in zip(scenes, results.values(), strict=True)]
     cases = [None if one is None else load_case(one, share) for one, share in zip(hot, shares, strict=True)]
@@ -146,6 +165,7 @@ def simulate_duty(
             {} if isinstance(result, str) else result.responses,
             None if case is None else finite(case.hours),
             None if life is None else life.damage[place],
+            None if point.origin is None or isinstance(result, str) else _point_start(point.origin, result),
         )
         for place, (point, share, at_point, result, case) in enumerate(
             zip(duty, shares, scenes, results.values(), cases, strict=True)
@@ -161,6 +181,58 @@ def simulate_duty(
         versions=versions(),
         scene=scene.model_dump(mode="json"),
     )
+
+
+def _results(
+    duty: Sequence[DutyPoint],
+    scenes: Sequence[Scene],
+    run: Callable[..., SimulationResult],
+    progress: Reporter,
+    notice: Notice,
+) -> dict[str, SimulationResult | str]:
+    """Result or fault of each point, by name in the order of the duty. Those that start from another point run after the others."""
+    at = {point.name: scene for point, scene in zip(duty, scenes, strict=True)}
+    found: dict[str, SimulationResult | str] = {}
+    ordered = sorted(duty, key=lambda point: point.origin not in (None, AMBIENT))
+    for place, point in enumerate(ordered):
+        # The time of the first point tells that of the others.
+        words = named(notice, f"{point.name}, 1 of {len(duty)} points") if place == 0 else None
+        try:
+            scene = at[point.name]
+            if point.origin is not None:
+                parts = None if point.origin == AMBIENT else _parts(point.origin, at, found, run)
+                scene = starting(scene, parts)
+            found[point.name] = run(scene, progress=part_of(progress, place, len(duty)), notice=words)
+        except (InputError, RunError) as error:
+            found[point.name] = f"failed: {error}"
+    return {point.name: found[point.name] for point in duty}
+
+
+def _parts(
+    origin: str,
+    at: Mapping[str, Scene],
+    found: Mapping[str, SimulationResult | str],
+    run: Callable[..., SimulationResult],
+) -> list[float]:
+    """Steady temperatures of oil, rings, rollers, housing and shaft at another point [C]. Raises RunError where it has none."""
+    from rbdyn.dynamics.temperatures import short
+
+    # Points that start from each other: the first one takes the other from short runs.
+    result = found[origin] if origin in found else run(short(at[origin].changed({"thermal.start": None})), notice=None)
+    if isinstance(result, str) or (result.thermal or {}).get("status") != "steady" or result.temperatures_C is None:
+        raise RunError(f"the point starts from {origin!r}, which has no steady temperatures")
+    nodes = {node: figure.value for node, figure in result.temperatures_C.items()}
+    return [*(nodes[node] for node in NODES), nodes["outer"], nodes["inner"]]
+
+
+def _point_start(origin: str, result: SimulationResult) -> PointStart | None:
+    """How the machine comes to a point; None where its steady state failed."""
+    start = result.start
+    if start is None:
+        return None
+    status = f"{start.status}: {start.reason}" if start.reason else start.status
+    plays = start.radial_um, start.guide_um, start.pocket_um
+    return PointStart(origin, status, *plays, start.temperature_difference_K, start.time_to_steady_s)
 
 
 def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:

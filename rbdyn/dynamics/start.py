@@ -182,7 +182,7 @@ def _machine(scene: Scene, state: State) -> Machine:
     thermal, hot = scene.thermal, state.run.hot
     assert thermal is not None and thermal.start is not None
     start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
-    cold = np.full(len(WARMING_NODES), float(start))
+    cold = np.array(thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
     course, parts, boundaries = course_of(scene), capacities(hot, thermal), state.model.boundaries
     whole, _ = warming_network(warming_conductances(state.model.conductances, seats_of(hot)), boundaries)
     end = float(course.times[-1]) + SETTLED * slowest(parts, whole)

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import Field
+
 from rbdyn.base.faults import (
     Consistent,
     InputError,
@@ -31,6 +33,8 @@ from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 MOST_POINTS = 12
 # Keys of speed and load, the axes of a map.
 AXES = ("operation.inner_speed_rpm", "operation.radial_load_N")
+# Start of a point from a cold machine.
+AMBIENT, ORIGIN = "ambient", "from"
 # Columns of a table of points besides the keys of the scene: the name, and the share of the time, or hours in its place.
 NAME, TIMES = "name", {"share": Limits(1.0, sign="not negative"), "hours": Limits(1e9, sign="not negative")}
 # Keys that a point may not set, with the reasons.
@@ -51,10 +55,16 @@ class DutyPoint(Consistent):
     """Share of the time; the shares of all points sum to 1. A point of share 0 counts for worst figures and limits only."""
     set: list[str] = []
     """Overrides of the scene's keys at this point, as "key=value": operation, temperatures, oil flow; not of factors and seeds."""
+    origin: str | None = Field(None, alias="from")
+    """State in which the machine is when this point begins: "ambient" for a cold machine, or the name of another point for its steady
+    temperatures. With it rbdyn simulate --duty follows temperatures and clearances until this point is steady, by [thermal.start];
+    without it the point is steady from the start."""
 
     def faults(self) -> Iterator[str]:
         if ": " in self.name:
             yield f"name = {self.name!r}: must not have a colon with a space; leave it out"
+        if self.origin == self.name:
+            yield f"from = {self.origin!r}: is the point itself; name another point or {AMBIENT!r}"
 
 
 class DutyTables(Consistent):
@@ -76,6 +86,9 @@ def point_faults(
     if len(points) > MOST_POINTS:
         yield f"duty: has {len(points)} points, more than {MOST_POINTS}; join or leave out some"
     names = Counter(point.name for point in points)
+    for point in points:
+        if point.origin not in (None, AMBIENT, *names):
+            yield f"duty.from = {point.origin!r} of {point.name}: no such point; choose {AMBIENT!r} or one of {listed(list(names))}"
     yield from (f"duty.name = {name!r}: used more than once; name each once" for name in names if names[name] > 1)
     total = math.fsum(point.share for point in points)
     if not total > 0.0:
@@ -125,7 +138,9 @@ def _points_of_table(sheet: InputTable) -> list[DutyPoint]:
     refuse(faults)
     points = []
     for row, name in enumerate(sheet.column(NAME).texts):
-        table = {"name": name, "share": float(shares[row]), "set": list(_assignments(values, row))}
+        table: dict[str, Any] = {"name": name, "share": float(shares[row]), "set": list(_assignments(values, row))}
+        if ORIGIN in sheet.header and (origin := sheet.column(ORIGIN).texts[row].strip()):
+            table[ORIGIN] = origin
         try:
             points.append(validated(DutyPoint, table, f"{sheet.path}: row {row + 1}"))
         except InputError as error:
@@ -147,9 +162,9 @@ def _columns(sheet: InputTable) -> tuple[list[str], str]:
     if len(times) > 1:
         faults.append(f"{sheet.path}: columns {' and '.join(times)}: both state the time; keep one of them")
     faults += [
-        f"{sheet.path}: column {listed([name])}: neither {NAME}, share, hours nor a key of a scene (table.key); rename or remove it"
+        f"{sheet.path}: column {listed([name])}: neither {NAME}, share, hours, {ORIGIN} nor a key of a scene (table.key); rename or remove it"
         for name in names
-        if name not in (NAME, *times, *keys)
+        if name not in (NAME, ORIGIN, *times, *keys)
     ]
     faults += [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
     # A wrong sheet or separator may be the reason.
@@ -175,6 +190,10 @@ def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[
     for point in points:
         try:
             scenes.append(scene.overridden(point.set))
+            if point.origin is not None:
+                # What the start lacks shows before anything runs.
+                warm = [scenes[-1].lubricant.temperature_C] * 6
+                starting(scenes[-1], None if point.origin == AMBIENT else warm)
             refuse(
                 first_guess_faults(
                     scenes[-1].thermal, scenes[-1].lubricant, {".".join(key_path(text) or ()) for text in point.set}
@@ -184,3 +203,15 @@ def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[
             faults += [f"{source}: duty {point.name!r}: {fault.removeprefix('scene: ')}" for fault in error.faults]
     refuse(faults)
     return scenes
+
+
+def starting(scene: Scene, parts: Sequence[float] | None = None) -> Scene:
+    """The scene with the start of its machine from the temperatures of ``WARMING_NODES`` [C], None for its surroundings.
+
+    Raises InputError for a scene without [thermal].
+    """
+    if scene.thermal is None:
+        raise InputError([f"duty.{ORIGIN}: a start needs a heat balance; add [thermal] to the scene or leave it out"])
+    stated = {} if scene.thermal.start is None else scene.thermal.start.model_dump(mode="json", exclude_none=True)
+    kept = {key: value for key, value in stated.items() if key not in ("from_C", "from_parts_C")}
+    return scene.changed({"thermal.start": kept if parts is None else {**kept, "from_parts_C": list(parts)}})

@@ -148,7 +148,7 @@ def descriptions(model: type[BaseModel]) -> dict[str, str]:
                 value = getattr(text, "value", None)
                 if isinstance(text, ast.Expr) and isinstance(value, ast.Constant):
                     texts[field.target.id] = " ".join(str(value.value).split())
-    return {name: texts[name] for name in model.model_fields}
+    return {field.alias or name: texts[name] for name, field in model.model_fields.items()}
 
 
 @functools.cache

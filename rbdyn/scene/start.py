@@ -62,6 +62,9 @@ class Start(Strict):
 
     from_C: OilCelsius | None = None  # noqa: N815
     """Temperature of all parts and of the oil at the start. Default: thermal.ambient_C."""
+    from_parts_C: Annotated[list[OilCelsius], Field(min_length=6, max_length=6)] | None = None  # noqa: N815
+    """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, such as those of another operating point;
+    instead of from_C."""
     schedule: StartSchedule | None = None
     """Speed and load over time. Default: the operating point from the start on."""
     housing_widths: Positive = 1.7
@@ -81,6 +84,10 @@ def start_faults(
     if start is None:
         return
     cold, name = (ambient, "thermal.ambient_C") if start.from_C is None else (start.from_C, "thermal.start.from_C")
+    if start.from_parts_C is not None:
+        if start.from_C is not None:
+            yield "thermal.start.from_C and thermal.start.from_parts_C both state the temperatures at the start; leave one out"
+        cold, name = start.from_parts_C[0], "thermal.start.from_parts_C, oil"
     oil = lubricant.at(cold)
     thickness = 1e6 * oil.viscosity / oil.density
     if cold >= ceiling:

@@ -1,0 +1,86 @@
+"""Points of a duty that begin from a cold machine or from another point."""
+
+import tomllib
+
+import pytest
+from conftest import ROOT
+from in_process import in_process
+
+from rbdyn import Scene, simulate
+from rbdyn.base.faults import InputError
+from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty
+from rbdyn.scene.duty import duty_scenes, read_duty, starting
+
+# Simulations of the heat alone, long enough for it.
+QUICK = {"turns": 20.0, "discard_turns": 10.0, "replicates": 2, "extend": False, "companion": False}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    words = ("NU308", "--speed", "4000", "--load", "4000", "--oil", "ISO VG 68", "--ambient", "20")
+    return Scene.from_dict(tomllib.loads(in_process("rbdyn", "new", *words).stdout) | {"numerics": QUICK})
+
+
+def duty(folder, text):
+    path = folder / "duty.csv"
+    path.write_text("name,share,from,operation.inner_speed_rpm\n" + text, "utf-8")
+    return path
+
+
+def test_starts_of_points(scene, tmp_path):
+    """From an equal point nothing moves; from ambient as by [thermal.start]; from a slower point less clearance is lost than cold."""
+    text = "same,0.2,rated,4000\nslow,0.2,,2000\nrated,0.2,ambient,4000\nfaster,0.4,slow,4000\n"
+    found = simulate_duty(scene, duty(tmp_path, text), workers=2, notice=None)
+    points = {point.name: point for point in found.points}
+    assert found.status == "ok" and list(points) == ["same", "slow", "rated", "faster"] and points["slow"].start is None
+    steady = points["rated"].figures["radial_operating_clearance_um"].value
+    same, rated, faster = (points[name].start for name in ("same", "rated", "faster"))
+    assert same.radial_um.least.value == pytest.approx(steady, abs=0.5) and same.time_to_steady_s < 100.0
+    alone = simulate(starting(scene.overridden(["operation.inner_speed_rpm=4000"])), workers=2, notice=None)
+    assert (
+        rated.radial_um.least == alone.start.radial_um.least and rated.time_to_steady_s == alone.start.time_to_steady_s
+    )
+    assert rated.radial_um.least.value + 2.0 < faster.radial_um.least.value < steady - 0.5
+    assert [point.start and point.start.origin for point in found.points] == ["rated", None, "ambient", "slow"]
+    again = DutySimulation.from_dict(found.as_dict())
+    assert again.points == found.points and found.as_dict()["points"][0]["start"]["from"] == "rated"
+    table = found.table()
+    assert table["start_from"][2] == "ambient"
+
+
+def test_points_that_start_from_each_other(scene, tmp_path):
+    """Each begins at the steady temperatures of the other: the slower one cools, so its rings come nearer, and nothing is lost."""
+    found = simulate_duty(scene, duty(tmp_path, "slow,0.5,fast,2000\nfast,0.5,slow,4000\n"), workers=2, notice=None)
+    slow, fast = (point.start for point in found.points)
+    steady = [point.figures["radial_operating_clearance_um"].value for point in found.points]
+    assert found.status == "ok" and fast.radial_um.least.value < steady[1] - 0.5
+    # Short runs gave the temperatures of the fast point.
+    assert slow.radial_um.least.value > steady[1] - 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a,1,b,4000\n", "duty.from = 'b' of a: no such point; choose 'ambient' or one of a"),
+        ("a,1,a,4000\n", "from = 'a': is the point itself"),
+    ],
+)
+def test_faults_of_a_table(tmp_path, text, says):
+    with pytest.raises(InputError) as refused:
+        read_duty(duty(tmp_path, text))
+    assert says in refused.value.faults[0]
+
+
+def test_a_start_needs_a_heat_balance_and_studies_have_none(tmp_path):
+    """A scene without [thermal] is refused before anything runs, as are both kinds of temperatures at once."""
+    points = read_duty(duty(tmp_path, "a,1,ambient,4000\n"))
+    with pytest.raises(InputError, match=r"duty 'a': duty.from: a start needs a heat balance; add \[thermal\]"):
+        duty_scenes(Scene.load(ROOT / "examples" / "cylindrical_roller.toml"), points, "duty")
+
+
+def test_both_temperatures_contradict(scene):
+    both = {"thermal.start": {"from_C": 20.0, "from_parts_C": [50.0] * 6}}
+    with pytest.raises(InputError, match="both state the temperatures at the start"):
+        scene.changed(both)
+    with pytest.raises(InputError, match="from_parts_C, oil = 300"):
+        scene.changed({"thermal.start.from_parts_C": [300.0, *[50.0] * 5]})
