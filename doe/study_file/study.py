@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
@@ -48,6 +48,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.tables.decimal_marks import is_like_number
 from rbdyn.base.tables.sheet import DATE, InputColumn, InputTable, listed, quoted, read_sheet
 from rbdyn.base.tables.workbook import split_path
+from rbdyn.result import START_FIGURES
 from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
@@ -73,10 +74,14 @@ class Fitted(Strict):
     """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
 
 
+# Figures of a start by their place in the JSON of a result, such as start.radial_um.least.
+PLACES = {f"start.{part}{'.least' * part.endswith('_um')}": key for key, part in START_FIGURES.items()}
+
+
 class Response(Fitted, OverDuty):
     """A response of the simulation, the fit of its surface, its goal and its limits."""
 
-    name: Name
+    name: Annotated[Name, BeforeValidator(lambda name: PLACES.get(name, name) if isinstance(name, str) else name)]
     """Name of the response: a figure of the simulation, or a column of the table."""
 
 

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 from doe.clearance import responses_of
+from doe.study_file.study import Response
 from rbdyn import Scene, plots, simulate
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
@@ -145,6 +146,14 @@ def test_unit_figures_of_a_start_are_responses(cold):
     tables["cage"] = {key: value for key, value in tables["cage"].items() if value is not None and "land" not in key}
     scene = Scene.from_dict(tables)
     assert why_missing(scene, "start_guide_clearance_um") == "no ring guides the cage; choose another figure"
+
+
+def test_unit_study_names_a_start_as_the_json_does():
+    """Unit: a limit of a study may name start.radial_um.least, the place in the JSON, and has the figure of the list."""
+    limit = Response.model_validate({"name": "start.radial_um.least", "goal": "none", "lower": 5.0})
+    assert limit.name == "start_radial_clearance_um" and limit.lower == 5.0
+    lead = Response.model_validate({"name": "start.temperature_difference_K", "goal": "min"})
+    assert lead.name == "start_inner_minus_outer_K"
 
 
 def test_unit_table_and_picture_of_a_start(cold, tmp_path):
@@ -289,6 +298,7 @@ def test_unit_nothing_without_a_start(cold):
     code = """
 import sys
 from doe.clearance import responses_of
+from doe.study_file.study import Response
 from rbdyn import Scene, plots, simulate
 import tomllib
 simulate(Scene.from_dict(tomllib.loads(sys.stdin.read())), workers=1, notice=None)
