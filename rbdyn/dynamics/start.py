@@ -507,7 +507,7 @@ def _notes(machine: Machine, start: StartResult, radial: tuple[float, float, boo
     (least, time, inside), range_ = radial, start.ranges["radial_um"]
     if machine.scene.bearing.radial_clearance > 0.0 and least < 0.0:
         when = f" after {time:.3g} s" if inside else ""
-        notes.append(Note("clearance", f"start: the radial clearance is lost{when} and falls to {least:.0f} µm"))
+        notes.append(Note("clearance", f"start: the radial clearance falls to {least:.0f} µm{when}"))
     elif machine.scene.bearing.radial_clearance > 0.0 and range_[0] < 0.0:
         sentence = (
             f"start: over its inputs the radial clearance can fall to {range_[0]:.0f} µm; widen it or warm up slowly"
