@@ -97,6 +97,18 @@ def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]
     )
 
 
+def cage_column() -> Column[Any]:
+    """Column with the class of the cage, of rows that have a ``verdict``."""
+    return Column(
+        "cage",
+        words="cage",
+        at=lambda row: "" if row.verdict is None else row.verdict.name,
+        cell=lambda row: "" if row.verdict is None else row.verdict.cell,
+        text=True,
+        meaning="class of the cage by its orbit, undecided or not judged; empty where the scene leaves it out",
+    )
+
+
 def start_sheet(start: "StartResult | None" = None) -> Sheet[Mapping[str, float]]:
     """A row a moment of a start: operating point, temperatures, heat of the nodes, clearances, and their ranges."""
     columns = dict[str, list[float]]()

@@ -24,7 +24,7 @@ from rbdyn.base.command import (
     plain_number,
     valued,
 )
-from rbdyn.base.faults import MethodError
+from rbdyn.base.faults import InputError, MethodError
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}
 HINT = """# Add to a factor: tolerance = 0.005, the half width that can be manufactured; then [front] tolerance_aware = "quantile" and
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
+CAGE_CLASS = "cage.verdict"
 BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}
 POINT = """[[duty]]
 name = {name}
@@ -113,11 +114,11 @@ def new(
 
         reads = [path, *([duty] if duty else [])]
         check_out(out, force, reads)
-        bounds = limits_of(limit or [])
+        responses = _responses(limits_of(limit or [])) + _class_limit(limit or [])
         scene = rollers_only(DrawnScene.load(path))
         template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
         points, hours = _duty(duty, scene)
-        sections = {"responses": _responses(bounds), "duty": points, "baseline": ""}
+        sections = {"responses": responses, "duty": points, "baseline": ""}
         factors = _factors(read_toml(path))
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
@@ -144,7 +145,7 @@ def new(
 
 
 def limits_of(texts: Sequence[str]) -> Limits:
-    """Limits by response. Raises InputError with all faults at once."""
+    """Limits by response, without that on the class of the cage. Raises InputError with all faults at once."""
     from doe.clearance import responses_of
     from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
     from rbdyn.base.words import quantity
@@ -157,6 +158,9 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
             continue
         name, sign, number = match.groups()
+        if name == CAGE_CLASS:
+            faults += [f'{where}: names classes; write "{CAGE_CLASS}=held|circling" in quotes'] * (sign != "=")
+            continue
         if name not in (names := responses_of(heats=True)):
             faults.append(f"{where}: no response has that name; choose one of {', '.join(names)}")
             continue
@@ -179,6 +183,14 @@ def limits_of(texts: Sequence[str]) -> Limits:
     ]
     refuse(faults)
     return limits
+
+
+def _class_limit(texts: Sequence[str]) -> str:
+    """The limit on the class of the cage; empty without one. The check of the study reads the names of classes."""
+    classes = [match[3] for text in texts if (match := LIMIT.fullmatch(text)) and match[1] == CAGE_CLASS]
+    if len(classes) > 1:
+        raise InputError([f"--limit {CAGE_CLASS}: is stated {len(classes)} times; keep one of them"])
+    return "\n".join(["\n[limits]", *(f"cage.verdict = {_quoted(text)}" for text in classes), ""]) if classes else ""
 
 
 def _responses(limits: Limits) -> str:

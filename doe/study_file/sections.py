@@ -6,12 +6,31 @@ without a goal, so that every step of a study treats it like any other limit.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from rbdyn.base.faults import Consistent, Figure, Name, NonNegative, Number, Positive, Strict, no_power_of_two
 from rbdyn.scene.duty import DutyPoint, point_faults, shares_of_time
+from rbdyn.verdict.orbits import CageClass
+
+# Classes that a limit may name.
+CLASSES = [name for name in get_args(CageClass) if name != "not judged"]
+
+
+def split_classes(text: str) -> list[str]:
+    """Names between upright strokes."""
+    return [name.strip() for name in text.split("|") if name.strip()]
+
+
+def _classes(text: str) -> str:
+    """The text of a limit on the class of a cage. Raises ValueError unless it names one to four of them."""
+    names = split_classes(text)
+    unknown = [name for name in names if name not in CLASSES]
+    if unknown or not names or set(names) == set(CLASSES):
+        raise ValueError(f'must name some of {", ".join(CLASSES)}, with "|" between them')
+    return text
+
 
 # Smallest ratio of a step to its value, and of a resolution to its step; a finer one is lost in rounding.
 FINEST = 1e-9
@@ -231,6 +250,26 @@ class Tolerances(Strict):
     """Random parts."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the parts."""
+
+
+class CageLimit(Strict):
+    """Limits on the cage."""
+
+    verdict: Annotated[str, AfterValidator(_classes)] | None = None
+    """Classes that the cage may have by its orbit, such as "held|circling", at every point of a duty. The simulated pick keeps the limit
+    where its replicates name one of them, and breaks it where they name another."""
+
+
+class OtherLimits(Strict):
+    """Limits that no figure has."""
+
+    cage: CageLimit = CageLimit()
+    """Limits on the cage."""
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Classes that the cage may have; empty without a limit."""
+        return tuple(split_classes(self.cage.verdict or ""))
 
 
 class StudyChain(Consistent):

@@ -21,6 +21,7 @@ from doe.study_file.sections import (
     Design,
     Factor,
     Front,
+    OtherLimits,
     OverDuty,
     Robust,
     StudyChain,
@@ -138,6 +139,8 @@ class StudyFile(Consistent):
     """The factors."""
     response: Annotated[list[Response], Field(min_length=1)]
     """The responses."""
+    limits: OtherLimits = OtherLimits()
+    """Limits that no figure has: limits.cage.verdict = "held|circling"."""
     design: Design = Design()
     """The design of the runs."""
     front: Front = Front()

@@ -25,6 +25,7 @@ from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
 from rbdyn.result import TEMPERATURES, Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
+from rbdyn.verdict.replicates import CageVerdict
 
 # Key of the only scene of a study without a duty.
 EVERYWHERE = ""
@@ -85,6 +86,13 @@ class Confirmed:
         return {
             name: simulated_scene(run) for name, run in results.items() if run is not None and run.thermal is not None
         }
+
+    @property
+    def cages(self) -> dict[str, CageVerdict]:
+        """Verdict on the cage by point of the duty, or under "operation"; empty where its scene leaves it out."""
+        result = self.result
+        results = result.points if isinstance(result, DutyResult) else {"operation": result}
+        return {name: run.verdict for name, run in results.items() if run is not None and run.verdict is not None}
 
     @property
     def dangers(self) -> Notes:
@@ -335,10 +343,35 @@ def every_limit(study: Problem, confirmed: Confirmed) -> list[Limit]:
     ]
 
 
+def class_limits(study: Problem, confirmed: Confirmed) -> list[Limit]:
+    """The limit on the class of the cage at a simulated point, of a duty at the worst of its points; none where the study has none.
+
+    The value is the share of bearings alike with one of the classes, which is the probability of keeping the limit.
+    """
+    classes, verdicts = study.file.limits.classes, confirmed.cages.values()
+    if not classes or not verdicts:
+        return []
+    limits = []
+    for found in verdicts:
+        kept, share = found.is_one_of(classes), round(found.share_of(classes), 3)
+        limits.append(
+            Limit(
+                response=f"cage_{'_or_'.join(classes).replace(' ', '_')}_share",
+                bound=found.least_share,
+                sense=">=",
+                value=share,
+                verdict="undecided" if kept is None else "kept" if kept else "broken",
+                error=None,
+                probability=share,
+            )
+        )
+    return [max(limits, key=lambda limit: limit.badness)]
+
+
 def limits_of(study: Problem, confirmed: Confirmed) -> list[Limit]:
     """The limits of the study at a simulated point, one per response."""
-    worst = worst_limits(every_limit(study, confirmed))
-    return [worst[name] for name in study.responses if name in worst]
+    worst = worst_limits([*every_limit(study, confirmed), *class_limits(study, confirmed)])
+    return sorted(worst.values(), key=lambda limit: [*study.responses, limit.response].index(limit.response))
 
 
 def worst_limits(limits: Sequence[Limit]) -> dict[str, Limit]:
@@ -408,7 +441,8 @@ class Balance(Record):
 class ConfirmedPoint(Record, kw_only=True):
     """A simulated point as reports show it, with the limits there and, except for the baseline, the gains over that.
 
-    ``every_limit``: the lower and the upper limit of a response apart; ``limits``: by response the worse of them.
+    ``every_limit``: the lower and the upper limit of a response apart; ``limits``: by response the worse of them. ``cage``: class of the
+    cage by point of the duty, or under "operation".
     """
 
     factors: dict[str, float]
@@ -417,6 +451,7 @@ class ConfirmedPoint(Record, kw_only=True):
     power_terms_W: dict[str, float]  # noqa: N815
     limits: dict[str, Limit]
     every_limit: list[Limit]
+    cage: dict[str, CageVerdict]
     friction_check: dict[str, float | None] | None = None
     temperatures_C: dict[str, Temperature] | None = None  # noqa: N815
     thermal: Balance | None = None
@@ -436,7 +471,8 @@ class ConfirmedPoint(Record, kw_only=True):
             responses=dict(zip(study.responses, map(SimulatedValue, *columns), strict=True)),
             power_terms_W=dict(result.power_terms_W),
             limits={limit.response: limit.nameless for limit in limits_of(study, point)},
-            every_limit=every_limit(study, point),
+            every_limit=[*every_limit(study, point), *class_limits(study, point)],
+            cage=point.cages,
             friction_check=result.friction_check,
             temperatures_C=_temperatures(result),
             thermal=None if balance is None else Balance(balance.get("ranges")),

@@ -26,7 +26,17 @@ from doe.running.runner import Progress
 from doe.running.store import Failure
 from doe.study_file.study import PointResponse
 from doe.workflow.adaptive import Adaptive
-from doe.workflow.confirmation import ORDER, Confirmed, Limit, Verdict, every_limit, limits_of, point_words, verdict_of
+from doe.workflow.confirmation import (
+    ORDER,
+    Confirmed,
+    Limit,
+    Verdict,
+    class_limits,
+    every_limit,
+    limits_of,
+    point_words,
+    verdict_of,
+)
 from doe.workflow.front import tolerances_out_of_reach
 from doe.workflow.pick import SearchedPick, place_of, sides_of
 from doe.workflow.problem import Problem
@@ -120,7 +130,8 @@ class Obstacles(Record):
     ``reachable``: whether a point of the region keeps all limits on the surfaces. ``at_bounds``: factors of the best point at a
     bound, and ``beyond``: changes of these each of which meets the missed limits by extrapolation; both empty where none is missed.
     ``chains``: why, by name of the chain. ``tolerances``: why none follow, or too fine ones; empty where nothing else is missed.
-    ``sentences``: all of it in words, what is missed first.
+    ``cage``: sentence on the limit of its class by the verdict, empty where it is kept. ``sentences``: all of it in words, what is
+    missed first.
     """
 
     reachable: bool
@@ -129,6 +140,7 @@ class Obstacles(Record):
     beyond: tuple[Beyond, ...]
     chains: dict[str, str]
     tolerances: str
+    cage: dict[Verdict, str]
     sentences: list[str] = derived(lambda self: [str(note) for note in self._notes()])
 
     @property
@@ -147,6 +159,8 @@ class Obstacles(Record):
             yield Note("broken-limit" if sure else "open-limit", limit.sentence)
         if self.limits:
             yield Note(worst, self._remedy())
+        for verdict, sentence in self.cage.items():
+            yield Note("broken-limit" if verdict == "broken" else "open-limit", sentence)
         yield from (Note("missed-chain", f"Chain {name}: {why}.") for name, why in self.chains.items())
         if self.tolerances:
             yield Note("tolerances", self.tolerances)
@@ -191,6 +205,19 @@ def obstacles_of(
         tuple(_beyond(study, pick)) if missed else (),
         dict(chains),
         tolerances,
+        {limit.verdict: _cage_sentence(study, pick) for limit in class_limits(study, pick) if limit.verdict != "kept"},
+    )
+
+
+def _cage_sentence(study: Problem, pick: Confirmed) -> str:
+    """The class of the cage where the limit of its class is not kept, and what to do."""
+    classes = study.file.limits.classes
+    open_points = {name: found for name, found in pick.cages.items() if found.is_one_of(classes) is not True}
+    where = {name: f" at {name}" if study.duty else "" for name in open_points}
+    words = "; ".join(f"{found.words.removeprefix('Cage: ')}{where[name]}" for name, found in open_points.items())
+    return (
+        f"Limit cage.verdict = {study.file.limits.cage.verdict}: the class of the pick's cage is {words}. No surface predicts its class: change "
+        "the bearing, its load or its speed, or state other classes."
     )
 
 

@@ -325,7 +325,23 @@ class Problem(Study):
     def _confirmation_scene(self, point: Array, sets: Sequence[str]) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
         effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-        return self.scene_at(point, seed, [*sets, *effort, *settings.set])
+        scene = self.scene_at(point, seed, [*sets, *effort, *settings.set])
+        needed = scene.verdict.limits.fewest_replicates
+        if self.file.limits.classes and settings.replicates < needed:
+            refuse(
+                [
+                    f"{self.path}: confirmation.replicates = {settings.replicates}: limits.cage.verdict needs {needed} replicates alike to "
+                    f"name a class; raise it to {needed}"
+                ]
+            )
+        if self.file.limits.classes and scene.cage_sample_s is None:
+            refuse(
+                [
+                    f"{self.path}: limits.cage.verdict: the scene leaves the verdict out, by verdict.trace, a schedule or a cage "
+                    "without guide; remove the limit"
+                ]
+            )
+        return scene
 
     def adaptive_scenes(self, points: Array, replicates: Sequence[int], first: int) -> list[Run]:
         """Scenes of runs (n, k) of an adaptive search, numbered from ``first``, each with its own replicates and seed."""

@@ -173,14 +173,16 @@ def accuracy(
 
 
 def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
-    """Cage slip over speed and load, what it cost, and the points of a duty."""
+    """Cage slip and class of the cage over speed and load, what it cost, and the points of a duty."""
     header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     spent = f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}"
-    answer = [Table("Cage slip", header, rows), Paragraph(spent), *(duty.blocks if duty else [])]
+    cages = [(f"{value:g}", *row) for value, row in zip(mapped.loads_N, mapped.cages, strict=False)]
+    classes = Table("Class of the cage by its orbit, with the replicates that have it", header, cages)
+    answer = [Table("Cage slip", header, rows), classes, Paragraph(spent), *(duty.blocks if duty else [])]
     return with_notes((*mapped.notes, *(duty.notes if duty else ())), answer)
 
 
@@ -240,7 +242,7 @@ def slip_map(
     seed: command.Seed = None,
     workers: command.Workers = None,
 ) -> Delivery:
-    """Map cage slip, power loss, impact and whirl over speed and load, or the stiffness."""
+    """Map cage slip, power loss, impact, whirl and class of the cage over speed and load, or the stiffness."""
     if stiffness:
         if duty is not None:
             raise InputError([f"--duty {duty}: marks points of a map of cage slip; leave it or --stiffness out"])

@@ -16,7 +16,7 @@ from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
 from rbdyn.life.duty import PointLife, life_notes, life_sheet
 from rbdyn.properties.rexs import Attributes, write_rexs
-from rbdyn.result import LeastClearance, SimulationResult, StartResult, figure_sheet, start_sheet
+from rbdyn.result import LeastClearance, SimulationResult, StartResult, cage_column, figure_sheet, start_sheet
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import AXES, DutyPoint, duty_scenes, read_duty, shares_of_time
 from rbdyn.scene.notes import catalogue_entry
@@ -473,7 +473,7 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
     lifeless = [point.name for point in found.points if point.L10_h is None and point.status != "ok"]
     blocks = [
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
-        _point_table("Figures", found, SHOWN),
+        _point_table("Figures", found, SHOWN, cage_column()),
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *_point_starts(found),
         *duty_blocks(found.points, found.life or {}),
@@ -482,14 +482,16 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
     return with_notes(found.notes, blocks)
 
 
-def _point_table(caption: str, found: "DutySimulation", figures: Mapping[str, tuple[str, float]]) -> Table:
+def _point_table(
+    caption: str, found: "DutySimulation", figures: Mapping[str, tuple[str, float]], *further: "Column[SimulatedPoint]"
+) -> Table:
     """A row a point that has figures; ``figures``: name and factor by heading."""
 
     def column(heading: str, name: str, factor: float) -> "Column[SimulatedPoint]":
         return Column(name, words=heading, cell=lambda point: _with_error(point.figures.get(name), factor))
 
     point_name: Column[SimulatedPoint] = Column("name", words="point", cell=_marked)
-    columns = [point_name, *(column(heading, *figure) for heading, figure in figures.items())]
+    columns = [point_name, *(column(heading, *figure) for heading, figure in figures.items()), *further]
     return Sheet(caption, columns, [point for point in found.points if point.figures]).block.without_empty_columns()
 
 

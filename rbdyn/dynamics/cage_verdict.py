@@ -22,7 +22,7 @@ def verdict_of(scene: Scene, runs: Sequence[Replicate]) -> CageVerdict | None:
     turns = min(_cage_turns(run) for run in runs)
     if turns < BLOCK_TURNS:
         reason = f"runs of {turns:.3g} cage turns are shorter than {BLOCK_TURNS}; raise numerics.turns"
-        return CageVerdict("not judged", {}, {}, "not judged", {}, {}, reason)
+        return CageVerdict("not judged", {}, {}, "not judged", {}, {}, scene.verdict.least_share, reason)
     samples, loaded = sum(run.traced[run.first :].sum(axis=0) for run in runs)
     films = "films alone drive the rollers" if loaded < DRIVEN * samples else None
     return cage_verdict([_trial(scene, run) for run in runs], scene.verdict.limits, films)

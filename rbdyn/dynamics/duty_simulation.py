@@ -14,18 +14,28 @@ from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
-from rbdyn.base.records import Record, derived, finite, keyed
+from rbdyn.base.records import Record, derived, finite, keyed, nullable
 from rbdyn.base.words import Notice, counted, named, part_of
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.run import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
-from rbdyn.result import LeastClearance, Quantity, SavedRecord, SimulationResult, arrays_of, figure_columns, full_status
+from rbdyn.result import (
+    LeastClearance,
+    Quantity,
+    SavedRecord,
+    SimulationResult,
+    arrays_of,
+    cage_column,
+    figure_columns,
+    full_status,
+)
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import AMBIENT, DutyPoint, duty_scenes, read_duty, shares_of_time, starting
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.thermal.network import NODES
+from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,6 +64,7 @@ class SimulatedPoint(Record):
     ``figures``: by name, those of the parts included; empty where ``status`` says why there are none. ``L10_h``: life of ISO/TS 16281
     if the machine ran at this point alone, None where it has no end or is unknown. ``damage_share``: share of the damage over the
     duty. ``start``: how the machine comes to the point, where the duty states from which state.
+    duty. ``verdict``: class of the cage by its orbit, None where the scene leaves it out.
     """
 
     name: str
@@ -65,6 +76,7 @@ class SimulatedPoint(Record):
     L10_h: float | None
     damage_share: float | None
     start: PointStart | None = None
+    verdict: CageVerdict | None = nullable(default=None)
 
 
 class Worst(Record):
@@ -123,7 +135,7 @@ def points_sheet(points: Sequence[SimulatedPoint], figures: Iterable[str]) -> Sh
     status: Column[Any] = Column("status", meaning="ok, or why the point failed")
     place, life = (life_sheet(points).columns[part] for part in (slice(4), slice(4, None)))
     starts = START_COLUMNS if not points or any(point.start for point in points) else ()
-    columns = (*place, status, *life, *starts, *figure_columns(figures))
+    columns = (*place, status, *life, *starts, cage_column(), *figure_columns(figures))
     return Sheet(
         "", columns, points, file="points.csv", content="One row per point of the duty, of `rbdyn simulate --duty`."
     )
@@ -166,6 +178,7 @@ def simulate_duty(
             None if case is None else finite(case.hours),
             None if life is None else life.damage[place],
             None if point.origin is None or isinstance(result, str) else _point_start(point.origin, result),
+            None if isinstance(result, str) else result.verdict,
         )
         for place, (point, share, at_point, result, case) in enumerate(
             zip(duty, shares, scenes, results.values(), cases, strict=True)

@@ -17,9 +17,10 @@ from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
-from rbdyn.base.records import Record, derived, keyed, spread
+from rbdyn.base.records import Record, derived, keyed, nullable, spread
 from rbdyn.base.words import Notice, counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
+from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -43,8 +44,9 @@ from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of
 from rbdyn.dynamics.statistics.replicate import Replicate
-from rbdyn.result import Quantity, figure_columns
+from rbdyn.result import Quantity, cage_column, figure_columns
 from rbdyn.scene import Scene
+from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +56,8 @@ RACES = ("inner", "outer")
 
 
 class Point(Record):
-    """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on. ``notes``: on its limits."""
+    """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on. ``notes``: on its limits.
+    ``verdict``: class of the cage by its orbit, None without one."""
 
     inner_speed_rpm: float
     radial_load_N: float  # noqa: N815
@@ -62,6 +65,7 @@ class Point(Record):
     figures: dict[str, Quantity] = spread()
     power_gap: float | None = keyed("power_balance", "relative_gap")
     notes: Notes | None = None
+    verdict: CageVerdict | None = nullable(default=None)
 
 
 def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Point]:
@@ -70,6 +74,7 @@ def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Poi
         Column("inner_speed_rpm", meaning="operating point"),
         Column("radial_load_N"),
         *figure_columns(figures or dict.fromkeys(name for point in points for name in point.figures)),
+        cage_column(),
         Column("power_gap", meaning="share of the power that the balance does not account for"),
         Column("status", meaning="ok, or why the point failed"),
     )
@@ -110,6 +115,14 @@ class SlipMap(Record):
     def table(self) -> "pd.DataFrame":
         """A row a point; figures with their 95 % errors."""
         return map_sheet(self.points).frame
+
+    @property
+    def cages(self) -> list[list[str]]:
+        """Class of the cage in rows of rising load with its replicates, "failed" without one; empty where the scene leaves it out."""
+        cells = ["failed" if point.verdict is None else point.verdict.cell for point in self.points]
+        columns = len(self.speeds_rpm)
+        judged = any(point.verdict for point in self.points)
+        return [cells[start : start + columns] for start in range(0, len(cells), columns)] if judged else []
 
     def grid(self, figure: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Values of a figure, shape (loads, speeds); NaN where a point failed."""
@@ -182,7 +195,7 @@ class Series:
         )
         damage = {figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures}
         shown = {panel.key: figures[panel.key] for panel in PANELS} | damage | parts
-        return Point(speed, load, status_of(notes), shown, power_gap, notes or None)
+        return Point(speed, load, status_of(notes), shown, power_gap, notes or None, verdict_of(self.scene, runs))
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
         return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]

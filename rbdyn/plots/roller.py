@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
 from rbdyn.base.arrays import Array
@@ -21,7 +22,21 @@ from rbdyn.dynamics import motion
 from rbdyn.dynamics.duty import row_stiffness
 from rbdyn.dynamics.figures import PANELS
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
-from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, METHOD_COLOURS, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
+from rbdyn.plots.style import (
+    BLUE,
+    CAGE_COLOURS,
+    GREEN,
+    GREY,
+    INNER,
+    METHOD_COLOURS,
+    ORANGE,
+    OUTER,
+    SKY,
+    VERMILION,
+    plain,
+    plt,
+    save,
+)
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion import History
@@ -256,9 +271,10 @@ def draw_slip_map(
     """
     speeds, loads = slip_map.speeds_rpm, slip_map.loads_N
     width = max(4.2, 0.85 * len(speeds) + 2.0)
-    rows = math.ceil(len(PANELS) / 2)
+    count = len(PANELS) + bool(slip_map.cages)
+    rows = math.ceil(count / 2)
     figure, axes = plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(loads) + 1.8)))
-    for axis in axes.ravel()[len(PANELS) :]:
+    for axis in axes.ravel()[count:]:
         axis.set_axis_off()
     for axis, panel in zip(axes.ravel(), PANELS, strict=False):
         values = panel.percent * slip_map.grid(panel.key)
@@ -269,16 +285,32 @@ def draw_slip_map(
             colour = "white" if np.isfinite(value) and value < middle else "black"
             # A value is below its place where that may be marked.
             axis.text(column, row - BELOW * bool(marks), text, ha="center", va="center", fontsize=8, color=colour)
-        axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
-        axis.set_yticks(range(len(loads)), [f"{load:g}" for load in loads])
-        axis.set(
-            xlabel="inner speed [rpm]",
-            ylabel="radial load [N]",
-            title=f"{label(panel.key)} [%]" if panel.percent > 1.0 else label(panel.key),
-        )
         figure.colorbar(image, ax=axis)
+        _label_axes(axis, slip_map, f"{label(panel.key)} [%]" if panel.percent > 1.0 else label(panel.key))
         _mark_points(axis, slip_map, marks)
+    if slip_map.cages:
+        _draw_classes(axes.ravel()[len(PANELS)], slip_map, BELOW * bool(marks))
+        _mark_points(axes.ravel()[len(PANELS)], slip_map, marks)
     save(figure, path)
+
+
+def _label_axes(axis: Axes, slip_map: "SlipMap", title: str) -> None:
+    axis.set_xticks(range(len(slip_map.speeds_rpm)), [f"{speed:g}" for speed in slip_map.speeds_rpm])
+    axis.set_yticks(range(len(slip_map.loads_N)), [f"{load:g}" for load in slip_map.loads_N])
+    axis.set(xlabel="inner speed [rpm]", ylabel="radial load [N]", title=title)
+
+
+def _draw_classes(axis: Axes, slip_map: "SlipMap", below: float) -> None:
+    """Cells in the colour of the class of their cage, with its name and replicates."""
+    names = [point.verdict.name if point.verdict else "" for point in slip_map.points]
+    colours = np.array([to_rgb(CAGE_COLOURS.get(name, "white")) for name in names])
+    axis.imshow(
+        colours.reshape(len(slip_map.loads_N), len(slip_map.speeds_rpm), 3), origin="lower", aspect="auto", alpha=0.5
+    )
+    for row, cells in enumerate(slip_map.cages):
+        for column, text in enumerate(cells):
+            axis.text(column, row - below, text.replace(", ", "\n"), ha="center", va="center", fontsize=8)
+    _label_axes(axis, slip_map, "class of the cage by its orbit")
 
 
 # Clearances of a picture over the operating or the drawn one, whichever is larger, and how many of them.

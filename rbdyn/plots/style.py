@@ -90,6 +90,11 @@ def _along(line: Line2D) -> Array:
     return np.concatenate([corners, *pieces])
 
 
+# Colours of the classes of a cage by its orbit.
+CAGE_COLOURS = {
+    "held": BLUE, "circling": GREEN, "fast whirl": VERMILION, "rattling": ORANGE, "wandering": PURPLE, "undecided": GREY,
+    "not judged": GREY,
+}  # fmt: skip
 COLOURS = {"impact_force_N": VERMILION, "whirl_deviation_ratio": ORANGE, "power_loss_W": BLUE}
 NAMES = {"impact_force_N": "impact force", "whirl_deviation_ratio": "whirl ratio", "power_loss_W": "power loss"}
 # Ours is black; the others share a colour a family and differ by mark.

@@ -16,6 +16,9 @@ SAMPLES_A_TURN = 64
 # Cage turns of a block, whose orbit has measures of its own.
 BLOCK_TURNS = 10
 
+# Outcomes of a replicate in the prior of a share: of its class, of another, undecided; the number of classes does not matter.
+PRIOR_OF_CLASS, PRIOR_OF_OTHERS = 0.5, 1.0
+
 CageClass = Literal["held", "circling", "fast whirl", "rattling", "wandering", "not judged"]
 
 
@@ -32,6 +35,12 @@ class Thresholds:
     # Turnover above which a cage rattles; None: no value is known, and such a motion is not judged.
     rattling_turnover: float | None = None
     least_share: float = 0.85
+
+    @property
+    def fewest_replicates(self) -> int:
+        """Replicates that name a class where all are alike: least n with (n + 1/2)/(n + 3/2) at the least share."""
+        prior = PRIOR_OF_CLASS + PRIOR_OF_OTHERS
+        return max(math.ceil((prior * self.least_share - PRIOR_OF_CLASS) / (1.0 - self.least_share) - 1e-9), 1)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from typing import NamedTuple, get_args
 
@@ -11,10 +11,8 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.records import Record, keyed
 from rbdyn.base.words import counted
-from rbdyn.verdict.orbits import CageClass, Forcing, Orbit, Thresholds, orbit_class
+from rbdyn.verdict.orbits import PRIOR_OF_CLASS, PRIOR_OF_OTHERS, CageClass, Forcing, Orbit, Thresholds, orbit_class
 
-# Outcomes of a replicate in its prior: of a class, of another, undecided; the number of classes does not matter.
-PRIOR_OF_CLASS, PRIOR_OF_OTHERS = 0.5, 1.0
 MEASURES = [measure.name for measure in fields(Orbit)]
 
 
@@ -28,27 +26,12 @@ class Share(NamedTuple):
 
 def class_shares(classes: Sequence[CageClass]) -> dict[str, Share]:
     """Share of each class among bearings alike, from those of replicates: Beta(k + 1/2, n - k + 1), mean and 90 % interval."""
-    from scipy.special import betaincinv
-
-    shares: dict[str, Share] = {}
-    for name in get_args(CageClass):
-        if count := classes.count(name):
-            a, b = count + PRIOR_OF_CLASS, len(classes) - count + PRIOR_OF_OTHERS
-            low, high = betaincinv(a, b, (0.05, 0.95))
-            shares[name] = Share(a / (a + b), float(low), float(high))
-    return shares
+    return {name: _share(classes.count(name), len(classes)) for name in get_args(CageClass) if classes.count(name)}
 
 
 def verdict(shares: Mapping[str, Share], limits: Thresholds) -> str:
     """Class that has at least ``least_share`` of bearings alike, else undecided."""
     return next((name for name, share in shares.items() if share.mean >= limits.least_share), "undecided")
-
-
-def fewest_replicates(limits: Thresholds) -> int:
-    """Replicates that name a class where all are alike: least n with (n + 1/2)/(n + 3/2) at the least share."""
-    share = limits.least_share
-    prior = PRIOR_OF_CLASS + PRIOR_OF_OTHERS
-    return max(math.ceil((prior * share - PRIOR_OF_CLASS) / (1.0 - share) - 1e-9), 1)
 
 
 class Measure(NamedTuple):
@@ -65,6 +48,7 @@ class CageVerdict(Record):
     - ``shares``: of each class among bearings alike, mean and 90 % interval; ``replicates``: number of each class
     - ``distances``: of the measures to each threshold, in standard errors over the replicates, positive above it. "offset" is that
       of the orbit's centre to the radius of the orbit, and "forced_band" that of the rate to the nearest forced order
+    - ``least_share``: that a class must have to be named
     - ``measures``: "offset" and "radius" over the radial play, "concentration" of the spectrum, "rate" over the speed of the cage, and
       "turnover" of its energy in a cage turn: mean and standard error
     """
@@ -75,6 +59,7 @@ class CageVerdict(Record):
     rule: str
     replicates: dict[str, int]
     measures: dict[str, Measure]
+    least_share: float
     reason: str | None = None
 
     @property
@@ -87,6 +72,48 @@ class CageVerdict(Record):
             by_rule = f"; its orbit is {self.rule} ({found})" if self.rule != self.name else ""
             return f"Cage: not judged, because {self.reason}{by_rule}"
         return f"Cage: {self.name} ({found}{'' if self.reason is None else f'; {self.reason}'})"
+
+    @property
+    def short_words(self) -> str:
+        """The class with the replicates that have it."""
+        total = sum(self.replicates.values())
+        if self.name == "undecided":
+            return f"{self.name} ({self.cell})"
+        same = f"{self.replicates[self.name]} of " if self.name in self.replicates else ""
+        return f"{self.name} ({same}{counted(total, 'replicate')})" if total else self.name
+
+    @property
+    def cell(self) -> str:
+        """The class in a cell of a table: 'held 8/8', or 'held 5, circling 3' where it is undecided."""
+        total = sum(self.replicates.values())
+        if self.name == "undecided":
+            return ", ".join(f"{name} {count}" for name, count in self.replicates.items())
+        return f"{self.name} {self.replicates[self.name]}/{total}" if self.name in self.replicates else self.name
+
+    def share_of(self, names: Collection[str]) -> float:
+        """Share of bearings alike whose class is one of these; 0 without replicates."""
+        total = sum(self.replicates.values())
+        return _share(sum(self.replicates.get(name, 0) for name in names), total).mean if total else 0.0
+
+    def is_one_of(self, names: Collection[str]) -> bool | None:
+        """Whether the class is one of these; None where the share of neither these nor the others is large enough, or none is judged."""
+        others = [name for name in self.replicates if name not in names]
+        if self.name != self.rule:
+            return None
+        if self.share_of(names) >= self.least_share:
+            return True
+        if "not judged" in others and {"rattling", "wandering"} & {*names}:
+            return None
+        return False if self.share_of(others) >= self.least_share else None
+
+
+def _share(count: int, total: int) -> Share:
+    """Beta(k + 1/2, n - k + 1) of k in n, mean and 90 % interval."""
+    from scipy.special import betaincinv
+
+    a, b = count + PRIOR_OF_CLASS, total - count + PRIOR_OF_OTHERS
+    low, high = betaincinv(a, b, (0.05, 0.95))
+    return Share(a / (a + b), float(low), float(high))
 
 
 class Trial(NamedTuple):
@@ -101,7 +128,7 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
     classes = [orbit_class(*trial, limits) for trial in trials]
     shares = class_shares(classes)
     rule = name = verdict(shares, limits)
-    needed = fewest_replicates(limits)
+    needed = limits.fewest_replicates
     if reason is not None:
         name = "not judged"
     elif rule == "not judged":
@@ -116,8 +143,9 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
         shares=shares,
         distances=_distances(series, limits, [trial.forcing for trial in trials]) if len(trials) > 1 else {},
         rule=rule,
-        replicates=dict(Counter(sorted(classes))),
+        replicates=dict(Counter(classes).most_common()),
         measures={key: Measure(float(values.mean()), _error(values)) for key, values in series.items()},
+        least_share=limits.least_share,
         reason=reason,
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rbdyn.verdict.orbits import Forcing, Orbit, Thresholds, mean_measures, orbit_class, orbit_measures
-from rbdyn.verdict.replicates import Share, Trial, cage_verdict, class_shares, fewest_replicates, verdict
+from rbdyn.verdict.replicates import Share, Trial, cage_verdict, class_shares, verdict
 
 PLAY = 100e-6
 TURNS = np.arange(64 * 10) / 64
@@ -71,10 +71,10 @@ def test_an_orbit_that_cannot_be_judged_is_refused(samples, play, fault):
 
 def test_fewest_replicates_follow_from_the_least_share():
     """Six alike bear the default of 0.85, and five do not."""
-    assert fewest_replicates(Thresholds()) == 6
+    assert Thresholds().fewest_replicates == 6
     for share in (0.6, 0.7, 0.9, 0.95):
         limits = Thresholds(least_share=share)
-        needed = fewest_replicates(limits)
+        needed = limits.fewest_replicates
         assert verdict(class_shares(["held"] * needed), limits) == "held"
         assert verdict(class_shares(["held"] * (needed - 1)), limits) == "undecided"
 
@@ -124,7 +124,7 @@ def test_distances_count_in_standard_errors():
     [
         ([1.0] * 8, None, "Cage: circling (8 of 8 replicates)"),
         ([1.0] * 5, None, "Cage: undecided (circling in 5 of 5 replicates; a class needs 6 replicates alike)"),
-        ([1.0] * 3 + [2.0] * 5, None, "Cage: undecided (circling in 3, fast whirl in 5 of 8 replicates)"),
+        ([1.0] * 3 + [2.0] * 5, None, "Cage: undecided (fast whirl in 5, circling in 3 of 8 replicates)"),
         (
             [1.0] * 8,
             "films alone drive the rollers",

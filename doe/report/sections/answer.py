@@ -55,6 +55,7 @@ def first_screen(summary: Summary) -> list[Block]:
         identity_line(summary.identity),
         *_clearances(summary),
         *_judged(summary),
+        Paragraph(_cages(summary)),
         *_gained(summary),
         *at_points(summary),
         *_parts_to_make(summary),
@@ -66,13 +67,26 @@ def _judged(summary: Summary) -> list[Block]:
     """Limits with their verdicts and the odds of keeping them over the unknown inputs, or the command that computes these."""
     odds = [limit.odds.value for limit in summary.limits.values() if limit.odds]
     table = _limits_judged(summary)
-    if summary.obstacles.limits or not summary.limits:
+    if summary.obstacles.limits or summary.obstacles.cage or not summary.limits:
         # The dangers above say which limits are missed, and by how much.
         return [table, *([_command_for_odds(summary)] if summary.limits else ())]
     if min(odds, default=1.0) < NEARLY_ALL:
         return [table, Paragraph("Not every limit is kept at the pick over the unknown inputs.", "warning")]
     everywhere = " and over the unknown inputs" if odds else ""
     return [table, Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement"), _command_for_odds(summary)]
+
+
+def _cages(summary: Summary) -> str:
+    """The class of the cage at the baseline and at the pick, or where the points of a duty differ at each; empty without it."""
+    before, after = (summary.confirmation[name].cage for name in ("baseline", "pick"))
+    if not before or not after:
+        return ""
+    pairs = {point: (before[point].short_words, after[point].short_words) for point in after if point in before}
+    if len(set(pairs.values())) > 1:
+        return f"Cage: {'; '.join(f'{point}: {old} at the baseline, {new} at the pick' for point, (old, new) in pairs.items())}."
+    old, new = next(iter(pairs.values()))
+    everywhere = ", at every point of the duty" if len(pairs) > 1 else ""
+    return f"Cage: {old} at the baseline, {new} at the pick{everywhere}."
 
 
 def _command_for_odds(summary: Summary) -> Paragraph:

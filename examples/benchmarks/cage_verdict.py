@@ -1,0 +1,86 @@
+"""Class of the cage at default numerics against runs of sixteen times the length, on seeded bearings of `rbdyn new`.
+
+python examples/benchmarks/cage_verdict.py [--seeds N] [--times N]: about half an hour for the ten bearings on two cores. A bearing is in
+the catalogue or on a drawing, guided by a ring or its rollers, at 0.5 to 2 times the speed and 0.02 to 1 times the load that the
+command takes by default. A row states both classes with their replicates, and whether classes that are named agree.
+"""
+
+import argparse
+import subprocess
+import sys
+import time
+import tomllib
+
+import numpy as np
+
+import rbdyn
+from rbdyn.scene import Scene
+
+DESIGNATIONS = ("NU206", "NU210", "NU308", "NU1014", "NU2311", "N215")
+OILS = ("ISO VG 22", "ISO VG 68", "ISO VG 220")
+# Classes that state no class of a bearing.
+OPEN = ("undecided", "not judged")
+# As few as can name a class.
+LONG_REPLICATES = 6
+
+
+def seeded(seed: int) -> tuple[str, Scene]:
+    """A bearing in words, and its scene at a speed and a load of its own."""
+    draw = np.random.default_rng(seed)
+    guidance, oil = str(draw.choice(["outer", "inner", "roller"])), str(draw.choice(OILS))
+    if seed % 2:
+        arguments = [str(draw.choice(DESIGNATIONS))]
+    else:
+        size, rollers = int(draw.choice([7, 9, 12])), int(draw.integers(11, 18))
+        pitch = 1.25 * size * rollers / np.pi
+        arguments = ["own", "--rollers", str(rollers), "--roller", f"{size}x{size}", "--pitch", f"{pitch:.0f}"]
+    new = subprocess.run(
+        [sys.executable, "-m", "rbdyn", "new", *arguments, "--guidance", guidance, "--oil", oil],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    scene = Scene.from_dict(tomllib.loads(new.stdout))
+    speed = scene.operation.inner_speed_rpm * float(np.exp(draw.uniform(np.log(0.5), np.log(2.0))))
+    load = scene.operation.radial_load_N * float(np.exp(draw.uniform(np.log(0.02), 0.0)))
+    scene = scene.overridden([f"operation.inner_speed_rpm={speed:.4g}", f"operation.radial_load_N={load:.4g}"])
+    return f"{arguments[0]}, {guidance}, {oil}, {speed:.4g} rpm, {load:.4g} N", scene
+
+
+def judged(scene: Scene) -> tuple[str, str, float]:
+    """Class, the verdict in words, and the time it took [s]."""
+    started = time.perf_counter()
+    found = rbdyn.simulate(scene, notice=None).verdict
+    assert found is not None
+    return found.name, found.words, time.perf_counter() - started
+
+
+def main(seeds: int, times: int) -> None:
+    """Print a row a bearing, and the counts."""
+    counts = {"agree": 0, "differ": 0, "open": 0}
+    for seed in range(1, seeds + 1):
+        words, scene = seeded(seed)
+        turns = times * scene.numerics.turns
+        long = scene.overridden(
+            [
+                f"numerics.turns={turns:g}",
+                f"numerics.replicates={LONG_REPLICATES}",
+                "numerics.extend=false",
+                "numerics.companion=false",
+            ]
+        )
+        short_class, short_words, short_s = judged(scene)
+        long_class, long_words, long_s = judged(long)
+        kind = "open" if {short_class, long_class} & set(OPEN) else "agree" if short_class == long_class else "differ"
+        counts[kind] += 1
+        print(
+            f"{seed}: {words}\n   default {short_words} [{short_s:.0f} s]\n   {times} x {long_words} [{long_s:.0f} s]",
+            flush=True,
+        )
+    print(", ".join(f"{count} {kind}" for kind, count in counts.items()))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--times", type=int, default=16)
+    options = parser.parse_args()
+    main(options.seeds, options.times)
