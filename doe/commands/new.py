@@ -25,6 +25,7 @@ from rbdyn.base.command import (
     valued,
 )
 from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.tables.sheet import listed
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults += [f'{where}: names classes; write "{CAGE_CLASS}=held|circling" in quotes'] * (sign != "=")
             continue
         if name not in (names := responses_of(heats=True)):
-            faults.append(f"{where}: no response has that name; choose one of {', '.join(names)}")
+            faults.append(f"{where}: no response has that name; choose one of {listed(names)}")
             continue
         try:
             value = plain_number(number, quantity(name)[1])

@@ -72,7 +72,16 @@ def test_command_line_out_writes_files(command, tmp_path):
     shown = command("simulate", EXAMPLE, *QUICK, "--json", "--out", folder)
     assert shown.returncode == 0
     pictures = {"roller_loads.png", "cage_orbit.png", "pocket_forces.png", "stiffness.png"}
-    names = {"result.json", "figures.csv", "history.csv", *pictures, "report.html", "tables.xlsx", "made_by.json"}
+    names = {
+        "result.json",
+        "figures.csv",
+        "bearing.rexs",
+        "history.csv",
+        *pictures,
+        "report.html",
+        "tables.xlsx",
+        "made_by.json",
+    }
     assert {path.name for path in folder.iterdir()} == names
     assert json.loads((folder / "result.json").read_text()) == json.loads(shown.stdout)
     lines = (folder / "history.csv").read_text().splitlines()

@@ -98,7 +98,7 @@ def test_goals_limits_and_rule_of_the_file_are_kept(tmp_path):
     assert set(record["ideal"]) == {"impact_force_N", "whirl_deviation_ratio"}
     # The back-off from the limits of the loss, whose surface misses much, keeps the impact off its target.
     assert 189.5 < record["ideal"]["impact_force_N"] < 210.0
-    assert "demanded probability of 0.95" in record["pick"]["reason"]
+    assert "required probability of 0.95" in record["pick"]["reason"]
     assert all(380.0 <= point["responses"]["power_loss_W"] <= 400.0 for point in record["front"])
     assert [limit["sense"] for limit in record["constraints"]] == [">=", "<="]
     assert all(limit["kept"] for limit in record["constraints"])
@@ -184,7 +184,7 @@ def test_missing_and_too_wide_tolerances_are_named(tmp_path):
     with pytest.raises(InputError) as refused:
         front_of(tmp_path, TOLERANCES[0], asked)
     assert [fault.split(":")[1] for fault in refused.value.faults] == [" factor.tolerance of guide_clearance_mm"]
-    with pytest.raises(InputError, match="leaves no room in the region"):
+    with pytest.raises(InputError, match="leaves no space in the region"):
         front_of(tmp_path, TOLERANCES[0], (TOLERANCES[1][0], TOLERANCES[1][1].replace("0.01", "0.2")), asked)
 
 

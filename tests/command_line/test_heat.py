@@ -51,7 +51,7 @@ def test_simulate_states_temperatures_and_their_origin(command, scene, tmp_path)
         "inputs (90 %)",
         "inner ring and shaft",
         "steady state; gain of heat",
-        "carried off: oil flow",
+        "removed: oil flow",
     ):
         assert words in done.stdout
     assert "heat balance with 1 L/min at 80 °C" in done.stdout

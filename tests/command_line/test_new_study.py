@@ -16,6 +16,7 @@ from doe.study_file.sections import StudyChain
 from doe.workflow.parts import clearance_parts
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
+from rbdyn.base.tables.sheet import listed
 from rbdyn.properties.tolerances import grade_tolerances
 from rbdyn.scene import Scene
 
@@ -61,7 +62,7 @@ def test_command_line_limits(scene):
 def test_command_line_limits_that_are_refused(scene):
     """Command line: a name, a number, a sign or a pair that cannot be is one sentence each, all at once; exit 2."""
     limits = {
-        "loss<=3": f"no response has that name; choose one of {', '.join(responses_of(heats=True))}",
+        "loss<=3": f"no response has that name; choose one of {listed(responses_of(heats=True))}",
         "impact_force_N<=abc": "abc is no number; write a plain number in N",
         "impact_force_N<=0,5": "0,5 has a decimal comma; write 0.5",
         "impact_force_N<=inf": "inf is not a finite number; write a plain number",

@@ -92,8 +92,8 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
         answer_text(Summary.from_dict(limited(odds=[0.57, 0.51, 0.63]))),
     )
     assert unknown.count("doe study study.toml --robust states the probabilities over the unknown inputs.") == 1
-    assert answer_text(Summary.from_dict(summary())).count("--robust states the odds") == 1
-    assert "57 (51 to 63)" in known and "kept [%]" in known
+    assert answer_text(Summary.from_dict(summary())).count("--robust states the probabilities") == 1
+    assert "57 (51 to 63)" in known and "kept over unknown inputs [%]" in known
 
 
 @pytest.mark.parametrize(
