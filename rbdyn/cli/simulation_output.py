@@ -80,7 +80,8 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     save_table(motion.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.roller_loads(motion, folder / "roller_loads.png")
-    plots.cage_orbit({title: motion}, folder / "cage_orbit.png")
+    classes = {} if result.verdict is None else {title: result.verdict.name}
+    plots.cage_orbit({title: motion}, folder / "cage_orbit.png", classes)
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
     files = [
         "result.json",

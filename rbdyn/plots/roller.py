@@ -66,19 +66,24 @@ def _plane(axis: Axes) -> None:
     plain(axis)
 
 
-def cage_orbit(histories: "Mapping[str, History]", path: Path) -> None:
-    """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each."""
+def cage_orbit(
+    histories: "Mapping[str, History]", path: Path, classes: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each.
+
+    ``classes``: of the cage by the title of its history, which names and colours its path.
+    """
     columns = len(histories)
     figure, axes = plt.subplots(2, columns, figsize=(4.8 * columns, 9.0), squeeze=False)
     for column, (title, history) in zip(axes.T, histories.items(), strict=True):
         x, y = (1e6 * part for part in history.guide_eccentricity)
         for axis in column:
-            axis.plot(x, y, linewidth=0.6, color=BLUE)
+            axis.plot(x, y, linewidth=0.6, color=CAGE_COLOURS.get(classes.get(title, ""), BLUE))
             axis.plot(x[0], y[0], "o", markersize=5, color=GREEN, label="start")
             axis.plot(x[-1], y[-1], "s", markersize=5, color=VERMILION, label="end")
             _plane(axis)
         _guide_circle(column[0], history)
-        column[0].set_title(title)
+        column[0].set_title(f"{title}; cage: {classes[title]}" if title in classes else title)
         column[1].set_title("enlarged")
     # Below the figure, where no orbit runs.
     figure.legend(
