@@ -292,7 +292,7 @@ def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: 
         kind="damage",
         words=f"{meaning} [{unit}]",
         sums="races",
-        is_defined=lambda runs: any(bool(run.races[run.first :, place, SAMPLES_NUMBER].any()) for run in runs),
+        is_defined=lambda runs: any(bool(run.races[run.first :, place:, SAMPLES_NUMBER][:, :1].any()) for run in runs),
     )
 
 

@@ -151,6 +151,16 @@ def types_by_body():
     return found
 
 
+# Sums and samples of every run by default, which a scene may leave out.
+UNSAMPLED = {"damage.impacts": False, "damage.races": False, "verdict.trace": False}
+
+
+@pytest.fixture(scope="module")
+def outer(outer):
+    """The scene of other tests without its sums over impacts, samples of contacts and trace of the cage."""
+    return outer.changed(UNSAMPLED)
+
+
 @pytest.fixture(scope="module")
 def optional(outer):
     """The bearing of every option, by name."""
@@ -254,6 +264,7 @@ def test_command_line_imports_what_the_scene_needs():
     """Import: the whole command, interpreted (compiling, numba itself loads scipy.linalg)."""
     arguments = ["rbdyn", "simulate", "examples/cylindrical_roller.toml", "--turns", "0.01", "--replicates", "2"]
     arguments += ["--set", "numerics.discard_turns=0.01", "--workers", "1", "--json"]
+    arguments += [word for key in UNSAMPLED for word in ("--set", f"{key}=false")]
     program = f"import sys; sys.argv = {arguments!r}\nfrom rbdyn.cli import run\ntry:\n    run()\n"
     program += "except SystemExit:\n    print(*sys.modules, file=sys.stdout)"
     output = fresh("-c", program, interpreted=True)

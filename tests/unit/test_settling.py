@@ -195,6 +195,8 @@ def test_unit_a_run_that_has_not_settled_states_no_interval(example):
         return run
 
     found = run_until_settled(example, start, 1, None, Stop())
+    orbit = np.zeros((len(found.runs[0].durations), 4))
+    found = found._replace(runs=[replace(run, orbit=orbit) for run in found.runs])
     assert len(found.runs[0].durations) == 480 and "no statistical error is known" in found.notes[1]
     states = quantities(example, found.runs, [], 1.0, found.since)
     for figure in (states[one.key] for one in figures.BEARING if one.slow):
@@ -422,7 +424,9 @@ def test_unit_replicates_start_in_two_groups(outer, make_scene):
         place, velocity = cage[[CAGE_X, CAGE_Y]], cage[[CAGE_VX, CAGE_VY]]
         assert np.hypot(*place) == pytest.approx(START_PLAY * play)
         assert cage[CAGE_SPEED] == pytest.approx((1.0 - START_SLIP) * near[5 * z + CAGE_SPEED])
-        assert np.hypot(*velocity) == pytest.approx(cage[CAGE_SPEED] * np.hypot(*place)) and place @ velocity == 0.0
+        assert np.hypot(*velocity) == pytest.approx(cage[CAGE_SPEED] * np.hypot(*place))
+        # With fused operations the sum of two equal products is rounded once.
+        assert abs(place @ velocity) < 1e-15 * np.hypot(*place) * np.hypot(*velocity)
         assert far[4 * z : 5 * z] == pytest.approx((1.0 - START_SLIP) * near[4 * z : 5 * z])
         pockets = cage[CAGE_ANGLE] + 2.0 * np.pi * np.arange(z) / z
         away = (

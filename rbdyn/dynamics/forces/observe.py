@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.compiled.kernel import entry, kernel
+from rbdyn.compiled.kernel import entry
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact, closed_load, line_load, slice_drop
-from rbdyn.contact.tangential import coefficient_of
 from rbdyn.dynamics.forces.cage import guide_forces
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
-from rbdyn.dynamics.forces.races import race_contact, roller_radius
+from rbdyn.dynamics.forces.races import race_observed
 
 BISECTIONS = 60
 
@@ -61,26 +60,6 @@ def slice_loads(
 # contact and film, is positive on the front wall, where the roller drives the cage.
 OUTER_LOAD, INNER_LOAD, POCKET_LOAD, OUTER_SLIP, INNER_SLIP, OUTER_HEAT, INNER_HEAT = range(7)
 OBSERVED = 7
-
-
-@kernel
-def race_observed(race, side, bearing, y, j, ring):
-    """``race_contact`` of roller ``j``."""
-    z = bearing.rollers
-    return race_contact(
-        race,
-        side,
-        roller_radius(bearing.sizes, j),
-        y[j] - ring.x,
-        y[z + j] - ring.y,
-        y[2 * z + j] - ring.vx,
-        y[3 * z + j] - ring.vy,
-        y[4 * z + j],
-        ring.speed,
-        ring.cos,
-        ring.sin,
-        coefficient_of(race.tangential, y, j),
-    )
 
 
 @entry

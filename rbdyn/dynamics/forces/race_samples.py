@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law, routine
 from rbdyn.dynamics.forces.equations import motions
-from rbdyn.dynamics.forces.observe import race_observed
+from rbdyn.dynamics.forces.races import race_observed
 from rbdyn.dynamics.forces.state import (
     ENTRY_ENERGIES,
     ENTRY_ENERGY,

@@ -15,7 +15,7 @@ from rbdyn.compiled.kernel import VECTOR, kernel, law
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.contact.tangential import response, steady_traction
+from rbdyn.contact.tangential import coefficient_of, response, steady_traction
 
 
 class RoundRace(NamedTuple):
@@ -265,3 +265,23 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     approach = race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin)
     steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
     return race_wrench(race, side, approach, steady, coefficient)
+
+
+@kernel
+def race_observed(race, side, bearing, y, j, ring):
+    """``race_contact`` of roller ``j``."""
+    z = bearing.rollers
+    return race_contact(
+        race,
+        side,
+        roller_radius(bearing.sizes, j),
+        y[j] - ring.x,
+        y[z + j] - ring.y,
+        y[2 * z + j] - ring.vx,
+        y[3 * z + j] - ring.vy,
+        y[4 * z + j],
+        ring.speed,
+        ring.cos,
+        ring.sin,
+        coefficient_of(race.tangential, y, j),
+    )
