@@ -30,8 +30,8 @@ from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
 if TYPE_CHECKING:
+    from rbdyn.dynamics.ensemble import Stop
     from rbdyn.dynamics.motion import History
-    from rbdyn.dynamics.run import Stop
 
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
@@ -163,7 +163,7 @@ def every_scene(runs: Sequence[Run]) -> list[Scene]:
 
 def work_of(scene: Scene) -> float:
     """Least shaft turns of a run of a scene, with those of its companions and of the short states of a heat balance."""
-    from rbdyn.dynamics.run import in_turn
+    from rbdyn.dynamics.ensemble import in_turn
 
     work = in_turn(scene)
     if scene.thermal is None:
@@ -212,8 +212,9 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
 
 def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], ledger: Ledger) -> None:
     """Engine of this process: the thread of a point notes its begin and stores its outcome."""
+    from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
-    from rbdyn.dynamics.run import Outcome, Stop, prepare, run_all
+    from rbdyn.dynamics.run import prepare
 
     stop, threads = Stop(), workers or os.cpu_count() or 1
 
@@ -260,7 +261,7 @@ def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> RunOu
     """Simulate a scene in ``workers`` threads; any fault of it is the cause of a failure, and so is a bearing without steady
     temperatures or too hot.
     """
-    from rbdyn.dynamics.run import CancelledError
+    from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
 
     start_s = time.perf_counter()

@@ -15,10 +15,11 @@ import numpy as np
 from rbdyn import Scene
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import with_error
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.advance import DERIVATIVES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance
-from rbdyn.dynamics.run import Run, Stop, with_numerics
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 
 RENORMALISE_TURNS = 0.1

@@ -38,7 +38,7 @@ from rbdyn.scene.keys import default_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rbdyn.dynamics.run import Reporter
+    from rbdyn.dynamics.ensemble import Reporter
     from rbdyn.quasistatic.result import BallResult
 
 # Smaller differences of figures without scatter come from the accuracy of the solver: relative, and in the unit of the figure.
@@ -323,7 +323,7 @@ def _kind(source: Any) -> str:
 
 def _result(source: Any, workers: int | None, progress: "Reporter", notice: Notice) -> Any:
     if isinstance(source, Scene):
-        from rbdyn.dynamics.run import plan_of, threads_of
+        from rbdyn.dynamics.ensemble import plan_of, threads_of
         from rbdyn.dynamics.simulate import simulate
 
         if notice is not None:

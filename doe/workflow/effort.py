@@ -42,7 +42,7 @@ class Effort(NamedTuple):
     @property
     def threads(self) -> int:
         """Number of threads. Raises InputError unless it is a whole number from 1."""
-        from rbdyn.dynamics.run import threads_of
+        from rbdyn.dynamics.ensemble import threads_of
 
         return threads_of(self.workers)
 

@@ -1,5 +1,6 @@
 """A study resolved once and handed to every step: goals, design, region, tolerances, its scenes at any point; what it asks."""
 
+import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -18,8 +19,9 @@ from doe.study_file import Study
 from doe.study_file.sections import Goal, OverDuty
 from doe.workflow.design import design_of
 from rbdyn.base.arrays import Array, Mask
-from rbdyn.base.faults import InputError, key_path, refuse
+from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, refuse
 from rbdyn.base.records import Record, spread
+from rbdyn.base.tables.sheet import listed
 from rbdyn.base.words import label, quantity
 from rbdyn.dynamics.figures import sums_left_out, why_missing
 from rbdyn.result import TEMPERATURES
@@ -142,15 +144,15 @@ class Problem(Study):
     def check_responses(self) -> None:
         """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
         heats = any(name in TEMPERATURES for name in self.figures) and self._states("thermal")
-        names = ", ".join(responses_of(heats))
+        names = responses_of(heats)
         refuse(
             f"{self.path}: response.name = {name!r}: "
             + (
-                f"{self.scene.file} has no [thermal], which computes temperatures; add that table there, or choose one of {names}"
+                f"{self.scene.file} has no [thermal], which computes temperatures; add that table there, or name another response"
                 if name in TEMPERATURES
                 else "wear needs K/H of a rig, which no simulation gives; choose pocket_sliding_N_m_s, to which wear is in proportion"
                 if "wear" in name
-                else f"the simulation does not give it; choose one of {names}"
+                else f"the simulation does not give it; {_nearest(name, names)}"
             )
             for name in self.figures
             if name not in responses_of(heats)
@@ -496,3 +498,9 @@ class Settings(Asked):
             turns=scene.numerics.turns,
             confirmation_replicates=study.file.confirmation.replicates,
         )
+
+
+def _nearest(name: str, names: Sequence[str]) -> str:
+    """The figures whose names are nearest to one that is none, or else the first of all."""
+    near = difflib.get_close_matches(name[:LONGEST_NAME], names, n=2)
+    return f"did you mean {' or '.join(near)}?" if near else f"choose one of {listed(names)}"

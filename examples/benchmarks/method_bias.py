@@ -27,9 +27,10 @@ from rbdyn.accuracy.tolerances import (
 from rbdyn.base.blocks import Sheet, Table, columns_of
 from rbdyn.base.faults import RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
-from rbdyn.dynamics.run import Run, Stop, prepare
+from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 

@@ -27,11 +27,12 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
+from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import Outcome, Stop, prepare, run_all, with_numerics
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import (
     LEAST_DAMPING,

@@ -22,9 +22,10 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Column, Sheet, columns_of
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import with_error
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import Stop, prepare, with_numerics
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.scene import Scene
 

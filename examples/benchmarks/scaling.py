@@ -23,9 +23,10 @@ from rbdyn.accuracy.variants import with_options
 from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Stop, prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 

@@ -23,9 +23,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import Recording, batches_of, run_until_settled
-from rbdyn.dynamics.run import Outcome, Run, Stop, prepare, run_all, with_numerics
+from rbdyn.dynamics.run import Run, prepare, with_numerics
 from rbdyn.dynamics.statistics.error_bars import quantities
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity

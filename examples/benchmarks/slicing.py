@@ -30,9 +30,10 @@ from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import shown
 from rbdyn.contact.hertz_line import line_load
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import Stop, prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 

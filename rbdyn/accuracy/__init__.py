@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rbdyn.accuracy.methods import times_faster
     from rbdyn.accuracy.report import Report, show, write
     from rbdyn.accuracy.tolerances import statistics_bias
-    from rbdyn.dynamics.run import Reporter
+    from rbdyn.dynamics.ensemble import Reporter
 
 __all__ = ["STUDIES", "Report", "show", "statistics_bias", "study", "study_name", "times_faster", "write"]
 

@@ -13,8 +13,9 @@ from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import error_alone, value_alone, with_error
+from rbdyn.dynamics.ensemble import in_turn
 from rbdyn.dynamics.figures import BEARING
-from rbdyn.dynamics.run import in_turn, with_numerics
+from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene

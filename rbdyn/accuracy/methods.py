@@ -23,11 +23,12 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.blocks import Column, Sheet, Table, columns_of
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.advance import ACCEPTED, DERIVATIVES, NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance, layout_of, scales
-from rbdyn.dynamics.run import Run, Stop, prepare, with_numerics
+from rbdyn.dynamics.run import Run, prepare, with_numerics
 from rbdyn.scene import Scene
 
 # Right-hand sides a turn past which a method counts as failed.

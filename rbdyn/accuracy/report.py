@@ -14,7 +14,7 @@ from rbdyn.base.files import versions, write_json
 from rbdyn.base.records import save_table
 from rbdyn.base.words import NOTABLE_S, counted, estimate
 from rbdyn.compiled.kernel import COMPILING
-from rbdyn.dynamics.run import LOOK_S, Reporter
+from rbdyn.dynamics.ensemble import LOOK_S, Reporter
 
 T = TypeVar("T")
 LOGGER = logging.getLogger("rbdyn.accuracy")

@@ -25,10 +25,11 @@ from rbdyn.base.blocks import Column, Sheet, Table, columns_of
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import signed_with_error
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import Stop, prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene

@@ -22,10 +22,11 @@ from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.faults import InputError, RunError, read_toml, set_key
 from rbdyn.base.records import Record, finite, shown
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Stop, held_by_stability, largest_eigenvalue, prepare
+from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue, prepare
 from rbdyn.scene import Scene
 
 COST_TURNS, COST_DISCARDED = 10, 2

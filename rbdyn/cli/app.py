@@ -104,7 +104,7 @@ def simulate(
     if duty is not None:
         return _over_duty(console, loaded, (scene, duty), aim, workers)
     console.folder.claim(scene)
-    from rbdyn.dynamics.run import plan_of, threads_of
+    from rbdyn.dynamics.ensemble import plan_of, threads_of
     from rbdyn.dynamics.simulate import simulate as run_scene
 
     if (say := console.notice) is not None and aim is None:

@@ -1,8 +1,8 @@
 """Cylindrical roller bearing in time, in the plane of rotation.
 
 - ``parameters``: what a scene becomes for compiled code; ``forces``: interactions, state and equations; ``integrators``: time stepping
-- ``run``: one replicate under way, its method, and runs side by side in threads; ``recording``: the same in batches, until their
-  figures no longer drift
+- ``run``: one replicate under way, and its method; ``recording``: the same in batches, until their figures no longer drift;
+  ``ensemble``: runs side by side in threads
 - ``simulate``: their figures as one result;
   ``temperatures``: those that the friction of a bearing keeps up; ``start``: those of a cold machine over time
 - ``figures``: one list of them, which studies, maps, rigs and the manual follow; ``statistics``: their errors

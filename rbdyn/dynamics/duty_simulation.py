@@ -17,8 +17,8 @@ from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.records import Record, derived, finite, keyed, nullable
 from rbdyn.base.words import Notice, counted, named, part_of
 from rbdyn.dynamics.duty import load_case
+from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
-from rbdyn.dynamics.run import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import (

@@ -21,10 +21,11 @@ from rbdyn.base.blocks import Column, Sheet, frame_of
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.base.words import Brief, Figure, Notice
 from rbdyn.contact.film_thickness import hertz_pressure
+from rbdyn.dynamics.ensemble import Pace, Stop, log
 from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing, rolling_contacts
 from rbdyn.dynamics.parameters.state import layout_of
-from rbdyn.dynamics.run import Pace, Run, Stop, log
+from rbdyn.dynamics.run import Run
 from rbdyn.life import turning_rings
 from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.scene import Scene, rollers_only

@@ -20,6 +20,7 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import Notice
+from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.advance import (
@@ -35,7 +36,7 @@ from rbdyn.dynamics.integrators.advance import (
 )
 from rbdyn.dynamics.parameters.model import pocket_width
 from rbdyn.dynamics.parameters.state import group_of, scales
-from rbdyn.dynamics.run import Outcome, Pace, Reporter, Run, Stop, in_turn, run_all, threads_of, with_numerics
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of, filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.replicate import Replicate

@@ -13,6 +13,7 @@ from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.words import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.cage_verdict import verdict_of
+from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log, threads_of
 from rbdyn.dynamics.figures import BEARING, DAMAGE, pocket_impacts
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, OUTER_LOAD
@@ -28,19 +29,7 @@ from rbdyn.dynamics.parameters.validity import (
 )
 from rbdyn.dynamics.part_figures import part_figures, races_of
 from rbdyn.dynamics.recording import Ensemble, recording_of, run_until_settled, whole_windows
-from rbdyn.dynamics.run import (
-    Pace,
-    Reporter,
-    Stop,
-    explicit_method,
-    in_turn,
-    keys_of,
-    log,
-    prepare,
-    stiffness_cost,
-    stiffness_notes,
-    threads_of,
-)
+from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.extremes import return_force_notes
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done

@@ -21,25 +21,14 @@ from rbdyn.base.records import Record, derived, keyed, nullable, spread
 from rbdyn.base.words import Notice, counted
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.cage_verdict import verdict_of
+from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
 from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import (
-    Outcome,
-    Pace,
-    Reporter,
-    Stop,
-    in_turn,
-    keys_of,
-    log,
-    plan_of,
-    prepare,
-    run_all,
-    threads_of,
-)
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of

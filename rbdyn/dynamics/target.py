@@ -20,10 +20,11 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.notes import Note
 from rbdyn.base.words import Notice, counted
+from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import Reporter, Stop, plan_of, prepare, threads_of, with_numerics
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.error_bars import after_transient
 from rbdyn.dynamics.statistics.metrics import bias_scale, companion_tolerance, mean_gap, work_done

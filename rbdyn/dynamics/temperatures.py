@@ -21,6 +21,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
+from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.heat import (
     Network,
@@ -34,7 +35,7 @@ from rbdyn.dynamics.parameters.heat import (
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.part_figures import at_temperatures_with_errors
 from rbdyn.dynamics.recording import Ensemble
-from rbdyn.dynamics.run import Reporter, with_numerics
+from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean

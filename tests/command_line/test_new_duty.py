@@ -100,7 +100,7 @@ def test_unit_names_survive_the_template(scene, tmp_path):
     ("text", "faults"),
     [
         ("share,x.y\n1,2\n", ["column name is missing; add it", "column x.y: unknown key"]),
-        (TABLE.replace("share", "part"), ["column share or hours is missing", "column part: neither name, share, hours nor a key of a"]),
+        (TABLE.replace("share", "part"), ["column share or hours is missing", "column part: neither name, share, hours, from nor a key of a"]),
         (TABLE.replace("inner_speed", "iner_speed"), ["iner_speed_rpm: unknown key; did you mean operation.inner_speed_rpm?"]),
         (TABLE.replace("0.75", "often"), ["share in row 2 = 'often': is not a finite number"]),
         (TABLE.replace("0.75", "75"), ["share in row 2 = 75: is beyond 1; check the unit"]),

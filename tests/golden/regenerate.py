@@ -38,8 +38,9 @@ def motion(name: str) -> list[float]:
     """State of the first replicate of a scene of ``conftest`` after ``TURNS``."""
     import conftest
 
+    from rbdyn.dynamics.ensemble import Stop
     from rbdyn.dynamics.parameters.model import roller_bearing
-    from rbdyn.dynamics.run import Run, Stop
+    from rbdyn.dynamics.run import Run
 
     assignments = {
         "outer": (), "inner": ("cage.guidance=inner",), "conservative": conftest.CONSERVATIVE,

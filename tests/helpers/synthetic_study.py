@@ -28,6 +28,7 @@ NOTHING_MISSED = {
     "beyond": [],
     "chains": {},
     "tolerances": "",
+    "cage": {},
     "sentences": [],
 }
 

@@ -13,12 +13,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.forces.races import unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, SmoothRamps
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.losses import LOAD, SHAFT
 
 HELPERS = Path(__file__).parents[1] / "helpers"

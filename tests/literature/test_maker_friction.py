@@ -155,7 +155,7 @@ def test_literature_minimum_load_by_series(make_scene):
     assert minimum_loads(0.07, 4250.0 * RPM, 0.0, 0.0, (0.15, 8500.0 * RPM))["SKF, k_r = 0.15"] == pytest.approx(588.0)
     point = ("operation.inner_speed_rpm=4250.0", "operation.radial_load_N=100.0")
     (note,) = light_load_notes(make_scene('bearing.designation="NU 210"', *point))
-    assert "0.59 kN (SKF, k_r = 0.15)" in note and "of 4 makers' minimum loads" in note
+    assert "0.59 kN (SKF, k_r = 0.15)" in note and "of 4 manufacturers' minimum loads" in note
 
 
 def test_command_line_states_the_makers_friction(tmp_path):
@@ -172,7 +172,7 @@ def test_command_line_states_the_makers_friction(tmp_path):
         result["friction_check"].keys() == KEYS and result["power_loss_W"] == json.loads(plain.stdout)["power_loss_W"]
     )
     shown = CliRunner().invoke(app, ["simulate", scene, *named])
-    (line,) = [line for line in shown.stdout.splitlines() if line.startswith("maker's friction: ")]
+    (line,) = [line for line in shown.stdout.splitlines() if line.startswith("friction by SKF's model ")]
     assert f"power loss is {result['friction_check']['ratio']:.2f} of SKF's" in line and "ISO 15312 heat" in line
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rbdyn.contact.damping import damped_load
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import rosenbrock, runge_kutta
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import recording_of
-from rbdyn.dynamics.run import Stop
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import (
     DAMPING_SCALE,

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import DAMAGE, fatigue_force
 from rbdyn.dynamics.forces.bodies import BalancedCage
 from rbdyn.dynamics.forces.impacts import book_changes, book_impacts
 from rbdyn.dynamics.forces.state import EXPONENTS, IMPACT_SUMS, NUMBER, PEAK_POWERS, POCKET_LOAD, SQUARES
 from rbdyn.dynamics.integrators.advance import FINISHED, advance
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.losses import POCKET_DAMPING, POCKET_FORCE
 from rbdyn.scene import Scene
 

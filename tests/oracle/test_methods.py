@@ -36,11 +36,12 @@ from rbdyn.accuracy.methods import (
     times_faster,
 )
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.integrators.advance import empty_tally
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 
 CVODE = [method for method in METHODS if method.name.startswith("CVODE")]
 

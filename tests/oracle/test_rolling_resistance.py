@@ -15,9 +15,9 @@ from numba import njit
 from rbdyn.base.faults import InputError
 from rbdyn.contact import film_thickness
 from rbdyn.contact import rolling_resistance as rolling
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing, rolling_law
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Stop
 
 MODULUS, RADIUS, LENGTH, VISCOSITY, PRESSURE_COEFFICIENT = 2.264e11, 5e-3, 10e-3, 0.01, 1.5e-8
 FLOODED = rolling.biboulet_houpert(VISCOSITY, MODULUS, RADIUS, LENGTH, 0.9)

@@ -17,11 +17,12 @@ from scipy.optimize import brentq
 from rbdyn.base.faults import InputError, read_toml
 from rbdyn.contact.tangential import ElasticContact, SteadyTraction, response, steady_traction
 from rbdyn.contact.traction import traction
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.integrators.advance import ACCEPTED, NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import contact_approach, layout_of
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.scene import Scene
 

@@ -9,6 +9,7 @@ import pytest
 from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.compiled.kernel import entry
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import CAGE_SLIP, IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.forces.race_lanes import scratch
@@ -20,7 +21,7 @@ from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, differences_of, 
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Stop, held_by_stability, largest_eigenvalue
+from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.losses import POWERS, SHAFT

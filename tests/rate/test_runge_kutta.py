@@ -11,12 +11,12 @@ from scipy.integrate import solve_ivp
 from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.base.faults import RunError
+from rbdyn.dynamics.ensemble import CancelledError
 from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import runge_kutta as dp
 from rbdyn.dynamics.integrators.advance import advance, interpolate, refine_peak
 from rbdyn.dynamics.parameters.state import scales
-from rbdyn.dynamics.run import CancelledError
 from rbdyn.losses import POCKET_FORCE, POWERS, SHAFT
 
 PAIR = dp.DormandPrince()

@@ -185,7 +185,7 @@ def test_threads_change_no_bit_of_a_bent_chain():
         ({"expression": "a", "nominal_mm": 3.0}, "nominal_mm = 3.0: a link of kind expression has none"),
         (
             {"expression": "a", "thermal_growth": {"of": "a", "expansion_per_K": 1e-5, "temperature_rise_K": 9.0}},
-            "thermal_growth and expression stand together",
+            "thermal_growth and expression contradict",
         ),
     ],
 )

@@ -15,10 +15,11 @@ from doe.clearance import responses_of
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.contact.cage_bar import CageSection, clamped_stress
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import DAMAGE, sliding_over_track
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, ENTRY_SLIPS, SAMPLES_NUMBER
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.extremes import LARGEST_DISTANCE, RETURN_WINDOWS, distance, moments_of, return_level
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene

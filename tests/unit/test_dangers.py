@@ -131,7 +131,7 @@ def test_unit_statuses_are_notes():
 def obstacles(verdict: str | None, reachable: bool = True, chains: dict[str, str] | None = None) -> Obstacles:
     """Obstacles of a pick with one limit of this verdict, or without any."""
     missed = MissedLimit("power_loss_W", None, "<=", 250.0, 255.0, 1.0, verdict, 5.0, 257.0, 0.9) if verdict else None
-    return Obstacles(reachable, (missed,) if missed else (), [], (), chains or {}, "")
+    return Obstacles(reachable, (missed,) if missed else (), [], (), chains or {}, "", {})
 
 
 def test_unit_dangers_of_a_choice():

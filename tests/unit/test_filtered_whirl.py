@@ -13,11 +13,12 @@ from doe.workflow.calibration import cases_of
 from doe.workflow.input_sets import case_of
 from doe.workflow.rig import read_rig
 from rbdyn.base.faults import InputError, read_toml
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.metrics import filtered_speed
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene

@@ -25,6 +25,7 @@ from rbdyn.contact.cage_film import journal_film_force, wall_film
 from rbdyn.contact.hertz_line import sum_of_slices
 from rbdyn.contact.rolling_resistance import film_forces
 from rbdyn.contact.traction import asperity_load_share, bicubic
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.cage import dry_walls, film_on_wall, journal_wrench
 from rbdyn.dynamics.forces.race_lanes import open_contact
 from rbdyn.dynamics.forces.races import turned_multiple
@@ -32,7 +33,7 @@ from rbdyn.dynamics.forces.schedule import segment
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 
 TESTS = Path(__file__).parents[1]
 ROOT, HELPERS = TESTS.parent, TESTS / "helpers"

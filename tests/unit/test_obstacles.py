@@ -263,10 +263,10 @@ def test_two_points_of_a_duty_are_shown_one_a_line(tmp_path, monkeypatch):
 def test_unit_what_to_relax_is_a_danger_ahead_of_a_worse_pick():
     """Unit: where no point keeps the limits, what would be kept stands behind that and ahead of what the pick loses."""
     missed = MissedLimit("impact_force_N", None, "<=", 5.0, 37.0, 37.0, "undecided", 32.0, 56.0, 0.95)
-    notes = Obstacles(False, (missed,), [], (), {}, "").notes
+    notes = Obstacles(False, (missed,), [], (), {}, "", {}).notes
     dangers = of_level(ranked([Note("worse", "the pick is worse"), *notes]), Level.DANGER)
     assert [str(note) for note in dangers] == [
         *map(str, notes),
         "the pick is worse",
     ] and "56 N would be kept" in dangers[1]
-    assert [note.level for note in Obstacles(True, (missed,), [], (), {}, "").notes] == [Level.WARNING] * 2
+    assert [note.level for note in Obstacles(True, (missed,), [], (), {}, "", {}).notes] == [Level.WARNING] * 2

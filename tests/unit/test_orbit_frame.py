@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import runge_kutta as rk
 from rbdyn.dynamics.integrators.advance import ACCEPTED, FINISHED, advance
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 
 
 @pytest.fixture

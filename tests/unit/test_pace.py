@@ -10,8 +10,8 @@ import pytest
 import rbdyn
 from rbdyn.base.command import progress_bar
 from rbdyn.base.words import duration, estimate
-from rbdyn.dynamics import run
-from rbdyn.dynamics.run import Pace, in_turn, keys_of, plan_of
+from rbdyn.dynamics import ensemble, run
+from rbdyn.dynamics.ensemble import Pace, in_turn, keys_of, plan_of
 from rbdyn.dynamics.simulate import simulate
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")
@@ -95,7 +95,7 @@ def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog
     scene, stated = make_scene(*QUICK), []
     plain = simulate(scene, notice=stated.append)
     assert stated == []
-    monkeypatch.setattr(run, "LOOK_S", 0.0)
+    monkeypatch.setattr(ensemble, "LOOK_S", 0.0)
     monkeypatch.setattr(run, "NOTABLE_S", 0.0)
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)

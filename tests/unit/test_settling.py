@@ -13,6 +13,7 @@ from instant_runs import with_figures
 from rbdyn.accuracy import coverage
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics import figures
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.forces.state import (
     CAGE_ANGLE,
@@ -38,7 +39,7 @@ from rbdyn.dynamics.parameters.state import (
     wall_of,
 )
 from rbdyn.dynamics.recording import Recording, record, run_until_settled, whole_windows
-from rbdyn.dynamics.run import Run, Stop, explicit_method, with_numerics
+from rbdyn.dynamics.run import Run, explicit_method, with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import (
     FALSE_ALARMS,

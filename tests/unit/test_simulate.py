@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import CAGE_SLIP, IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, LOADS, OUTER_LOAD, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_chance, student_factor, student_half_width
 from rbdyn.dynamics.statistics.metrics import quantity

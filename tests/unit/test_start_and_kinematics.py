@@ -12,6 +12,7 @@ from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
 
 from rbdyn.contact.hertz_line import LineContactOnBar
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.cage import InnerGuide, NoFilm, NoGuide, OuterGuide
 from rbdyn.dynamics.forces.equations import mechanical_energy
@@ -19,7 +20,7 @@ from rbdyn.dynamics.parameters import state as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import load_distribution, scales, start_state, static_share
 from rbdyn.dynamics.parameters.validity import race_report
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 from rbdyn.scene import Scene, fits
 from rbdyn.scene.bearing import Bearing
 

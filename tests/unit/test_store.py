@@ -239,7 +239,7 @@ def test_full_disk_is_one_sentence_and_keeps_what_was_finished(path):
         store.put("key 1", result(1))
         (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
         store._connection.execute(f"PRAGMA max_page_count = {pages + 1}")
-        with pytest.raises(RunError, match=r"study\.sqlite: .*full.*make room") as refused:
+        with pytest.raises(RunError, match=r"study\.sqlite: .*full.*free space") as refused:
             for number in range(2, 9):
                 store.put(f"key {number}", result(number))
         assert "\n" not in str(refused.value)

@@ -265,7 +265,7 @@ def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
     shown, said = full.communicate(timeout=60)
     assert full.returncode == 1, said
     assert re.fullmatch(
-        r"\S+study\.sqlite: cannot be written \(.*\); finished runs are kept: make room .*", said.strip()
+        r"\S+study\.sqlite: cannot be written \(.*\); finished runs are kept: free space .*", said.strip()
     )
     assert json.loads(shown)["status"].startswith("failed: ")
     kept = seeds_run(out / STORE)
@@ -294,4 +294,5 @@ def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
     scenes = study.design_scenes(np.array([study.centre, 1.1 * study.centre]))
     one, two = (module.simulate(scene, 1) for scene in scenes)
     assert prepared == scenes[:1]
-    assert [result.cost["compile_s"] for result in (one, two)] == [1.0, 0.0]
+    # What the figures of the first run compile comes on top.
+    assert one.cost["compile_s"] >= 1.0 and two.cost["compile_s"] == 0.0

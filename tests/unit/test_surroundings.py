@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import quad, solve_ivp
 
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.bodies import (
     BalancedCage,
     Gravity,
@@ -34,7 +35,7 @@ from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, Smooth
 from rbdyn.dynamics.integrators.advance import NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import layout_of
-from rbdyn.dynamics.run import Run, Stop
+from rbdyn.dynamics.run import Run
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 7.0]), np.array([10.0, -4.0, 6.0, 6.5])
 

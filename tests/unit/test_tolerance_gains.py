@@ -135,7 +135,7 @@ def test_unit_warning_names_the_gain_and_the_width_without_it(planes):
     assert record.without_limiting_gain.half_width == pytest.approx(without.half_widths[0])
     assert record.without_limiting_gain.grade == without.grades["radial_clearance_mm"].name
     assert found.warning.startswith(
-        "The gain of power loss demands parts finer than IT4: radial clearance within ± 0.0"
+        "The gain of power loss requires parts finer than IT4: radial clearance within ± 0.0"
     )
     assert (
         f"({record.grade})" in found.warning

@@ -11,10 +11,10 @@ from conftest import ROOT
 from in_process import in_process
 
 import rbdyn
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.motion import history
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import recording_of
-from rbdyn.dynamics.run import Stop
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
