@@ -175,6 +175,8 @@ def test_oracle_first_guess_and_spacing_do_not_matter(cold, monkeypatch):
     assert abs(guess.value - least.value) < np.hypot(guess.error, least.error)
     monkeypatch.setattr(start_module, "FILM_REACH", 7.5)
     monkeypatch.setattr(start_module, "CLEARANCE_REACH", 0.05)
+    monkeypatch.setattr(start_module, "LEAST_REACH", 1.25)
+    monkeypatch.setattr(start_module, "MOST_SIMULATIONS", 30)
     dense = simulate(_scene(start={}), workers=2, notice=None).start
     assert len(dense.moments) > len(cold.start.moments)
     assert abs(dense.radial_um.least.value - least.value) < np.hypot(dense.radial_um.least.error, least.error)
