@@ -164,7 +164,7 @@ class Recording:
             work=work,
             largest=largest,
             impacts=impacts.reshape(-1, *tally.impacts.shape),
-            races=races.reshape(-1, *tally.races.shape),
+            races=races.reshape(len(self._ends) - 1, *tally.races.shape),
             cage_angle=np.diff(cage),
             kinematic_angle=np.diff(rolling),
             energy=energy,

@@ -121,6 +121,7 @@ def summary() -> dict[str, Any]:
         "power_terms_W": {},
         "limits": {},
         "every_limit": [],
+        "cage": {},
     }
     return {
         "format": "doe.study/2",

@@ -158,7 +158,7 @@ def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     found = whirl_sentence(study, both)
     assert "does not whirl" in found
     assert "0.016 of its clearance at the baseline and 0.02 of its clearance at the pick" in found
-    assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("0.016 of its play at the baseline.")
+    assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("0.016 of its clearance at the baseline.")
     assert whirl_sentence(study, dict.fromkeys(both, point(0.9))) == ""
     assert whirl_sentence(study, dict.fromkeys(both, point(None))) == ""
     assert whirl_sentence(idle, both) == ""

@@ -197,7 +197,7 @@ def test_unit_a_run_that_has_not_settled_states_no_interval(example):
 
     found = run_until_settled(example, start, 1, None, Stop())
     orbit = np.zeros((len(found.runs[0].durations), 4))
-    found = found._replace(runs=[replace(run, orbit=orbit) for run in found.runs])
+    found = replace(found, runs=[replace(run, orbit=orbit) for run in found.runs])
     assert len(found.runs[0].durations) == 480 and "no statistical error is known" in found.notes[1]
     states = quantities(example, found.runs, [], 1.0, found.since)
     for figure in (states[one.key] for one in figures.BEARING if one.slow):
