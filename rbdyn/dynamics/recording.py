@@ -163,7 +163,7 @@ class Recording:
             pocket_width=pocket_width(run.scene),
             work=work,
             largest=largest,
-            impacts=impacts.reshape(-1, *tally.impacts.shape),
+            impacts=impacts.reshape(len(self._ends) - 1, *tally.impacts.shape),
             races=races.reshape(len(self._ends) - 1, *tally.races.shape),
             cage_angle=np.diff(cage),
             kinematic_angle=np.diff(rolling),

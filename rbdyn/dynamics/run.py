@@ -16,6 +16,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, RunError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Pace, Stop
+from rbdyn.dynamics.forces.cage import Impacts
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.race_samples import RaceSamples
 from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
@@ -84,7 +85,9 @@ class Run:
         first_method = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = carry_from(y, bearing.rollers, first_step, method_of(first_method, scene, bearing))
-        self.tally = empty_tally(bearing.rollers, isinstance(bearing.samples, RaceSamples))
+        self.tally = empty_tally(
+            bearing.rollers, isinstance(bearing.impacts, Impacts), isinstance(bearing.samples, RaceSamples)
+        )
         self.sample_step = scene.turn_s / numerics.samples_per_turn
         self.control = self._control_by(first_method)
 

@@ -145,9 +145,10 @@ def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: 
     )
 
 
-def empty_tally(rollers: int, sampled: bool = True) -> Tally:
-    """A tally of nothing of so many rollers; without sums of race contacts unless these are ``sampled``."""
-    impacts, races = np.zeros((rollers, IMPACT_SUMS)), np.zeros((SAMPLED * sampled, SAMPLES_TOTAL + 1 + SAMPLE_BINS))
+def empty_tally(rollers: int, followed: bool = True, sampled: bool = True) -> Tally:
+    """A tally of nothing of so many rollers; without sums of impacts unless these are ``followed``, of race contacts unless ``sampled``."""
+    impacts = np.zeros((rollers * followed, IMPACT_SUMS))
+    races = np.zeros((SAMPLED * sampled, SAMPLES_TOTAL + 1 + SAMPLE_BINS))
     return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL), impacts, races)
 
 
