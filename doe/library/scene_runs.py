@@ -72,7 +72,7 @@ def run(
 ) -> "pd.DataFrame":
     """Simulate every row of a table of scenes, as ``doe run``; a frame with its figures, in the order of the table.
 
-    - ``table``: a frame, or a file of text, a workbook or parquet: columns "name", "scene" (a file next to the table),
+    - ``table``: a frame, or a file of text, a workbook or parquet: columns "name", "scene" (a file next to the table), "designation",
       "replicates", "seed", and keys of a scene such as "operation.inner_speed_rpm"; an empty cell leaves a key as it is
     - ``scene``: SCENE.toml of rows without one; ``overrides`` of its keys in all rows, such as ``["cage.mass_g=50"]``
     - ``out``: folder of the files and the store of runs; finished rows are found there. ``part``: "K/N" runs every N-th row

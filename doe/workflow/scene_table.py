@@ -27,8 +27,10 @@ from rbdyn.base.files import digest_of
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import finite
 from rbdyn.base.tables.sheet import InputTable, listed, read_sheet, sheet_of_frame
+from rbdyn.draft.text import tables_of
 from rbdyn.result import SimulationResult, arrays_of
-from rbdyn.scene import BallScene, Scene
+from rbdyn.scene import Scene
+from rbdyn.scene.ball import BALL_KINDS
 from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.thermal import first_guess_faults
 
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-NAME, SCENE = "name", "scene"
+NAME, SCENE, DESIGNATION = "name", "scene", "designation"
 # Columns that stand for a key of the scene.
 SHORT = {"replicates": "numerics.replicates", "seed": "numerics.seed"}
 # Scene files that are kept at a time.
@@ -45,11 +47,15 @@ FILES_KEPT = 64
 
 @dataclass(frozen=True)
 class SceneRow:
-    """A row of a table: its ``number`` from 1, its ``name``, its scene ``file``, ``values`` by scene key, and faults of its cells."""
+    """A row of a table: its ``number`` from 1, its ``name``, ``values`` by scene key, and faults of its cells.
+
+    ``file``: its scene, or ``designation``: the bearing of the catalogue that it begins with; the base of the table without both.
+    """
 
     number: int
     name: str
     file: Path | None
+    designation: str
     values: Mapping[str, Any]
     faults: Sequence[str] = ()
 
@@ -73,25 +79,32 @@ class SceneTable:
             else f"row {row.number} ({one_line(row.name, LONGEST_NAME)})"
         )
         refuse(row.faults)
-        file = row.file or self.base
+        if row.file is not None and row.designation:
+            raise InputError(
+                [f"{source}: has a {SCENE} and a {DESIGNATION}, which both state the bearing; keep one of them"]
+            )
+        file = row.designation or row.file or self.base
         if file is None:
-            raise InputError([f"{source}: has no scene; name one in its column {SCENE}, or for all rows by --scene"])
+            fix = f"name one in its column {SCENE}, a bearing in {DESIGNATION}, or a scene for all rows by --scene"
+            raise InputError([f"{source}: has no scene; {fix}"])
         tables = deepcopy(_tables(file))
+        bearing = tables.get("bearing")
+        if isinstance(bearing, dict) and bearing.get("kind") in BALL_KINDS:
+            raise InputError([f"{source}: {file}: is a ball bearing; rbdyn ball computes it, doe run takes rollers"])
         for assignment in self.overrides:
             set_key(tables, assignment)
         for key, value in row.values.items():
             put_key(tables, key, value, source)
         scene = Scene.from_dict(tables, f"{source}: {file}")
-        if isinstance(scene, BallScene):
-            raise InputError([f"{source}: {file}: is a ball bearing; rbdyn ball computes it, doe run takes rollers"])
         stated = {*row.values, *(".".join(key_path(text)) for text in self.overrides)}
         refuse(f"{source}: {fault}" for fault in first_guess_faults(scene.thermal, scene.lubricant, stated))
         return scene
 
 
 @lru_cache(FILES_KEPT)
-def _tables(file: Path) -> dict[str, Any]:
-    return read_toml(file)
+def _tables(file: Path | str) -> dict[str, Any]:
+    """Tables of a scene file, or of a designation."""
+    return read_toml(file) if isinstance(file, Path) else tables_of(file)
 
 
 def read_scene_table(table: "Path | pd.DataFrame", base: Path | None, overrides: Sequence[str] = ()) -> SceneTable:
@@ -113,7 +126,7 @@ def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
     names = [name for name in sheet.header if name]
     keys = {name: SHORT.get(name, name) for name in names if name in SHORT or "." in name}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(key for key in keys if key not in SHORT)]
-    faults += [f"{sheet.path}: {_unknown(name)}" for name in names if name not in (NAME, SCENE, *keys)]
+    faults += [f"{sheet.path}: {_unknown(name)}" for name in names if name not in (NAME, SCENE, DESIGNATION, *keys)]
     for name, key in SHORT.items():
         if name in keys and key in keys:
             faults.append(f"{sheet.path}: columns {name} and {key}: both state one value; keep one of them")
@@ -123,8 +136,10 @@ def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
         for name, key in keys.items()
         if key in stated
     ]
-    if not faults and not {SCENE, *keys} & set(names):
-        faults.append(f"{sheet.path}: states neither {SCENE} nor a key of a scene; it has {listed(names)}")
+    if not faults and not {SCENE, DESIGNATION, *keys} & set(names):
+        faults.append(
+            f"{sheet.path}: states neither {SCENE}, {DESIGNATION} nor a key of a scene; it has {listed(names)}"
+        )
     refuse([*faults, *(sheet.notes if faults else ())])
     return keys
 
@@ -132,7 +147,7 @@ def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
 def _unknown(name: str) -> str:
     """The fault of a column that is no key, with the nearest one."""
     known = {key.rpartition(".")[2]: key for key in reversed(dotted_keys())}
-    known |= {own: own for own in (NAME, SCENE, *SHORT)}
+    known |= {own: own for own in (NAME, SCENE, DESIGNATION, *SHORT)}
     near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1)
     fix = f"did you mean {known[near[0]]}?" if near else "rename or remove it"
     return f"column {one_line(name, LONGEST_NAME)}: unknown key; {fix}"
@@ -146,7 +161,7 @@ def dotted_keys() -> list[str]:
 
 
 def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:
-    columns = {name: sheet.column(name) for name in (NAME, SCENE) if name in sheet}
+    columns = {name: sheet.column(name) for name in (NAME, SCENE, DESIGNATION) if name in sheet}
     values, faults = dict[str, list[Any]](), dict[str, Iterator[str]]()
     for name, key in keys.items():
         # An empty cell is one of the choices, so it has a value.
@@ -156,10 +171,9 @@ def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:
         texts = {name: column.texts[row] for name, column in columns.items()}
         own = {key: column[row] for key, column in values.items() if column[row] != ""}
         bad = [next(faults[key]) for key, value in own.items() if value is None]
-        file = texts.get(SCENE) or None
-        yield SceneRow(
-            row + 1, texts.get(NAME) or str(row + 1), None if file is None else sheet.path.parent / file, own, bad
-        )
+        name, designation = texts.get(NAME) or str(row + 1), texts.get(DESIGNATION, "")
+        file = sheet.path.parent / texts[SCENE] if texts.get(SCENE) else None
+        yield SceneRow(row + 1, name, file, designation, own, bad)
 
 
 # Rows whose results are in memory at a time.
@@ -201,7 +215,8 @@ class RowRun:
     def cells(self) -> dict[str, Any]:
         """The row of a file: its keys, then each figure with the half-width of its 95 % interval."""
         cells: dict[str, Any] = {"name": self.row.name, STATUS: self.status, "fault": self.cause or None}
-        cells |= {} if self.row.file is None else {"scene": str(self.row.file)}
+        cells |= {} if self.row.file is None else {SCENE: str(self.row.file)}
+        cells |= {DESIGNATION: self.row.designation} if self.row.designation else {}
         cells |= self.row.values
         if self.figures is not None:
             errors = np.hypot(np.nan_to_num(self.figures.numbers[1]), np.nan_to_num(self.figures.numbers[2]))
@@ -232,7 +247,7 @@ def table_digest(table: SceneTable) -> str:
     """Digest of a table: its rows, the files of their scenes and the overrides."""
     files = sorted({file for row in table.rows if (file := row.file or table.base) is not None})
     content = [file.read_bytes() if file.is_file() else b"" for file in files]
-    rows = [(row.name, str(row.file), dict(row.values), list(row.faults)) for row in table.rows]
+    rows = [(row.name, str(row.file), row.designation, dict(row.values), list(row.faults)) for row in table.rows]
     return digest_of(b"".join((json.dumps([rows, list(table.overrides)], default=str).encode(), *content)))
 
 

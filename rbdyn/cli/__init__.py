@@ -4,8 +4,7 @@
 - ``compare``: two bearings; ``stiffness``: over speed, for programs of rotors
 - ``ball``: the command of ball bearings; ``ball_studies``: its equilibria, studies and sweeps
 - ``manual``: keys of a scene, and the manual as one page: keys, commands, equations and the prose between them
-- ``new``: the command; ``new_options``: the table of its options; ``new_drawing``: a bearing of one's own
-- ``new_scene``: a scene of a catalogue bearing or of one's own, from a template
+- ``new``: a scene of a catalogue bearing or of one's own
 
 ``rbdyn.base`` has what the commands of both packages share.
 """

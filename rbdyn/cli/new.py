@@ -1,29 +1,18 @@
 """The command ``rbdyn new``: a scene of a catalogue bearing or of one's own from its options."""
 
-import tomllib
-from collections.abc import Callable
 from dataclasses import Field
 from inspect import Parameter, Signature, signature
-from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 
-from rbdyn.base.command import ForceFile, Json, OutFile, fill_template, guarded, hand_out, valued
-from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
-from rbdyn.cli.new_drawing import OF_DRAWINGS, OWN, own_subject
-from rbdyn.cli.new_options import TABLE, Options, dashed
-from rbdyn.cli.new_scene import Subject, ball_values, catalogue_subject, mounting_values, roller_values
-from rbdyn.properties.catalogue import ANGULAR, ROLLERS, Designation, Envelope, envelope, read_designation
-from rbdyn.properties.rexs import SIZES as REXS_SIZES
-from rbdyn.properties.rexs import RexsBearing, is_rexs, read_rexs
-from rbdyn.properties.tolerances import housing_interference, shaft_interference
-from rbdyn.scene import Scene
-from rbdyn.scene.notes import heat_notes
+from rbdyn.base.command import ForceFile, Json, OutFile, guarded, hand_out, valued
+from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.draft.options import TABLE, Options, dashed
+from rbdyn.draft.text import rexs_text, scene_text
+from rbdyn.properties.rexs import is_rexs, read_rexs
 
-Value = TypeVar("Value")
-SIZES = ("--bore", "--outside", "--width")
 Designations = Annotated[
     list[str],
     typer.Argument(
@@ -67,118 +56,3 @@ def _parameter(entry: Field[Any]) -> Parameter:
 
 named, *output, _ = signature(new).parameters.values()
 new.__signature__ = Signature([named, *map(_parameter, TABLE.values()), *output])  # type: ignore[attr-defined]
-
-
-def rexs_text(found: RexsBearing, typed: dict[str, str | None]) -> str:
-    """The scene of a bearing in a REXS file, headed by what was taken; options that are typed replace those of the file.
-
-    Sizes of a listed designation are those of its catalogue. Raises InputError with all faults at once.
-    """
-    presets = {dashed(entry.name): entry.metadata.get("preset") for entry in TABLE.values()}
-    stated = {name: text for name, text in typed.items() if text != presets[name]}
-    without = {name: text for name, text in found.options.items() if name not in SIZES or found.words == OWN}
-    sizes = {name for option, names in REXS_SIZES.items() if option not in without for name in names}
-    for words, options in product((found.words, found.basic), (without, found.options)):
-        try:
-            text = scene_text(words, Options(presets | dict(options) | stated))
-            break
-        except InputError as error:
-            refused = error
-    else:
-        raise refused
-    taken = [name for name in dict.fromkeys(found.taken) if options is found.options or name not in sizes]
-    unread = f"# Not read: {', '.join(found.unread)}.\n" if found.unread else ""
-    return f"# From {found.title}. Taken: {', '.join(taken)}.\n{unread}{text}"
-
-
-def scene_text(words: str, options: Options) -> str:
-    """The commented scene that designation and options ask for, checked. Raises InputError with all faults at once."""
-    first, _, rest = words.strip().partition(" ")
-    own = first.lower() == OWN
-    subject = own_subject(rest.strip(), options) if own else _catalogue_bearing(words, options)
-    rollers = subject.kind == ROLLERS
-    cause = f"--clearance {subject.clearance}" if own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
-    values = _or_fault(cause, lambda: (roller_values if rollers else ball_values)(subject, options))
-    template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
-    text = fill_template(template.read_text(encoding="utf-8"), values | _mounting(subject, options))
-    # What is wrong with an estimate comes from the sizes that were given.
-    sizes = " ".join(options.typed(*SIZES))
-    source = f"{sizes}: estimated inside" if sizes and not own else OWN if own else f"DESIGNATION {subject.name}"
-    try:
-        scene = Scene.from_dict(tomllib.loads(text), source)
-        notes = [*getattr(scene, "unit_notes", ())]
-        if scene.thermal and scene.lubricant and scene.mounting and scene.mounting.width:
-            notes += heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width)
-        refuse(f"{source}: {note}" for note in notes)
-    except InputError as error:
-        raise InputError(map(options.of_scene, error.faults)) from None
-    return text
-
-
-def _or_fault(name: str, attempt: Callable[[], Value]) -> Value:
-    """What an attempt gives. Raises InputError, with the name in front, where it raises MethodError."""
-    try:
-        return attempt()
-    except MethodError as error:
-        raise InputError([f"{name}: {error}"]) from None
-
-
-def _mounting(subject: Subject, options: Options) -> dict[str, Any]:
-    """Values of [mounting], none of them without a class or a heat balance. Raises InputError for a class or a size that is not listed."""
-    sizes, rings = subject.sizes, subject.rings
-    options.read("--shaft", lambda zone: shaft_interference(sizes.bore, zone, rings.ring_class))
-    options.read("--housing", lambda zone: housing_interference(sizes.outside, zone, rings.ring_class))
-    refuse(options.faults)
-    if not options.mounted:
-        return {"loose": sizes}
-    where = f"{' '.join(options.mounted)}: a usual seat of the rings, of {sizes.bore:g} x {sizes.outside:g} mm"
-    return _or_fault(where, lambda: mounting_values(sizes, rings, options))
-
-
-def _catalogue_bearing(words: str, options: Options) -> Subject:
-    """The bearing of a designation. Raises InputError with all faults at once."""
-    name = one_line(words, LONGEST_NAME)
-    for stated in options.typed(*OF_DRAWINGS):
-        options.note(f"{stated}: is of a bearing of one's own; leave it out, or write {OWN} instead of {name}")
-    try:
-        named = read_designation(words)
-    except MethodError as error:
-        raise InputError([*options.faults, f"DESIGNATION {name}: {error}"]) from None
-    options.check_kind(named.kind == ROLLERS)
-    _note_contradictions(named, options)
-    refuse(options.faults)
-    return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, _envelope(named, options), options))
-
-
-def _note_contradictions(named: Designation, options: Options) -> None:
-    """Note options that contradict a designation, and a clearance of a bearing that has a contact angle instead."""
-    clearance, of_suffix, cage = options.clearance, named.value_of("clearance"), named.value_of("cage")
-    if named.value_of("bore") is not None:
-        if not isinstance(clearance, float):
-            tapered = "a tapered bore is driven up its seat; add --clearance in mm, as it is then"
-            options.note(f"DESIGNATION {named.name}: {tapered}")
-        if options["--shaft"] is not None:
-            options.fault("--shaft", "a tapered bore has no such seat; leave it out")
-    angular = "an angular contact bearing has a contact angle instead; leave it out"
-    if named.kind == ANGULAR and clearance is not None:
-        options.fault("--clearance", angular)
-    elif clearance is not None and of_suffix not in (None, clearance):
-        options.fault("--clearance", f"contradicts {of_suffix} of {named.name}; leave one out")
-    if named.kind == ANGULAR and of_suffix is not None:
-        options.note(f"DESIGNATION {named.name}: suffix {of_suffix}: {angular}")
-    if cage is not None:
-        for stated in options.typed("--guidance", "--cage-material"):
-            options.note(f"{stated}: contradicts the cage {cage} of {named.name}; leave one out")
-
-
-def _envelope(named: Designation, options: Options) -> Envelope:
-    """Boundary dimensions as typed or as the catalogue lists them. Raises MethodError, InputError."""
-    bore, outside, width = options.bore, options.outside, options.width
-    if not options.typed(*SIZES):
-        return envelope(named)
-    if bore is None or outside is None or width is None:
-        missing = ", ".join(name for name in SIZES if options[name] is None)
-        raise InputError([f"{missing}: missing; give all of {', '.join(SIZES)} in mm, or none for a listed bearing"])
-    if bore >= outside:
-        raise InputError([f"--bore {bore:g}: not below --outside {outside:g}; fix them"])
-    return Envelope(bore, outside, width)

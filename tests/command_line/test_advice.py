@@ -18,7 +18,7 @@ from doe.library.studies import _points_faults
 from doe.workflow.problem import Problem
 from rbdyn.base.command import plain_number
 from rbdyn.base.faults import InputError, MethodError, read_toml
-from rbdyn.cli.new_options import clearance_of, roller_size
+from rbdyn.draft.options import clearance_of, roller_size
 from rbdyn.dynamics.ensemble import threads_of
 from rbdyn.scene import Scene
 

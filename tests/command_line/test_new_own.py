@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.base.faults import InputError, MethodError
-from rbdyn.cli.new import scene_text
-from rbdyn.cli.new_options import Options, clearance_of, conformity_of, roller_size
+from rbdyn.draft.options import Options, clearance_of, conformity_of, roller_size
+from rbdyn.draft.text import scene_text
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import Envelope, envelope, read_designation, roller_interior
 from rbdyn.properties.drawing import BallDrawing, RollerDrawing, ball_boundary, roller_boundary

@@ -99,7 +99,7 @@ SLIPS = {
     "seeds\n1\n": "column seeds: unknown key; did you mean seed?",
     "seed,numerics.seed\n1,2\n": "columns seed and numerics.seed: both state one value; keep one of them",
     "cage.mass_g\n30\n": "column cage.mass_g: --set cage.mass_g states it too; leave out one of them",
-    "name\na\n": "states neither scene nor a key of a scene; it has name",
+    "name\na\n": "states neither scene, designation nor a key of a scene; it has name",
 }
 
 
@@ -119,7 +119,7 @@ def test_a_row_without_a_scene_and_a_ball_bearing_fail(folder, monkeypatch):
     shutil.copy(EXAMPLES / "angular_contact_ball.toml", "balls.toml")
     record = json.loads(doe("run", table("a,,,11,0.2\nb,balls.toml,,,\n"), "--out", "out", "--json").stdout)
     assert [failure["cause"] for failure in record["failures"]] == [
-        "row 1 (a): has no scene; name one in its column scene, or for all rows by --scene",
+        "row 1 (a): has no scene; name one in its column scene, a bearing in designation, or a scene for all rows by --scene",
         "row 2 (b): balls.toml: is a ball bearing; rbdyn ball computes it, doe run takes rollers",
     ]
 
@@ -195,3 +195,16 @@ def test_every_table_may_be_parquet(folder, monkeypatch):
         fails(error)
         refused = doe("run", "rows.parquet", "--scene", "base.toml", "--out", "third")
         assert refused.returncode == 2 and words in refused.stderr and len(refused.stderr.splitlines()) == 1
+
+
+def test_a_row_may_begin_with_a_designation(folder, monkeypatch):
+    """Command line: a bearing of the catalogue as ``rbdyn new`` writes it, with the keys of the row; two sources fail."""
+    instantly(monkeypatch.setattr)
+    header = "name,scene,designation,seed,operation.inner_speed_rpm\n"
+    rows = table("a,,NU 210,11,3000\nb,,NU999,12,\nc,base.toml,NU210,13,\nd,,6208,14,\n", header)
+    record = json.loads(doe("run", rows, "--out", "out", "--json").stdout)
+    assert [row["status"] for row in record["rows"]] == ["done", "failed", "failed", "failed"]
+    unlisted, both, balls = (failure["cause"] for failure in record["failures"])
+    assert "DESIGNATION NU999" in unlisted and "rbdyn ball computes it" in balls
+    assert both == "row 3 (c): has a scene and a designation, which both state the bearing; keep one of them"
+    assert pd.read_csv("out/runs.csv")["designation"].tolist() == ["NU 210", "NU999", "NU210", "6208"]

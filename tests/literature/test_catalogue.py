@@ -8,8 +8,8 @@ import math
 import pytest
 from conftest import ROOT
 
-from rbdyn.cli.new_options import Options
-from rbdyn.cli.new_scene import ball_values, catalogue_subject, roller_values
+from rbdyn.draft.options import Options
+from rbdyn.draft.values import ball_values, catalogue_subject, roller_values
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties import table
 from rbdyn.properties.catalogue import (
@@ -86,7 +86,7 @@ def data_of(template, values):
 
     from rbdyn.base.command import fill_template
 
-    return tomllib.loads(fill_template((ROOT / "rbdyn" / "cli" / template).read_text(encoding="utf-8"), values))
+    return tomllib.loads(fill_template((ROOT / "rbdyn" / "draft" / template).read_text(encoding="utf-8"), values))
 
 
 def test_literature_rollers_without_a_listed_raceway():

@@ -4,8 +4,8 @@ import tomllib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.new import scene_text
-from rbdyn.cli.new_options import OIL, TEMPERATURE_C, Options
+from rbdyn.draft.options import OIL, TEMPERATURE_C, Options
+from rbdyn.draft.text import scene_text
 from rbdyn.plots.sketches import Sketch, ball_axes, clearances, roller_axes
 
 if TYPE_CHECKING:

@@ -3,8 +3,8 @@
 import math
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
-from rbdyn.cli.new_options import Options
-from rbdyn.cli.new_scene import Subject, drawing_subject
+from rbdyn.draft.options import Options
+from rbdyn.draft.values import Subject, drawing_subject
 from rbdyn.properties.catalogue import NO_SERIES, cage_estimate
 from rbdyn.properties.drawing import BallDrawing, RollerDrawing, ball_boundary, roller_boundary
 

@@ -5,7 +5,7 @@ import math
 from collections import defaultdict
 from typing import Any, NamedTuple
 
-from rbdyn.cli.new_options import POLYAMIDE_NAME, Options
+from rbdyn.draft.options import POLYAMIDE_NAME, Options
 from rbdyn.life import rollers
 from rbdyn.properties import catalogue
 from rbdyn.properties.drawing import (
