@@ -5,7 +5,7 @@
     python examples/rig_signals.py impact_force trace.csv --threshold 10 --bandwidth 5000
     python examples/rig_signals.py simulated SCENE.toml --threshold 10 --bandwidth 5000
 
-Each prints columns of RIG.csv for ``doe calibrate``, or the pulses of a simulated motion. Errors are by batch means.
+A signal is a table of text, a workbook or parquet, and MDF4 or TDMS where asammdf or nptdms is installed. Each prints columns of RIG.csv for ``doe calibrate``, or the pulses of a simulated motion. Errors are by batch means.
 
 A mean over time needs no filter. Pulses of a wheel are counted by whole cage turns, so that uneven spacing of their marks
 cancels. Whirl needs a velocity: an orbit is filtered as ``numerics.whirl_cutoff_hz`` filters the simulated one, so give the
@@ -29,15 +29,15 @@ same Gaussian, whose bandwidth lies below that of the sensor.
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 import typer
 from scipy.ndimage import gaussian_filter1d
 
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError, refuse
-from rbdyn.base.tables.sheet import Limits, read_sheet
+from rbdyn.base.faults import InputError, read_bytes, refuse
+from rbdyn.base.tables.sheet import InputTable, Limits, read_sheet, sheet_of_frame
 from rbdyn.base.words import counted
 from rbdyn.dynamics.figures import WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.motion import history
@@ -45,6 +45,9 @@ from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.metrics import NOTCH_PERIODS, filtered_speed, sums_until
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import SAMPLES_A_PERIOD
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Columns of each kind of signal; some may have one of two units.
 KINDS = {
@@ -55,6 +58,9 @@ KINDS = {
     "impact_acceleration": ("t_s", "acceleration_m_s2"),
     "impact_pulses": ("t_s", "height_N or height_kN"),
 }
+TIME = "t_s"
+# Packages that read the files of measuring systems, by the end of a name.
+MEASURED = {".mf4": "asammdf", ".mdf": "asammdf", ".tdms": "nptdms"}
 # Kinds of signals with impact pulses: traces, which are sampled evenly, and lists, whose pulses a logger took.
 TRACES, LISTS = ("impact_force", "impact_acceleration"), ("impact_pulses",)
 # Units that are not those of SI, by the end of a name.
@@ -339,9 +345,48 @@ def _pulses_of_trace(
     return pulses, (0.0, len(force) / rate), notes
 
 
+def _signals(path: Path) -> InputTable:
+    """The table of a file: text, a workbook or parquet, MDF by asammdf and TDMS by nptdms where these are installed.
+
+    The time of both is the column "t_s"; other columns have the names of their channels. Raises InputError.
+    """
+    kind = path.suffix.lower()
+    if kind not in MEASURED:
+        return read_sheet(path)
+    package = MEASURED[kind]
+    read_bytes(path)
+    try:
+        frame = _mdf(path) if package == "asammdf" else _tdms(path)
+    except ImportError:
+        raise InputError([f"{path}: is read by {package}; pip install {package}, or export it as CSV"]) from None
+    except Exception:
+        raise InputError([f"{path}: cannot be read by {package}; check the file, or export it as CSV"]) from None
+    return sheet_of_frame(frame, path)
+
+
+def _mdf(path: Path) -> "pd.DataFrame":
+    """All channels of an MDF file, interpolated at the times of every one."""
+    from asammdf import MDF
+
+    with MDF(path) as file:
+        frame = file.to_dataframe()
+    frame.insert(0, TIME, frame.index.to_numpy())
+    return frame
+
+
+def _tdms(path: Path) -> "pd.DataFrame":
+    """Channels of the first group of a TDMS file, whose waveforms have a time."""
+    from nptdms import TdmsFile
+
+    group = TdmsFile.read(path).groups()[0]
+    frame = group.as_dataframe(time_index=True)
+    frame.insert(0, TIME, frame.index.to_numpy())
+    return frame
+
+
 def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
     """Numbers in SI of the columns, each of which may have one of several units. Raises InputError."""
-    sheet, numbers, faults = read_sheet(path), list[Array](), list[str]()
+    sheet, numbers, faults = _signals(path), list[Array](), list[str]()
     for name in names:
         units = [unit for unit in name.split(" or ") if unit in sheet]
         if len(units) == 1:

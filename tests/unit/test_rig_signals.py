@@ -208,3 +208,45 @@ def test_a_speed_signal_remembers_and_its_error_knows(tmp_path: Path) -> None:
     # Variance of the mean of an autoregression: s^2/((1 - r)^2 n).
     assert sd == pytest.approx(5.0 / 0.02 / np.sqrt(20_000.0), rel=0.25)
     assert value == pytest.approx(9400.0, abs=3.0 * sd)
+
+
+def test_unit_files_of_measuring_systems_are_read_where_a_package_reads_them(tmp_path, monkeypatch):
+    """Unit: channels of MDF and TDMS are columns with the time as "t_s"; a missing package and a broken file are a sentence each."""
+    import sys
+    from types import SimpleNamespace
+
+    import pandas as pd
+    from rig_signals import cage_speed
+
+    time = np.arange(400) / 1000.0
+    frame = pd.DataFrame({"cage_speed_rpm": 3000.0 + np.sin(40.0 * time)}, index=time)
+    table, mdf, tdms = (tmp_path / name for name in ("s.csv", "s.mf4", "s.tdms"))
+    frame.rename_axis("t_s").to_csv(table)
+    for path in (mdf, tdms):
+        path.write_bytes(b"0")
+
+    class File:
+        def __init__(self, path):
+            assert path == mdf
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *ended):
+            return None
+
+        def to_dataframe(self):
+            return frame.copy()
+
+    group = SimpleNamespace(as_dataframe=lambda time_index: frame.copy())
+    reader = SimpleNamespace(read=lambda path: SimpleNamespace(groups=lambda: [group]))
+    monkeypatch.setitem(sys.modules, "asammdf", SimpleNamespace(MDF=File))
+    monkeypatch.setitem(sys.modules, "nptdms", SimpleNamespace(TdmsFile=reader))
+    means = [cage_speed(path, "cage_speed", 1) for path in (table, mdf, tdms)]
+    assert means[1] == means[2] and means[1].value == pytest.approx(means[0].value, rel=1e-12)
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(InputError, match="pip install nptdms"):
+        cage_speed(tdms, "cage_speed", 1)
+    monkeypatch.setitem(sys.modules, "asammdf", SimpleNamespace(MDF=lambda path: 1 / 0))
+    with pytest.raises(InputError, match="cannot be read by asammdf"):
+        cage_speed(mdf, "cage_speed", 1)
