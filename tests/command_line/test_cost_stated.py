@@ -24,7 +24,7 @@ from doe.workflow.status import inputs_digest, study_stages, study_status
 from rbdyn.base.blocks import Detail
 from rbdyn.base.command import notice
 from rbdyn.base.terminal import show
-from rbdyn.dynamics import ensemble, run
+from rbdyn.dynamics import ensemble
 from rbdyn.dynamics import simulate as module
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -53,7 +53,7 @@ def left(said: str) -> list[tuple[int, int]]:
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the time of the shortest runs be stated."""
     monkeypatch.setattr(runner, "NOTABLE_S", 0.0)
-    monkeypatch.setattr(run, "NOTABLE_S", 0.0)
+    monkeypatch.setattr(ensemble, "NOTABLE_S", 0.0)
     monkeypatch.setattr(ensemble, "LOOK_S", 0.0)
 
 

@@ -10,7 +10,7 @@ import pytest
 import rbdyn
 from rbdyn.base.command import progress_bar
 from rbdyn.base.words import duration, estimate
-from rbdyn.dynamics import ensemble, run
+from rbdyn.dynamics import ensemble
 from rbdyn.dynamics.ensemble import Pace, in_turn, keys_of, plan_of
 from rbdyn.dynamics.simulate import simulate
 
@@ -96,7 +96,7 @@ def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog
     plain = simulate(scene, notice=stated.append)
     assert stated == []
     monkeypatch.setattr(ensemble, "LOOK_S", 0.0)
-    monkeypatch.setattr(run, "NOTABLE_S", 0.0)
+    monkeypatch.setattr(ensemble, "NOTABLE_S", 0.0)
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)
     assert [each.getMessage().startswith("the rest takes about ") for each in caplog.records] == [True]

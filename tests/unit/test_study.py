@@ -192,7 +192,7 @@ def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_pat
     ("replace", "words"),
     [
         (('key = "cage.guide_clearance_mm"', 'key = "cage.guide_clearence_mm"'), ("factor.key", "no such key")),
-        (('name = "power_loss_W"', 'name = "power_W"'), ("response.name", "choose one of")),
+        (('name = "power_loss_W"', 'name = "power_W"'), ("response.name", "did you mean power_loss_W")),
         (('factor = "pocket_clearance_mm"', 'factor = "pocket"'), ("chain.factor", "no such factor")),
         (("half_width_mm = 0.005", "half_width_mm = -0.005"), ("half_width_mm", "greater than 0")),
         (("coefficient = -1.0", "coefficient = 0.0"), ("coefficient", "must not be zero")),
