@@ -60,7 +60,8 @@ def instructions(bearing: "RollerBearing", pair: Any) -> int:
 
     kind, of_pair = numba.typeof(bearing), numba.typeof(pair)
     for signature, compiled in advance.overloads.items():
-        if signature[0] == kind and signature[2].types[-1] == of_pair:
+        carry = signature[2]
+        if signature[0] == kind and carry.types[carry.fields.index("method")] == of_pair:
             module = compiled.library._get_module_for_linking()
             return sum(1 for body in module.functions for block in body.blocks for _ in block.instructions)
     raise KeyError(kind)
