@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, read_bytes
 from rbdyn.base.tables.sheet import is_number
+from rbdyn.properties.oils import GRADES
 
 SUFFIX = ".rexs"
 MOST_BYTES = 100_000_000
@@ -54,8 +55,7 @@ PARTS = ("part", "inner_part")
 NAMES = ("catalogue_designation", "name")
 COUNT, CIRCLE = "number_of_rolling_elements", "reference_diameter_rolling_bearing"
 VISCOSITY = "viscosity_at_40_degree_celsius"
-# Viscosities at 40 C [mm2/s] of the classes of ISO 3448, and their width.
-GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460, 680)
+# Width of the viscosity classes of ISO 3448.
 CLASS_WIDTH = 0.1
 FORCES = ("force_acting_on_inner_component_v", "force_acting_on_inner_component_w")
 # Attributes of a bearing that say where and how it stands, not what it is.

@@ -110,3 +110,10 @@ def test_a_written_file_is_read_again(tmp_path):
         assert read["bearing"][key] == approx(getattr(before.bearing, key), rel=1e-9), key
     assert read["operation"]["inner_speed_rpm"] == 24000.0 and read["operation"]["radial_load_N"] == 1300.0
     assert read["lubricant"]["temperature_C"] == before.lubricant.temperature_C
+
+
+def test_an_oil_of_no_known_grade_is_not_taken(tmp_path):
+    """Unit: a class of ISO 3448 that no oil here has leaves the default, so that the bearing can be read all the same."""
+    thick = written(tmp_path, CATALOGUE.replace("OTHER", "").replace(">97<", ">680<"))
+    assert "--oil" not in read_rexs(thick).options
+    assert in_process("rbdyn", "new", str(thick)).returncode == 0
