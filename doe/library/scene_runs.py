@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from doe.workflow.scene_table import RowRun
 
 RUN_FILES = ("runs.csv", "runs.json")
-# Typical wall time [s] of what is no run, and what makes the runs shorter.
-STEPS_S, SHORTER = 1.0, ("numerics.turns", "numerics.replicates")
+# Typical wall time [s] of what is no run.
+STEPS_S = 1.0
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -101,6 +101,7 @@ def run_answer(
     force: bool = False,
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
+    from doe.library.studies import SHORTER
     from doe.workflow.scene_table import read_scene_table, rows_stage, run_rows, table_digest
     from doe.workflow.whole import gather, part_folder, refuse_other_parts, rows_of
     from rbdyn.base.identity import identity_of
@@ -149,7 +150,7 @@ def run_answer(
 
             written = write_with_report(output, identity, answer.blocks, write)
             agenda.finish(written)
-    return RunsAnswer(record, folder, tuple(written), identity=identity, runs=runs, part=words)
+    return replace(answer, files=tuple(written))
 
 
 def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[str, Any]:

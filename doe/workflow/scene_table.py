@@ -62,11 +62,10 @@ class SceneRow:
 
 @dataclass(frozen=True)
 class SceneTable:
-    """A table of scenes with the ``base`` file of rows without one, ``overrides`` of all rows, and their scene ``keys``."""
+    """A table of scenes with the ``base`` file of rows without one, and ``overrides`` of all rows."""
 
     path: Path
     rows: Sequence[SceneRow]
-    keys: Sequence[str]
     base: Path | None = None
     overrides: Sequence[str] = ()
     notes: Notes = ()
@@ -116,8 +115,8 @@ def read_scene_table(table: "Path | pd.DataFrame", base: Path | None, overrides:
     sheet = read_sheet(table) if isinstance(table, Path) else sheet_of_frame(table, Path("table"))
     if base is not None:
         read_toml(base)
-    keys = _keys(sheet, overrides)
-    return SceneTable(sheet.path, list(_rows(sheet, keys)), list(keys.values()), base, overrides, sheet.notes)
+    rows = list(_rows(sheet, _keys(sheet, overrides)))
+    return SceneTable(sheet.path, rows, base, overrides, sheet.notes)
 
 
 def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:

@@ -538,7 +538,6 @@ def run_part(
     study: Problem, folder: Path, effort: Effort, part: Part, agenda: AgendaKeeper
 ) -> list[SimulationResult | DutyResult | Failure]:
     """Simulate the design runs of a part of a study, with their store in ``folder``. Raises as ``run_study``."""
-
     study, _ = region_that_runs(study, folder, effort)
     check_study(study)
     ordered, rows = study.plan, rows_of(part)
