@@ -42,6 +42,9 @@ class RunsAnswer(Answer):
         where = "the table runs" if self.folder is None else "runs.csv"
         return [f"{failed} of {counted(len(self.runs), 'row')} failed; {where} says which and why"] if failed else []
 
+    def as_dict(self) -> dict[str, Any]:
+        return {**super().as_dict(), "rows": [run.as_dict() for run in self.runs]}
+
     def blocks(self) -> list[Block]:
         from doe.report.sections.scene_runs import scene_run_blocks
 
@@ -102,8 +105,8 @@ def run_answer(
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
     from doe.library.studies import SHORTER
-    from doe.workflow.scene_table import read_scene_table, rows_stage, run_rows, table_digest
-    from doe.workflow.whole import gather, part_folder, refuse_other_parts, rows_of
+    from doe.running.queue import gather, part_folder, refuse_other_parts, rows_of
+    from doe.workflow.scene_table import RowRun, read_scene_table, rows_stage, run_rows, table_digest
     from rbdyn.base.identity import identity_of
     from rbdyn.base.page import REPORT_FILES, write_with_report
 
@@ -142,10 +145,10 @@ def run_answer(
             answer = RunsAnswer(record, folder, (), identity=identity, runs=runs, part=words)
 
             def write(stage: Path) -> list[str]:
-                from rbdyn.base.records import save_table
+                from rbdyn.base.records import save_rows
 
-                save_table([run.cells for run in runs], stage / "runs.csv")
-                write_json(stage / "runs.json", answer.as_dict())
+                save_rows(lambda: (run.cells for run in runs), stage / "runs.csv")
+                write_json(stage / "runs.json", {**record, "rows": runs}, RowRun.as_dict)
                 return ["runs.csv", "runs.json"]
 
             written = write_with_report(output, identity, answer.blocks, write)
@@ -158,7 +161,7 @@ def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[
     failures = [run for run in runs if run.figures is None]
     return {
         "status": "failed" if failures else "ok",
-        "rows": [run.as_dict() for run in runs],
+        "rows": [],
         "failures": [{"row": run.row.number, "name": run.row.name, "cause": run.cause} for run in failures],
         "table": table or None,
         "notes": list(notes),

@@ -210,9 +210,9 @@ def study(
     A broken limit is in ``answer["status"]`` and ``answer["limits"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
     """
+    from doe.running.queue import gather, refuse_other_parts
     from doe.workflow.problem import Problem
     from doe.workflow.status import finished_record, inputs_digest
-    from doe.workflow.whole import gather, refuse_other_parts
 
     path = path_given(path, "path")
     folder = optional_path(out, "out") or Path(f"{path.stem}_results")
@@ -243,10 +243,11 @@ def study(
 
 def _part(path: Path, whole: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
     """The design runs of a part. Raises as ``study``."""
+    from doe.running.queue import part_folder, refuse_other_parts
     from doe.running.store import Failure
     from doe.workflow.problem import Problem
     from doe.workflow.status import inputs_digest
-    from doe.workflow.whole import part_folder, refuse_other_parts, run_part
+    from doe.workflow.whole import run_part
 
     folder = part_folder(whole, share)
     with output_folder(folder, "doe", (), force=force) as output, registered(path, folder):

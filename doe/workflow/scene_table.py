@@ -210,6 +210,12 @@ class RowRun:
         """The failure of the row under its name."""
         return Failure(self.row.name, self.cause, self.row.number)
 
+    def value(self, name: str) -> float | None:
+        """A figure of the run; None where it failed or has none of this name."""
+        if self.figures is None or name not in self.figures.names:
+            return None
+        return finite(float(self.figures.numbers[0, self.figures.names.index(name)]))
+
     @property
     def cells(self) -> dict[str, Any]:
         """The row of a file: its keys, then each figure with the half-width of its 95 % interval."""

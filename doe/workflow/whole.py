@@ -20,8 +20,9 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
 from doe.duty import Duty, DutyResult, scene_at
 from doe.pareto import ParetoFront
-from doe.running.runner import ANSWER, AgendaKeeper, Stage, agendas_of
-from doe.running.store import STORE, Failure, Store
+from doe.running.queue import Part, rows_of
+from doe.running.runner import ANSWER, AgendaKeeper, Stage
+from doe.running.store import Failure
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (
     EVERYWHERE,
@@ -494,44 +495,6 @@ class _Clock:
     def total(self) -> dict[str, float]:
         """Wall times [s] of all stages by name, and of the whole."""
         return {**self._laps, "total_s": time.perf_counter() - self._started}
-
-
-# Part k of n: every n-th run from the k-th.
-Part = tuple[int, int]
-
-
-def rows_of(part: Part | None) -> slice:
-    """Places of the runs of a part; those of all runs without one."""
-    return slice(None) if part is None else slice(part[0] - 1, None, part[1])
-
-
-def part_folder(folder: Path, part: Part | None) -> Path:
-    """Folder of the store of a part within that of its table."""
-    return folder if part is None else folder / f"part-{part[0]}-of-{part[1]}"
-
-
-def part_stores(folder: Path) -> list[Path]:
-    """Stores of all parts in the folder of a table or a study."""
-    return sorted(folder.glob(f"part-*-of-*/{STORE}"))
-
-
-def refuse_other_parts(folder: Path, question: str) -> None:
-    """Raises InputError where the folder has a part of another table or study than that of this digest."""
-    for path in part_stores(folder):
-        with Store(path, read_only=True) as store:
-            questions = {agenda.question for agenda, _ in agendas_of(store)}
-        if questions - {question}:
-            raise InputError(
-                [f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"]
-            )
-
-
-def gather(folder: Path) -> None:
-    """Take over the runs of all parts into the store of their folder. Raises as ``Store``."""
-    if stores := part_stores(folder):
-        with Store(folder / STORE) as store:
-            for path in stores:
-                store.adopt(path)
 
 
 def run_part(

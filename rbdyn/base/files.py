@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -55,10 +55,14 @@ def read_json(path: Path | str) -> Any:
         raise ValueError("nested too deep") from None
 
 
-def write_json(path: Path | str, data: dict[str, Any]) -> None:
-    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never a part of it."""
-    with whole_file(path) as new:
-        new.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+def write_json(path: Path | str, data: Mapping[str, Any], record: Callable[[Any], Any] | None = None) -> None:
+    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never a part of it.
+
+    The text is written as it is made, and ``record`` gives that of each object that JSON does not know, one at a time.
+    """
+    with whole_file(path) as new, new.open("w", encoding="utf-8") as file:
+        json.dump(data, file, indent=1, allow_nan=False, default=record)
+        file.write("\n")
 
 
 def place_of_file(path: Path | str) -> Path:
@@ -154,6 +158,12 @@ def intact(record: dict[str, Any]) -> bool:
     """Whether a record from JSON is unchanged since ``sign``."""
     rest = {key: value for key, value in record.items() if key != "sha256"}
     return record.get("sha256") == digest_of(json.dumps(rest))
+
+
+def digest_of_file(path: Path) -> str:
+    """SHA-256 of a file, which is not held as a whole. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def digest_of(content: str | bytes) -> str:

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rbdyn.base.faults import InputError, files_read, read_bytes, record_read, recorded_reads, refuse
-from rbdyn.base.files import digest_of, naming, read_json, write_json
+from rbdyn.base.files import digest_of, digest_of_file, naming, read_json, write_json
 from rbdyn.base.streams import Uninterrupted
 
 T = TypeVar("T")
@@ -195,7 +195,7 @@ class OutputFolder:
         refuse(self._conflicts(path, present, self._mark))
         made = self._mark["files"]
         self._mark["replaced"] = {entry.name: _digest(Path(entry.path)) for entry in present if entry.is_file()}
-        made |= {name: digest_of((stage / name).read_bytes()) for name in names}
+        made |= {name: digest_of_file(stage / name) for name in names}
         write_json(path / MARK, self._mark)
         if last:
             (path / last).unlink(missing_ok=True)
@@ -275,7 +275,7 @@ def _resolved(path: Path, lists: dict[str, Any]) -> dict[str, str | None]:
 def _digest(path: Path) -> str:
     """SHA-256 of a file; empty where it cannot be read."""
     with suppress(OSError):
-        return digest_of(path.read_bytes())
+        return digest_of_file(path)
     return ""
 
 

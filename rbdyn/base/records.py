@@ -6,6 +6,7 @@ the others. A field whose default is None is left out where it is None, unless i
 Cells of CSV files are written so that no program takes them for formulas and numbers keep their digits.
 """
 
+import csv
 import functools
 import math
 import re
@@ -195,3 +196,12 @@ def save_table(
         if not pd.api.types.is_numeric_dtype(kind):
             frame[name] = frame[name].map(quoted_cell)
     frame.rename(columns=quoted_cell).to_csv(path, index=False, float_format=float_format)
+
+
+def save_rows(rows: Callable[[], Iterable[Mapping[str, Any]]], path: Path | str) -> None:
+    """Write rows as CSV that are too many to be held at once; they are made twice, first for their columns. Raises OSError."""
+    header = list(dict.fromkeys(name for row in rows() for name in row))
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(map(quoted_cell, header))
+        table.writerows([quoted_cell(row.get(name)) for name in header] for row in rows())

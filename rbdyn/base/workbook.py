@@ -40,13 +40,18 @@ def write_workbook(path: Path, files: Iterable[Path], identity: Identity) -> Non
     day = datetime.fromisoformat(identity.date)
     book = Workbook(write_only=True)
     book.properties.title, book.properties.creator, book.properties.created = identity.title, "rbdyn", day
-    tables = {file.name: _rows(file) for file in files}
-    long = {name: f"{len(rows) - 1} rows, in this file only" for name, rows in tables.items() if _is_long(rows)}
+    tables, long = dict[str, list[list[str]]](), dict[str, str]()
+    for file in files:
+        rows, cells = _size(file)
+        if cells > MOST_CELLS:
+            long[file.name] = f"{rows - 1} rows, in this file only"
+        else:
+            tables[file.name] = [*_rows(file)]
     _sheet(book, FIRST, [("property", "value"), *identity_table(identity).rows, *long.items()])
     sheets = [FIRST]
-    for name in (name for name in tables if name not in long):
+    for name, table in tables.items():
         sheets.append(sheet_name(Path(name).stem, sheets))
-        _sheet(book, sheets[-1], _typed(tables[name]))
+        _sheet(book, sheets[-1], _typed(table))
     written = io.BytesIO()
     ExcelWriter(book, _Archive(written, day)).save()
     path.write_bytes(written.getvalue())
@@ -73,14 +78,15 @@ class _Archive(zipfile.ZipFile):
         self.writestr(arcname, Path(filename).read_bytes())
 
 
-def _rows(path: Path) -> list[list[str]]:
+def _rows(path: Path) -> Iterator[list[str]]:
     with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.reader(file))
+        yield from csv.reader(file)
 
 
-def _is_long(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a table is too long for a workbook."""
-    return sum(map(len, rows)) > MOST_CELLS
+def _size(path: Path) -> tuple[int, int]:
+    """Numbers of rows, with the header, and of cells of a table."""
+    lengths = [len(row) for row in _rows(path)]
+    return len(lengths), sum(lengths)
 
 
 def sheet_name(name: str, taken: Sequence[str]) -> str:

@@ -64,10 +64,8 @@ def cause_sheet(runs: Sequence[RowRun]) -> Sheet[Cause]:
 def span_sheet(runs: Sequence[RowRun]) -> Sheet[Span]:
     """A row a main figure over all rows that are done."""
     spans = []
-    done = [(run.row.name, run.figures.of(0)) for run in runs if run.figures is not None]
     for name in (figure.key for figure in FIGURES if figure.key in SHOWN):
-        numbers = [(value, row) for row, values in done if (value := values.get(name)) is not None]
-        if numbers:
+        if numbers := [(value, run.row.name) for run in runs if (value := run.value(name)) is not None]:
             (low, low_row), (high, high_row) = min(numbers), max(numbers)
             spans.append(Span(name, low, low_row, float(np.median([value for value, _ in numbers])), high, high_row))
     return Sheet("Figures over all rows", SPANS, spans)
