@@ -314,11 +314,11 @@ def histories(scenes: Mapping[str, Scene], turns: float) -> "dict[str, History]"
     return {name: history(scene, min(turns, scene.numerics.turns), notice=None) for name, scene in scenes.items()}
 
 
-def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
-    """Draw cage orbits and pocket forces. Returns the names of the pictures."""
+def draw_motion(motions: "Mapping[str, History]", folder: Path, classes: Mapping[str, str]) -> list[str]:
+    """Draw cage orbits, in the colour of the ``classes`` of their cages, and pocket forces. Returns the names of the pictures."""
     from rbdyn import plots
 
-    plots.cage_orbit(motions, folder / "cage_orbit.png")
+    plots.cage_orbit(motions, folder / "cage_orbit.png", classes)
     plots.pocket_forces(motions, folder / "pocket_forces.png")
     return ["cage_orbit.png", "pocket_forces.png"]
 

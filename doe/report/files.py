@@ -96,7 +96,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
             save(drawn_stills, folder / name)
             pictures.append(name)
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
-    pictures += clearance.draw_motion(motions, folder)
+    cages = {name: outcome.confirmed[name].cages.get(outcome.main_point) for name in motions}
+    pictures += clearance.draw_motion(motions, folder, {name: cage.name for name, cage in cages.items() if cage})
     drawn = {name: clearance.drawn_motion(motion) for name, motion in motions.items()}
     texts = {"report.html": html_report(result, drawn), "answer.txt": answer_text(result)}
     for name, text in texts.items():

@@ -257,9 +257,13 @@ class StudyResult:
     def scenes(self) -> dict[str, Scene]:
         """Scenes of baseline and pick; those with a heat balance at the temperatures of their runs."""
         scenes = scenes_of(self.study, self.baseline.point, self.pick.point)
+        return {name: self.confirmed[name].hot.get(self.main_point, scene) for name, scene in scenes.items()}
+
+    @property
+    def main_point(self) -> str:
+        """The point of the duty that ``scenes`` are at."""
         duty = Duty.of(self.study)
-        point = EVERYWHERE if duty is None else duty.main
-        return {name: self.confirmed[name].hot.get(point, scene) for name, scene in scenes.items()}
+        return EVERYWHERE if duty is None else duty.main
 
     @cached_property
     def clearances(self) -> OperatingClearances:

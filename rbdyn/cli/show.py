@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rbdyn.base.blocks import Block, Detail, Table, with_notes
+from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.faults import refuse
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.notes import DANGER, Note, Notes, of_level
@@ -19,6 +19,7 @@ from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
+from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
     from rbdyn.base.words import Notice
@@ -104,7 +105,7 @@ def write(
         from rbdyn.plots.roller import moving_bearing
 
         files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
-        (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
+        (folder / "bearing.html").write_text(player_html(motion, _cage(request)), encoding="utf-8")
     record = {**_record(request, motion), "notes": plain(request.notes), "versions": versions()}
     record["files"] = ["orbit.json", *files]
     write_json(folder / "orbit.json", record)
@@ -112,12 +113,18 @@ def write(
     return record
 
 
+def _cage(request: Request) -> str:
+    """Class of the cage with its replicates; empty where the result has none."""
+    return "" if request.result.verdict is None else request.result.verdict.short_words
+
+
 def _pictures(request: Request, motion: "History") -> dict[str, Callable[[Path], object]]:
     from rbdyn import plots
 
     title = f"{request.turns:g} counted shaft turns, replicate {request.replicate + 1}"
+    classes = {} if request.result.verdict is None else {title: request.result.verdict.name}
     return {
-        "cage_orbit.png": partial(plots.cage_orbit, {title: motion}),
+        "cage_orbit.png": partial(plots.cage_orbit, {title: motion}, classes=classes),
         "forces.png": partial(plots.forces, motion),
         "whirl.png": partial(plots.whirl, motion),
         "poincare.png": partial(plots.section, motion),
@@ -142,6 +149,7 @@ def _record(request: Request, motion: "History") -> dict[str, Any]:
         "turns": request.turns,
         "replicate": request.replicate + 1,
         "seed": motion.scene.numerics.seed,
+        "verdict": None if request.result.verdict is None else request.result.verdict.as_dict(),
         "cage_speed_rpm": orbit.mean_cage_speed(motion) * 30.0 / np.pi,
         "whirl_ratio": orbit.whirl_ratio(motion),
         "whirl_ratio_quantiles": {f"{100.0 * share:g}%": value for share, value in quantiles.items()},
@@ -155,6 +163,7 @@ def _record(request: Request, motion: "History") -> dict[str, Any]:
         "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
         "spectra": {
+            "cage_orbit_um": _peaks(orbit.orbit_spectrum(motion), 1e6),
             "eccentricity_um": _peaks(orbit.spectrum(motion, eccentricity), 1e6),
             "cage_speed_rpm": _peaks(orbit.spectrum(motion, motion.cage_speed), 30.0 / np.pi),
         },
@@ -191,10 +200,11 @@ def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
 
 
 def blocks(record: dict[str, Any]) -> list[Block]:
-    """The main figures; in full detail also the peaks of the spectra; notes."""
+    """Class of the cage, the main figures; in full detail also the peaks of the spectra; notes."""
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
     figures = Table(title, ("figure", "value"), _figures(record))
-    return with_notes(record["notes"], [figures, *_spectra(record["spectra"])])
+    cage = [] if record["verdict"] is None else [Paragraph(CageVerdict.from_dict(record["verdict"]).words)]
+    return with_notes(record["notes"], [*cage, figures, *_spectra(record["spectra"])])
 
 
 def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:

@@ -40,20 +40,31 @@ def _cage_turns(run: Replicate) -> float:
     return abs(float(run.cage_angle[run.first :].sum())) / (2.0 * math.pi)
 
 
-def _trial(scene: Scene, run: Replicate) -> Trial:
-    """Orbit of a replicate and its forcing.
+def forced_orders(scene: Scene, speed: float) -> dict[str, float]:
+    """Orders of forces on a cage of this speed [rad/s], over that speed: 1 of its imbalance, and of each ring that turns, with its load."""
+    inner, outer = (ring / speed for ring in scene.operation.speeds)
+    name = "shaft and its load" if scene.operation.rotating_load_N or scene.operation.unbalance else "shaft"
+    return {"cage": 1.0, **{key: order for key, order in ((name, inner), ("outer ring", outer)) if order}}
 
-    A ring that turns, or the load that turns with it, has an order; a film between it and the cage drives an orbit at half the sum
-    of their speeds at most.
-    """
+
+def passing_orders(scene: Scene, speed: float) -> tuple[float, float]:
+    """Orders at which rollers pass the load, forwards and backwards: load + Z (1 - load), the order of a load that stands still being 0."""
+    rotates = scene.operation.rotating_load_N > scene.operation.radial_load_N
+    load = scene.operation.speeds[0] / speed if rotates else 0.0
+    passing = scene.bearing.rollers * (1.0 - load)
+    return load + passing, load - passing
+
+
+def _trial(scene: Scene, run: Replicate) -> Trial:
+    """Orbit of a replicate and its forcing. A film between ring and cage drives an orbit at half the sum of their speeds at most."""
     path, samples_per_turn = counted_path(run)
     turns = _cage_turns(run)
     speed = float(run.cage_angle[run.first :].sum()) / run.duration
-    rings = dict(zip(("inner", "outer"), (ring / speed for ring in scene.operation.speeds), strict=True))
+    rings = dict(zip(("inner", "outer"), scene.operation.speeds, strict=True))
     lubricated = scene.model.guide_land == "film"
-    guide = rings.get(scene.cage.guidance, 0.0) if lubricated else 0.0
+    guide = rings.get(scene.cage.guidance, 0.0) / speed if lubricated else 0.0
     energy = 0.5 * scene.geometry.cage_inertia * speed**2
     work = float(run.work[run.first :, RUBBING].sum())
-    orders = (1.0, *(ring for ring in rings.values() if ring))
+    orders = tuple(forced_orders(scene, speed).values())
     forcing = Forcing(orders, 0.5 * (1.0 + guide), work / (turns * energy))
     return Trial(mean_measures(path, scene.orbit_play_m, samples_per_turn), forcing)

@@ -352,6 +352,19 @@ class Spectrum(NamedTuple):
         return [(float(self.frequency[i]), float(self.amplitude[i])) for i in highest]
 
 
+def orbit_spectrum(history: History) -> Spectrum:
+    """The circles that the cage's orbit is the sum of: their radii [m], frequencies rising, positive as the cage turns.
+
+    Hann's window over the whole history: up to 15 % less where a frequency lies between two.
+    """
+    x, y = history.guide_eccentricity
+    orbit = x + 1j * math.copysign(1.0, mean_cage_speed(history)) * y
+    window = 1.0 - np.cos(2.0 * np.pi * np.arange(len(orbit)) / len(orbit))
+    amplitude = abs(np.fft.fft((orbit - orbit.mean()) * window)) / len(orbit)
+    frequency = np.fft.fftfreq(len(orbit), float(history.time[1] - history.time[0]))
+    return Spectrum(np.fft.fftshift(frequency), np.fft.fftshift(amplitude))
+
+
 def spectrum(history: History, values: Array) -> Spectrum:
     """Amplitude spectrum of a sampled signal without its mean, by Welch's method (Welch 1967) with Hann's window.
 

@@ -291,11 +291,16 @@ TEMPLATE = Path(__file__).with_name("player.html")
 BEARING = Path(__file__).with_name("bearing.js")
 
 
-def player_html(history: "History") -> str:
-    """The page, of up to three shaft turns about the largest pocket force; rounded to 0.1 um, 1 mrad and four digits."""
+def player_html(history: "History", cage: str = "") -> str:
+    """The page, of up to three shaft turns about the largest pocket force; rounded to 0.1 um, 1 mrad and four digits.
+
+    ``cage``: its class, for the title.
+    """
     most_frames = MOST_NUMBERS // (PER_ROLLER * history.scene.bearing.rollers + PER_FRAME)
     picture = drawing(history, TURNS, FRAMES_PER_TURN, most_frames)
-    record = json.dumps(motion_record(history, picture), separators=(",", ":"), allow_nan=False)
+    moving = motion_record(history, picture)
+    moving["title"] += f"; cage: {cage}" if cage else ""
+    record = json.dumps(moving, separators=(",", ":"), allow_nan=False)
     page = TEMPLATE.read_text(encoding="utf-8").replace("{{BEARING}}", BEARING.read_text(encoding="utf-8"))
     # Data last, so that no mark inside it is replaced.
     return page.replace("{{FIRST_FRAME}}", _svg(picture)).replace("{{DATA}}", record.replace("<", "\\u003c"))

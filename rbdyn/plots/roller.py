@@ -19,6 +19,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import label
 from rbdyn.dynamics import motion
+from rbdyn.dynamics.cage_verdict import forced_orders, passing_orders
 from rbdyn.dynamics.duty import row_stiffness
 from rbdyn.dynamics.figures import PANELS
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
@@ -69,16 +70,18 @@ def _plane(axis: Axes) -> None:
 def cage_orbit(
     histories: "Mapping[str, History]", path: Path, classes: Mapping[str, str] = MappingProxyType({})
 ) -> None:
-    """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each.
+    """Path of the cage centre about that of its guide: in the guide clearance, enlarged, and its spectrum; a column each.
 
     ``classes``: of the cage by the title of its history, which names and colours its path.
     """
     columns = len(histories)
-    figure, axes = plt.subplots(2, columns, figsize=(4.8 * columns, 9.0), squeeze=False)
+    figure, axes = plt.subplots(3, columns, figsize=(4.8 * columns, 12.6), squeeze=False)
     for column, (title, history) in zip(axes.T, histories.items(), strict=True):
         x, y = (1e6 * part for part in history.guide_eccentricity)
-        for axis in column:
-            axis.plot(x, y, linewidth=0.6, color=CAGE_COLOURS.get(classes.get(title, ""), BLUE))
+        colour = CAGE_COLOURS.get(classes.get(title, ""), BLUE)
+        _orbit_spectrum(column[2], history, colour)
+        for axis in column[:2]:
+            axis.plot(x, y, linewidth=0.6, color=colour)
             axis.plot(x[0], y[0], "o", markersize=5, color=GREEN, label="start")
             axis.plot(x[-1], y[-1], "s", markersize=5, color=VERMILION, label="end")
             _plane(axis)
@@ -90,6 +93,23 @@ def cage_orbit(
         *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=3, fontsize=8
     )
     save(figure, path)
+
+
+def _orbit_spectrum(axis: Axes, history: "History", colour: str) -> None:
+    """Radii of the circles of an orbit over their order, with the orders of what drives it."""
+    frequency, amplitude = motion.orbit_spectrum(history)
+    speed = motion.mean_cage_speed(history)
+    order, passing = frequency * 2.0 * math.pi / abs(speed), passing_orders(history.scene, speed)
+    near = abs(order) <= 1.2 * max(map(abs, passing))
+    axis.semilogy(order[near], 1e6 * amplitude[near], color=colour, linewidth=0.8)
+    marks = {name: (at,) for name, at in forced_orders(history.scene, speed).items()} | {"roller pass": passing}
+    for (name, places), own in zip(marks.items(), (ORANGE, VERMILION, SKY, GREY), strict=False):
+        for place in places:
+            axis.axvline(place, color=own, linewidth=0.9, linestyle="--", zorder=1)
+        axis.plot([], [], "--", color=own, label=f"{name} {', '.join(f'{place:.3g}' for place in places)}")
+    axis.set(xlabel="order: turns of the orbit in a cage turn", ylabel="radius of the circle [µm]")
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(marks), fontsize=8, frameon=False)
+    plain(axis)
 
 
 def _draw_pockets(axis: Axes, history: "History") -> None:

@@ -76,6 +76,13 @@ def test_show_figures(shown):
     assert {"frequency_Hz", "amplitude"} == set(record["spectra"]["eccentricity_um"][0])
 
 
+def test_show_states_the_class_of_the_result(saved, shown, page):
+    """Show: the verdict of all replicates in orbit.json and in the title of the player."""
+    verdict = json.loads((saved / "result.json").read_text())["verdict"]
+    assert shown[1]["verdict"] == verdict
+    assert page[1]["title"].endswith(f"; cage: {verdict['class']}")
+
+
 def test_show_film_moves(shown):
     """Show: the moving picture has more than one frame."""
     from PIL import Image
@@ -125,6 +132,7 @@ def test_show_prints_a_table_beside_the_result(command, saved):
     assert done.returncode == 0, done.stderr
     for words in (
         "1 shaft turns of replicate 2, seed 1",
+        "Cage: not judged, because runs of",
         "whirl speed over cage speed",
         "never touched",
         "Peaks of the spectrum of eccentricity",

@@ -35,6 +35,7 @@ from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.words import label, quantity, rounded_down, shown, with_error
 from rbdyn.plots.roller import cage_orbit
+from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 VOID = {"meta", "input"}
@@ -330,14 +331,18 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **options: kept.update({path: figure}))
     orbit = SimpleNamespace(
         guide_eccentricity=(np.linspace(-66e-6, -43e-6, 9), np.linspace(19e-6, 39e-6, 9)),
-        scene=SimpleNamespace(guide_clearance_m=75e-6),
+        time=np.linspace(0.0, 1e-3, 9),
+        cage_angle=np.linspace(0.0, 1.0, 9),
+        scene=Scene.load(EXAMPLES / "cylindrical_roller.toml"),
     )
     cage_orbit({"baseline": orbit, "pick": orbit}, "orbit")
     figure = kept["orbit"]
     figure.canvas.draw()
     (box,) = (legend.get_window_extent() for legend in figure.legends)
     assert not any(box.overlaps(axis.get_window_extent()) for axis in figure.axes)
-    assert not any(axis.get_legend() for axis in figure.axes)
+    assert not any(axis.get_legend() for axis in figure.axes[:4])
+    for axis in figure.axes[4:]:
+        assert not axis.get_legend().get_window_extent().overlaps(axis.get_window_extent())
     cage_orbit({"one": orbit}, "one")
     kept["one"].canvas.draw()
     for axis in [*figure.axes, *kept["one"].axes]:

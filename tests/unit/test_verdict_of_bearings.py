@@ -11,8 +11,9 @@ from conftest import ROOT
 from in_process import in_process
 
 import rbdyn
+from rbdyn.dynamics.cage_verdict import forced_orders, passing_orders
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.motion import history
+from rbdyn.dynamics.motion import history, mean_cage_speed, orbit_spectrum
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.result import SimulationResult
@@ -107,6 +108,35 @@ def test_a_trace_is_the_path_that_a_history_shows(guidance):
     inside = (times > 0) & (times < motion.time[-1])
     path = np.interp(times[inside], motion.time, x) + 1j * np.interp(times[inside], motion.time, y)
     assert abs(run.cage_path[inside] - path).max() < 0.02 * abs(path).max()
+
+
+def test_the_spectrum_of_an_orbit_shows_what_drives_it():
+    """Rollers that pass the load, at Z cage turns both ways, and a load that turns with the shaft, at its order."""
+    motion = history(Scene.load(EXAMPLE), 10)
+    cage_hz = mean_cage_speed(motion) / (2 * np.pi)
+    highest = [frequency / cage_hz for frequency, _ in orbit_spectrum(motion).peaks(2)]
+    assert sorted(highest) == pytest.approx(passing_orders(motion.scene, 2 * np.pi * cage_hz)[::-1], abs=0.13)
+    load = ("operation.radial_load_N=0", "operation.rotating_load_N=1300", "model.guide_land=dry")
+    motion = history(Scene.load(EXAMPLE, [*load, "model.land_friction=0.3"]), 10)
+    cage_hz = mean_cage_speed(motion) / (2 * np.pi)
+    ((highest, radius),) = orbit_spectrum(motion).peaks(1)
+    order = forced_orders(motion.scene, 2 * np.pi * cage_hz)["shaft and its load"]
+    assert highest / cage_hz == pytest.approx(order, abs=0.13)
+    assert 60e-6 < radius < 75e-6
+
+
+def test_rollers_pass_a_load_that_turns_at_its_own_orders():
+    """Sidebands of a push along a load of order 2.4 by ten rollers, each where it is near the load."""
+    scene = Scene.load(EXAMPLE, ["operation.radial_load_N=0", "operation.rotating_load_N=1300"])
+    rollers, order = scene.bearing.rollers, 2.4
+    angle = 2 * np.pi * np.arange(5 * 1024) / 1024
+    place = angle + 2 * np.pi / rollers * np.arange(rollers)[:, None] - order * angle
+    push = np.exp(1j * order * angle) * (np.maximum(np.cos(place), 0) ** 3).sum(axis=0)
+    power = abs(np.fft.fft(push))
+    orders = np.fft.fftfreq(len(angle), 1 / 1024)[np.argsort(-power)[:3]]
+    passing = passing_orders(scene, scene.operation.speeds[0] / order)
+    assert sorted(orders) == pytest.approx(sorted([order, *passing]))
+    assert passing == pytest.approx((2.4 - 14, 2.4 + 14))
 
 
 def test_a_scene_may_leave_the_verdict_out():
