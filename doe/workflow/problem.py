@@ -23,7 +23,7 @@ from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, refuse
 from rbdyn.base.records import Record, spread
 from rbdyn.base.tables.sheet import listed
 from rbdyn.base.words import label, quantity
-from rbdyn.dynamics.figures import sums_left_out, why_missing
+from rbdyn.dynamics.figures import switched_off, why_missing
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
@@ -226,12 +226,23 @@ class Problem(Study):
         numbers = zip(self.file.factor, map(float, factors), strict=True)
         return [f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers]
 
-    def scene_at(self, factors: Array, seed: int, overrides: Sequence[str] = (), kind: type[Scene] = Scene) -> Scene:
+    def scene_at(
+        self,
+        factors: Array,
+        seed: int,
+        overrides: Sequence[str] = (),
+        kind: type[Scene] = Scene,
+        *,
+        confirms: bool = False,
+    ) -> Scene:
         """The scene at factor values (k,), with a seed and ``overrides`` after those of all runs, of this ``kind``.
 
-        Raises InputError for an impossible value.
+        It leaves out what the study does not name; a run that ``confirms`` a design traces its cage all the same. Raises InputError
+        for an impossible value.
         """
-        left_out = sums_left_out(self.figures)
+        left_out = switched_off(self.figures)
+        if not (confirms or self.file.limits.classes):
+            left_out.append("verdict.trace=false")
         texts = (*self.scene.set, *left_out, *overrides, f"numerics.seed={seed}", *self.assignments(factors))
         if (kind, *texts) not in self.built:
             scene = kind.from_dict(self.scene_tables, str(self.path_of(self.scene.file)), texts)
@@ -327,7 +338,7 @@ class Problem(Study):
     def _confirmation_scene(self, point: Array, sets: Sequence[str]) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
         effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-        scene = self.scene_at(point, seed, [*sets, *effort, *settings.set])
+        scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates
         if self.file.limits.classes and settings.replicates < needed:
             refuse(

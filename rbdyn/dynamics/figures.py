@@ -66,7 +66,7 @@ class Figure:
     - ``panel``: place on a map from 1, and its heading in tables of points, "[%]" where these show it in percent
     - ``worst``: which value is the worst one over a duty
     - ``needs``: what a scene without it lacks, in words
-    - ``sums``: key of [damage] without which a run leaves out its sums
+    - ``switch``: key of the scene that leaves it out where it is false
     - ``is_defined``: whether runs bear it, where it needs more than its scene
     - ``response``: whether a study may name it. ``harmonic``: whether its mean over time is that of its inverse
     - ``accuracy``: of a rig's sensor [%] where its table states none, 0 where no rig measures the figure
@@ -90,16 +90,21 @@ class Figure:
     worst: Literal["largest", "least", "farthest from 0", "none"] = "largest"
     is_defined: Callable[[Sequence[Replicate]], bool] = lambda runs: True
     needs: str = ""
-    sums: Literal["", "impacts", "races"] = ""
+    switch: Literal["", "damage.impacts", "damage.races", "numerics.stiffness"] = ""
     response: bool = True
     harmonic: bool = False
     accuracy: float = 0.0
 
     def scale_in(self, scene: "Scene") -> float | None:
         """Factor of the statistic in a scene; None where the scene has no such figure."""
-        if self.sums and not getattr(scene.damage, self.sums):
+        if self.is_off(scene):
             return None
         return self.scale(scene) if callable(self.scale) else self.scale
+
+    def is_off(self, scene: "Scene") -> bool:
+        """Whether its ``switch`` leaves it out."""
+        table, _, key = self.switch.partition(".")
+        return bool(table) and not getattr(getattr(scene, table), key)
 
     @property
     def percent(self) -> float:
@@ -291,7 +296,7 @@ def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: 
         scale,
         kind="damage",
         words=f"{meaning} [{unit}]",
-        sums="races",
+        switch="damage.races",
         is_defined=lambda runs: any(bool(run.races[run.first :, place:, SAMPLES_NUMBER][:, :1].any()) for run in runs),
     )
 
@@ -386,7 +391,7 @@ CAGE_DAMAGE = (
         kind="damage",
         words="impacts in all pockets in a shaft turn",
         needs="pockets",
-        sums="impacts",
+        switch="damage.impacts",
     ),
     Figure(
         "impact_energy_J",
@@ -396,7 +401,7 @@ CAGE_DAMAGE = (
         kind="damage",
         words="energy of an impact, mean [J]",
         needs="pockets",
-        sums="impacts",
+        switch="damage.impacts",
         is_defined=_any_impacts,
     ),
     Figure(
@@ -407,7 +412,7 @@ CAGE_DAMAGE = (
         kind="damage",
         words="equal peak force of impacts, for fatigue [N]",
         needs="pockets",
-        sums="impacts",
+        switch="damage.impacts",
         is_defined=_any_impacts,
     ),
     Figure(
@@ -455,7 +460,7 @@ DAMAGE = (*CAGE_DAMAGE, *RACE_DAMAGE)
 def pocket_impacts(scene: "Scene", runs: Sequence[Replicate]) -> dict[str, list[float]] | None:
     """Figures of impacts of each pocket in turn, 0 of a pocket without any; None where impacts are not followed."""
     found = {}
-    for figure in (figure for figure in DAMAGE if figure.sums == "impacts"):
+    for figure in (figure for figure in DAMAGE if figure.switch == "damage.impacts"):
         scale, statistic = figure.scale_in(scene), figure.statistic
         if scale is None or statistic is None:
             return None
@@ -472,14 +477,20 @@ def why_missing(scene: "Scene", key: str) -> str | None:
         return "the scene has no [thermal.start]; add that table to its file or choose another figure"
     if START_FIGURES.get(key) == "guide_um" and scene.cage.guidance == "roller":
         return "no ring guides the cage; choose another figure"
-    stiff = key in {figure.key for figure in of_kind("stiffness")}
-    if stiff and scene.thermal is None and scene.operation.largest_load_N == 0.0 and scene.geometry.clearance >= 0.0:
-        return "the scene has no load and no preload; raise operation.radial_load_N or choose another figure"
-    figure = next((figure for figure in DAMAGE if figure.key == key), None)
+    figure = next((figure for figure in FIGURES if figure.key == key), None)
     if figure is None:
         return None
-    if figure.sums and not getattr(scene.damage, figure.sums):
-        return f"the scene leaves out its sums (damage.{figure.sums} = false); write true or choose another figure"
+    if figure.is_off(scene):
+        return f"the scene leaves it out ({figure.switch} = false); write true or choose another figure"
+    if (
+        figure.kind == "stiffness"
+        and scene.thermal is None
+        and scene.operation.largest_load_N == 0.0
+        and scene.geometry.clearance >= 0.0
+    ):
+        return "the scene has no load and no preload; raise operation.radial_load_N or choose another figure"
+    if figure.kind != "damage":
+        return None
     if figure.scale_in(scene) is None:
         return f"the scene leaves out {figure.needs}; state it or choose another figure"
     numerics = scene.numerics
@@ -492,10 +503,11 @@ def why_missing(scene: "Scene", key: str) -> str | None:
     return None
 
 
-def sums_left_out(keys: Collection[str]) -> list[str]:
-    """Overrides by which a scene leaves out the sums that none of the figures needs, by their keys."""
-    tables = {figure.sums: any(one.key in keys for one in DAMAGE if one.sums == figure.sums) for figure in DAMAGE}
-    return [f"damage.{table}=false" for table, needed in tables.items() if table and not needed]
+def switched_off(keys: Collection[str]) -> list[str]:
+    """Overrides by which a scene leaves out what none of the figures needs, by their keys."""
+    needed = {"", *(figure.switch for figure in FIGURES if figure.key in keys)}
+    switches = dict.fromkeys(figure.switch for figure in FIGURES)
+    return [f"{switch}=false" for switch in switches if switch not in needed]
 
 
 _PLACES = {"oil": "oil that leaves the bearing", "outer": "outer ring", "inner": "inner ring", "rollers": "rollers"}
@@ -541,22 +553,21 @@ PARTS = (
     # 1/L is damage an hour (Palmgren and Miner).
     Figure("life_h", "life L10r by static loads (ISO/TS 16281)", kind="life", harmonic=True, worst="least"),
     # x is along the load, y across it.
-    Figure(
-        "stiffness_xx_N_um",
-        "stiffness along the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
-        kind="stiffness",
-        worst="least",
-    ),
-    Figure(
-        "stiffness_yy_N_um",
-        "stiffness across the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
-        kind="stiffness",
-        worst="least",
+    *(
+        Figure(
+            f"stiffness_{axes}_N_um",
+            f"stiffness {way} the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
+            kind="stiffness",
+            switch="numerics.stiffness",
+            worst="least",
+        )
+        for axes, way in (("xx", "along"), ("yy", "across"))
     ),
     Figure(
         "variable_compliance_um",
         "travel of the shaft's centre while the rollers pass a pitch, peak to peak, along or across the load, whichever is larger",
         kind="stiffness",
+        switch="numerics.stiffness",
     ),
     *(
         Figure(

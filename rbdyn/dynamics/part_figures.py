@@ -97,7 +97,9 @@ def _exact(scene: Scene) -> dict[str, float]:
 
 
 def _stiffness(scene: Scene) -> dict[str, float]:
-    """Stiffness along and across the load [N/um] and travel over a pitch [um]; empty where no roller carries load."""
+    """Stiffness along and across the load [N/um] and travel over a pitch [um]; empty without load, or where the scene leaves it out."""
+    if not scene.numerics.stiffness:
+        return {}
     try:
         found = row_stiffness(scene)
     except MethodError:

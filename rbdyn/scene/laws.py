@@ -169,7 +169,8 @@ class Verdict(Sparse):
     the cage, rates over its speed."""
 
     trace: bool = True
-    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out."""
+    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out. Of a study,
+    all runs trace it where limits.cage.verdict names classes, else only those that confirm a design."""
     still_radius: Share = Thresholds.still_radius
     """Rms radius of the orbit below which the cage is held. A cage is also held where the centre of its orbit is farther from that of
     its guide than this radius."""
@@ -199,8 +200,10 @@ class Verdict(Sparse):
         return Thresholds(**{key: value for key, value in self if key != "trace"})
 
 
-class Numerics(Consistent):
+class Numerics(Consistent, Sparse):
     """Tolerance, length and replication of a run."""
+
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"stiffness": True}
 
     method: Literal["auto", "rk45", "rk43", "rosenbrock"] = "auto"
     """Integrator. rk45: explicit, Dormand-Prince; rk43: explicit, Kutta's 3/8 rule; rosenbrock: linearly implicit, RODAS4, for
@@ -240,6 +243,9 @@ class Numerics(Consistent):
     steps of a slow bearing, they are repeated with steps that resolve its light contacts instead."""
     companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
+    stiffness: bool = True
+    """Compute the stiffness by static loads after the runs: some 20 ms, nine times as long with a heat balance. A study computes it
+    only where it names one of its figures."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
     """Largest number of steps in a shaft turn before a run fails, with place and reason. With 10 rollers in one slice the default takes about
     1 s a turn (8 us a step on one core). With 80 rollers in 31 slices it takes 14 s (0.14 ms a step)."""

@@ -141,6 +141,7 @@ def test_stress_follows_the_return_force_and_its_concentration():
         ("impact_energy_J", "damage.impacts=false", "damage.impacts = false"),
         ("impacts_per_turn", "model.pocket=off", "leaves out pockets"),
         ("entry_slip_m_s", "damage.races=false", "damage.races = false"),
+        ("stiffness_xx_N_um", "numerics.stiffness=false", "numerics.stiffness = false"),
         ("wear_life_h", "model.drag_coefficient=1.0", "wear needs K/H of a rig"),
     ],
 )
@@ -168,16 +169,26 @@ def test_mean_force_slides_at_the_speed_of_the_rollers():
     assert wet.damage["pocket_impact_power_W"].value > wet.power_terms_W["pocket_damping"]
 
 
-def test_a_study_follows_impacts_only_where_it_names_them(tmp_path):
-    """Scenes of a study leave the sums out unless a response needs them; figures that remain keep their bits without them."""
+def test_a_study_computes_only_what_it_names(tmp_path):
+    """Scenes of a study leave out sums, stiffness and trace that no response or limit needs; figures that remain keep their bits without them."""
     problem = Problem.load(short_study(tmp_path))
     scene = problem.scene_at(problem.baseline, 1)
     assert not scene.damage.impacts and not scene.damage.races
+    assert not scene.numerics.stiffness and not scene.verdict.trace
+    confirmed = problem.confirmation_scene(problem.baseline)
+    assert confirmed.verdict.trace and not confirmed.numerics.stiffness
     text = problem.path.read_text(encoding="utf-8").replace("power_loss_W", "impact_fatigue_force_N")
     path = tmp_path / "named.toml"
     path.write_text(text, encoding="utf-8")
     named = Problem.load(path)
     assert named.scene_at(named.baseline, 1).damage.impacts
+    path.write_text(
+        text.replace("impact_fatigue_force_N", "stiffness_yy_N_um") + '\n[limits]\ncage.verdict = "held"\n',
+        encoding="utf-8",
+    )
+    stiff = Problem.load(path)
+    scene = stiff.scene_at(stiff.baseline, 1)
+    assert scene.numerics.stiffness and scene.verdict.trace and not scene.damage.impacts
     full, bare = result(), result("damage.impacts=false")
     missing = {"impacts_per_turn", "impact_energy_J", "impact_fatigue_force_N"}
     assert set(full.damage) - set(bare.damage) == missing
@@ -199,7 +210,7 @@ def test_impacts_are_fewer_the_faster_they_must_be():
 def test_samples_of_the_races_change_no_motion():
     """Without the samples every other figure keeps its bits; with them power density is largest at the inner race."""
     full, bare = result(), result("damage.races=false")
-    sampled = [figure.key for figure in DAMAGE if figure.sums == "races"]
+    sampled = [figure.key for figure in DAMAGE if figure.switch == "damage.races"]
     assert len(sampled) == 8 and set(full.damage) - set(bare.damage) == set(sampled)
     assert bare.figures == full.figures and bare.power_terms_W == full.power_terms_W
     damage = full.damage
