@@ -20,29 +20,31 @@ from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
-from rbdyn.dynamics.parameters.start import at_point, capacities, clearances_at, course_of, seats_of, turning_speed
+from rbdyn.dynamics.parameters.start import at_point, capacities, clearances_at, seats_of, turning_speed
 from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.temperatures import Balance, Balanced
 from rbdyn.result import LeastClearance, Quantity, SimulationResult, StartMoment, StartResult
 from rbdyn.scene import Scene
-from rbdyn.scene.input_ranges import QUANTILES, STARTING, input_sets, varied_inputs
+from rbdyn.scene.input_ranges import QUANTILES, STARTING, course_ranges, input_sets, varied_inputs
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST
 from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS, Boundaries, Conductances
 from rbdyn.thermal.start import (
     HOUSING,
+    MOVING,
     SETTLED,
     SHAFT,
+    STEADY,
     WARMING_NODES,
     Course,
     Law,
     Moment,
     Seats,
     Warming,
-    WarmingConductances,
+    columns,
     law_of,
     least_of,
     settling_time,
@@ -61,8 +63,6 @@ FILM_REACH, CLEARANCE_REACH, LEAST_REACH, POINT_REACH = 15.0, 0.1, 2.5, 0.35
 SLOW = 0.25
 # Distance from the nearest moment, over its reach, that a note states.
 FAR = 2.0
-# Distance from the last temperatures that counts as steady [K]; change within a time constant that does not.
-STEADY, MOVING = 1.0, 0.5
 # Tolerance of courses for ranges.
 ROUGH = 1e-5
 
@@ -183,7 +183,8 @@ def _machine(scene: Scene, state: State) -> Machine:
     assert thermal is not None and thermal.start is not None
     start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
     cold = np.array(thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
-    course, parts, boundaries = course_of(scene), capacities(hot, thermal), state.model.boundaries
+    course = thermal.start.course(turning_speed(scene), scene.operation.radial_load_N)
+    parts, boundaries = capacities(hot, thermal), state.model.boundaries
     whole, _ = warming_network(warming_conductances(state.model.conductances, seats_of(hot)), boundaries)
     end = float(course.times[-1]) + SETTLED * slowest(parts, whole)
     return Machine(scene, hot, thermal, parts, course, cold, state, boundaries, end)
@@ -409,8 +410,8 @@ def _ranges(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulate
         sources=np.array([[inflow for _, inflow in row] for row in networks]),
     )
     rows = _course_of(machine, many, np.array([capacities(hot, thermal) for thermal, *_ in varied]), ROUGH)
-    columns = {name: np.array([getattr(each, name) for each, *_ in varied]) for name in ("shaft_lag", "cage_offset_K")}
-    plays, left = machine.clearances(rows, machine.thermal.model_copy(update=columns))
+    keys = {name: np.array([getattr(each, name) for each, *_ in varied]) for name in ("shaft_lag", "cage_offset_K")}
+    plays, left = machine.clearances(rows, machine.thermal.model_copy(update=keys))
     figures = _with_lead(rows, plays, len(rows.times))
     nodes = dict(zip(WARMING_NODES, np.moveaxis(rows.temperatures, -1, 0), strict=True))
     bands = {
@@ -419,7 +420,7 @@ def _ranges(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulate
     }
     seizing = np.any([(play <= 0.0).any(axis=0) for play in left.values()], axis=0)
     seizing = seizing | (rows.temperatures.max(axis=(0, 2)) > HOTTEST)
-    return InputRanges(_figure_ranges(machine, rows, figures), bands, tuple(sets), float(np.mean(seizing)))
+    return InputRanges(course_ranges(rows, figures), bands, tuple(sets), float(np.mean(seizing)))
 
 
 def _varied_network(machine: Machine, each: Simulated, ratios: Mapping[str, float]) -> tuple[Array, Array]:
@@ -427,25 +428,6 @@ def _varied_network(machine: Machine, each: Simulated, ratios: Mapping[str, floa
     scaled = {name: ratio * getattr(each.conductances, name) for name, ratio in ratios.items()}
     conductances = warming_conductances(each.conductances._replace(**scaled), each.seats)
     return warming_network(conductances, machine.boundaries)
-
-
-def _figure_ranges(machine: Machine, rows: Warming, figures: Mapping[str, Array]) -> dict[str, tuple[float, ...]]:
-    """Quantiles over the machines; none of a time that one in twenty of them does not have."""
-    found = {name: figures[name].max(axis=0) if name == DIFFERENCE else figures[name].min(axis=0) for name in figures}
-    for name, column in figures.items():
-        if name != DIFFERENCE:
-            ends = np.minimum(column[0], column[-1]) - column.min(axis=0)
-            inside = ends > 1e-3 * np.ptp(column, axis=0)
-            found[f"{name}_time_s"] = np.where(inside, rows.times[column.argmin(axis=0)], np.nan)
-    moving = np.abs(rows.temperatures - rows.temperatures[-1]).max(axis=-1) > STEADY
-    last = len(rows.times) - 1 - moving[::-1].argmax(axis=0)
-    settled = np.where(moving.any(axis=0), rows.times[np.minimum(last + 1, len(rows.times) - 1)], 0.0)
-    found["time_to_steady_s"] = settled
-    return {
-        name: tuple(np.nanquantile(column, QUANTILES).tolist())
-        for name, column in found.items()
-        if np.mean(np.isnan(column)) < QUANTILES[0]
-    }
 
 
 def _race_pressure(machine: Machine, path: Path) -> float | None:
@@ -477,30 +459,13 @@ def _record(each: Simulated) -> StartMoment:
 def _columns(
     machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated], bands: Mapping[str, Array]
 ) -> dict[str, Any]:
-    """Columns over time to six digits: operating point, temperatures, heat, conductances, clearances, and bands of the ranges."""
     times, nodes = path.rows.times, path.rows.temperatures
-    speeds, loads = machine.course.at(times)
+    speeds, _ = machine.course.at(times)
     logarithms = machine.course.logarithms(times)
     heat = law.heat(nodes, logarithms, (speeds > 0.0).astype(float))
     of_moments = [warming_conductances(each.conductances, each.seats) for each in simulated]
     conductances = law.weights(nodes, logarithms) @ np.array(of_moments)
-
-    def short(column: Array) -> list[float]:
-        return [float(f"{value:.6g}") for value in column]
-
-    def table(names: Sequence[str], columns: Array) -> dict[str, list[float]]:
-        return {name: short(column) for name, column in zip(names, columns.T, strict=True)}
-
-    return {
-        "time_s": short(times),
-        "speed_rpm": short(speeds / RPM),
-        "load_N": short(loads),
-        "temperatures_C": table(WARMING_NODES, nodes),
-        "heat_W": table(WARMING_NODES, heat),
-        "conductances_W_K": table(WarmingConductances._fields, conductances),
-        "figures": {name: short(column) for name, column in path.figures.items()},
-        "ranges": {name: [short(row) for row in rows] for name, rows in bands.items()},
-    }
+    return columns(machine.course, path.rows, heat, conductances, path.figures, bands)
 
 
 def _failure_notes(failures: Sequence[Failure]) -> Notes:

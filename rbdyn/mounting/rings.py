@@ -42,6 +42,11 @@ class Ring:
                 f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall; fix its diameters"
             )
 
+    def heat_capacity(self, width: float) -> float:
+        """Heat capacity of the ring over a width [m], [J/K]."""
+        area = math.pi * (self.outer_radius**2 - self.inner_radius**2)
+        return area * width * self.material.density * self.material.heat_capacity
+
     def pressure_growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
         """Growth at ``radius`` [m] under pressures on bore and outside [Pa] (Lamé)."""
         a, b, nu = self.inner_radius, self.outer_radius, self.material.poisson_ratio
@@ -143,6 +148,13 @@ class MountedRings:
     def outer_pressure(self) -> float:
         """Pressure between outer ring and housing [Pa]."""
         return interface_pressure(self.outer_ring, self.housing, self.outer_interference)
+
+    @property
+    def seat_gaps(self) -> tuple[float, float]:
+        """Radial gaps between outer ring and housing, and between inner ring and shaft [m]; 0 for a tight fit."""
+        outer = overlap(self.outer_ring, self.housing, self.outer_interference)
+        inner = overlap(self.shaft, self.inner_ring, self.inner_interference)
+        return max(-outer, 0.0), max(-inner, 0.0)
 
     @property
     def loosening_speed(self) -> float:

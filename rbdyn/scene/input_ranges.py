@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
     from rbdyn.scene.ball import SingleRowScene
     from rbdyn.scene.thermal import Thermal
+    from rbdyn.thermal.start import Warming
 
 # Keys of [thermal] that scale conductances, and the conductances that each scales; all keys that vary.
 SCALED = {
@@ -103,6 +104,32 @@ def input_ranges(
     columns |= {name: np.array([other[name] for other in others]) for name in (others or [{}])[0]}
     figures = {name: tuple(np.quantile(column, QUANTILES).tolist()) for name, column in columns.items()}
     return Ranges(figures, tuple(sets), float(np.mean(table.max(axis=1) >= HOTTEST)))
+
+
+def course_ranges(
+    rows: "Warming", figures: Mapping[str, Array], greatest: Collection[str] = (DIFFERENCE,)
+) -> dict[str, tuple[float, ...]]:
+    """Ranges of least figures (rows, machines), of the ``greatest`` ones, of their times, and of the time to the last temperatures.
+
+    A time that one in twenty of the machines does not have has none.
+    """
+    from rbdyn.thermal.start import STEADY
+
+    found = {}
+    for name, column in figures.items():
+        low = -column if name in greatest else column
+        found[name] = column.max(axis=0) if name in greatest else column.min(axis=0)
+        inside = np.minimum(low[0], low[-1]) - low.min(axis=0) > 1e-3 * np.ptp(low, axis=0)
+        found[f"{name}_time_s"] = np.where(inside, rows.times[low.argmin(axis=0)], np.nan)
+    found.pop(f"{DIFFERENCE}_time_s")
+    moving = np.abs(rows.temperatures - rows.temperatures[-1]).max(axis=-1) > STEADY
+    last = len(rows.times) - 1 - moving[::-1].argmax(axis=0)
+    found["time_to_steady_s"] = np.where(moving.any(axis=0), rows.times[np.minimum(last + 1, len(rows.times) - 1)], 0.0)
+    return {
+        name: tuple(np.nanquantile(column, QUANTILES).tolist())
+        for name, column in found.items()
+        if np.mean(np.isnan(column)) < QUANTILES[0]
+    }
 
 
 def varied_inputs(

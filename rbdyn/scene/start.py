@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
@@ -10,6 +10,9 @@ from rbdyn.base.faults import Consistent, InSI, NonNegative, Positive, Strict
 from rbdyn.base.words import counted
 from rbdyn.scene.lubricant import THICKEST, Lubricant, OilCelsius
 from rbdyn.scene.operation import SLOWEST_RPM, Load
+
+if TYPE_CHECKING:
+    from rbdyn.thermal.start import Course
 
 MOST_POINTS = 60
 # Speed over the reference speed of a catalogue, above which a unit is wrong or the bearing is another one.
@@ -72,6 +75,22 @@ class Start(Strict):
     inner ring stays warmer than the outer one."""
     shaft_widths: Positive = 2.2
     """Length of shaft that warms with the bearing, in widths of the bearing: 1 to 5."""
+
+    @property
+    def widths(self) -> tuple[float, float]:
+        """Widths of the bearing over which housing and shaft count."""
+        return self.housing_widths, self.shaft_widths
+
+    def course(self, speed: float, load: float) -> "Course":
+        """Speed [rad/s] and load [N] over time: those of the schedule, else ``speed`` and ``load`` of the operating point."""
+        import numpy as np
+
+        from rbdyn.thermal.start import Course
+
+        times = [0.0] if self.schedule is None else self.schedule.time_s
+        speeds, loads = (None, None) if self.schedule is None else (self.schedule.speed, self.schedule.load_N)
+        speeds, loads = speeds or [speed] * len(times), loads or [load] * len(times)
+        return Course(*(np.array(column, dtype=np.float64) for column in (times, speeds, loads)))
 
 
 def start_faults(

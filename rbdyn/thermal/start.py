@@ -9,19 +9,25 @@ over the moments k that were simulated, with viscosity eta of the film, speed n 
 distance d from a moment, sum to 1. Conductances have the same weights. Nothing here knows a bearing.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import MethodError
+from rbdyn.base.faults import RPM, MethodError
 from rbdyn.thermal.losses import DEGREES, HOTTEST
 from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, source
 
+if TYPE_CHECKING:
+    from rbdyn.mounting.rings import MountedRings
+
 WARMING_NODES = (*NODES, "housing", "shaft")
 HOUSING, SHAFT = len(NODES), len(NODES) + 1
+# Gap of a tight seat by its roughness [m]: filled with oil of 0.13 W/(m K) it conducts 1.5e5 W/(m^2 K).
+ROUGHNESS = 0.87e-6
 # Heat that ISO 15312 lets a seat pass, so that the seat itself conducts more than that: by this factor at least.
 LEAST_SEAT = 2.0
 # Tolerance of LSODA, relative and in kelvins.
@@ -30,6 +36,8 @@ TOLERANCE = 1e-7
 ROWS, FIRST = 16.0, 2.0
 # Time constants of the slowest node after which a network at rest is steady: exp(-16) of 100 K are 1e-5 K.
 SETTLED = 16.0
+# Distance from the last temperatures that counts as steady [K]; change within a time constant that does not.
+STEADY, MOVING = 1.0, 0.5
 # Speed and load, over the largest of a course, below which the power laws see no further fall, or logarithms have no end.
 SLOWEST, LIGHTEST = 1e-3, 1e-2
 # Least and largest exponents of viscosity, speed and load.
@@ -54,6 +62,24 @@ def seat(area: float, gap: float, conductivity: float, roughness: float) -> floa
     ``conductivity`` k of what fills it [W/(m K)]. ``roughness`` [m]: gap that a tight seat keeps.
     """
     return conductivity * area / (gap + roughness)
+
+
+def seats_between(rings: "MountedRings", width: float, conductivity: float) -> Seats:
+    """Conductances of both seats of rings of a width [m] at their temperatures [W/K]; oil of a conductivity fills their gaps."""
+    radii = rings.outer_ring.outer_radius, rings.shaft.outer_radius
+    areas = [2.0 * math.pi * radius * width for radius in radii]
+    return Seats(*(seat(area, gap, conductivity, ROUGHNESS) for area, gap in zip(areas, rings.seat_gaps, strict=True)))
+
+
+def capacities_of(
+    rings: "MountedRings", width: float, widths: tuple[float, float], oil: float, rollers: float
+) -> Array:
+    """Heat capacities of ``WARMING_NODES`` [J/K] from those of ``oil`` and ``rollers``; rings have their whole width [m] between seat
+    and raceway, housing and shaft count over ``widths`` of it."""
+    outer, inner, housing, shaft = (
+        ring.heat_capacity(width) for ring in (rings.outer_ring, rings.inner_ring, rings.housing, rings.shaft)
+    )
+    return np.array([oil, outer, inner, rollers, widths[0] * housing, widths[1] * shaft])
 
 
 class WarmingConductances(NamedTuple):
@@ -310,6 +336,36 @@ def warming(
             raise MethodError(f"temperatures over time: the integration ends at {part.t[-1]:.3g} s: {part.message}")
         found.append(part.y.T)
     return Warming(times, np.concatenate(found).reshape(-1, *shape))
+
+
+def columns(
+    course: Course,
+    rows: Warming,
+    heat: Array,
+    conductances: Array,
+    figures: Mapping[str, Array],
+    bands: Mapping[str, Array],
+) -> dict[str, Any]:
+    """Columns over time to six digits: operating point, temperatures, ``heat`` (rows, 6) of the nodes, conductances, figures, and
+    bands of their ranges."""
+
+    def short(column: Array) -> list[float]:
+        return [float(f"{value:.6g}") for value in column]
+
+    def table(names: Sequence[str], columns: Array) -> dict[str, list[float]]:
+        return {name: short(column) for name, column in zip(names, columns.T, strict=True)}
+
+    speeds, loads = course.at(rows.times)
+    return {
+        "time_s": short(rows.times),
+        "speed_rpm": short(speeds / RPM),
+        "load_N": short(loads),
+        "temperatures_C": table(WARMING_NODES, rows.temperatures),
+        "heat_W": table(WARMING_NODES, heat),
+        "conductances_W_K": table(WarmingConductances._fields, conductances),
+        "figures": {name: short(column) for name, column in figures.items()},
+        "ranges": {name: [short(row) for row in band] for name, band in bands.items()},
+    }
 
 
 def slowest(capacities: Array, whole: Array) -> float:

@@ -19,12 +19,12 @@ from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics import start as start_module
 from rbdyn.dynamics.figures import FIGURES, why_missing
-from rbdyn.dynamics.parameters.start import ROUGHNESS, capacities, clearances_at, seats_of
+from rbdyn.dynamics.parameters.start import capacities, clearances_at, seats_of
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 from rbdyn.result import START_FIGURES, SimulationResult, StartResult, start_sheet
 from rbdyn.scene.thermal import Temperatures, at_temperatures, part_temperatures
-from rbdyn.thermal.start import WARMING_NODES
+from rbdyn.thermal.start import ROUGHNESS, WARMING_NODES
 
 # Simulations of the heat alone, long enough for it.
 QUICK = {"turns": 20.0, "discard_turns": 10.0, "replicates": 2, "extend": False, "companion": False}

@@ -9,15 +9,13 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM
 from rbdyn.dynamics.parameters.heat import cavity_of, ring_width
-from rbdyn.mounting.rings import MountedRings, Ring, overlap
+from rbdyn.mounting.rings import MountedRings
 from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
 from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
 from rbdyn.thermal.network import NODES
-from rbdyn.thermal.start import HOUSING, SHAFT, Course, Seats, seat
+from rbdyn.thermal.start import HOUSING, SHAFT, Seats, capacities_of, seats_between
 
-# Gap of a tight seat by its roughness [m]: filled with oil of 0.13 W/(m K) it conducts 1.5e5 W/(m^2 K).
-ROUGHNESS = 0.87e-6
 # Names of clearances in JSON by those of a scene.
 NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
 
@@ -25,29 +23,18 @@ NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
 def capacities(scene: Scene, thermal: Thermal) -> Array:
     """Heat capacities of ``WARMING_NODES`` [J/K], from the drawing.
 
-    Rings have their whole width between seat and raceway. The oil is what the cavity holds: full for a bath, which has as much again
-    at its sides, else the oil fraction. Housing and shaft count over some widths of the bearing.
+    The oil is what the cavity holds: full for a bath, which has as much again at its sides, else the oil fraction.
     """
-    mounting, geometry, start = scene.mounting, scene.geometry, thermal.start
-    assert mounting is not None and start is not None
-    width, rings = ring_width(scene), _rings(scene)
-    parts = {
-        "outer": _capacity(rings.outer_ring, width),
-        "inner": _capacity(rings.inner_ring, width),
-        "rollers": scene.bearing.rollers * geometry.roller_mass * scene.material("roller").heat_capacity
-        + scene.cage.mass * scene.material("cage").heat_capacity,
-    }
+    start = thermal.start
+    assert start is not None
+    rollers = (
+        scene.bearing.rollers * scene.geometry.roller_mass * scene.material("roller").heat_capacity
+        + scene.cage.mass * scene.material("cage").heat_capacity
+    )
     oil = scene.oil()
     fill = 1.0 if scene.lubricant.supply == "bath" else scene.lubricant.oil_fraction
-    parts["oil"] = fill * cavity_of(scene) * oil.density * oil.heat_capacity
-    housing = start.housing_widths * _capacity(rings.housing, width)
-    shaft = start.shaft_widths * _capacity(rings.shaft, width)
-    return np.array([*(parts[node] for node in NODES), housing, shaft])
-
-
-def _capacity(ring: Ring, width: float) -> float:
-    area = math.pi * (ring.outer_radius**2 - ring.inner_radius**2)
-    return area * width * ring.material.density * ring.material.heat_capacity
+    full = fill * cavity_of(scene) * oil.density * oil.heat_capacity
+    return capacities_of(_rings(scene), ring_width(scene), start.widths, full, rollers)
 
 
 def _rings(scene: Scene) -> MountedRings:
@@ -58,14 +45,7 @@ def _rings(scene: Scene) -> MountedRings:
 
 def seats_of(hot: Scene) -> Seats:
     """Conductances of both seats of a scene at temperatures: the gap of a loose fit has oil [W/K]."""
-    rings, width, conductivity = _rings(hot), ring_width(hot), hot.oil().conductivity
-    pairs = (
-        (rings.outer_ring, rings.housing, rings.outer_interference),
-        (rings.shaft, rings.inner_ring, rings.inner_interference),
-    )
-    gaps = [max(-overlap(*pair), 0.0) for pair in pairs]
-    areas = [2.0 * math.pi * pair[0].outer_radius * width for pair in pairs]
-    return Seats(*(seat(area, gap, conductivity, ROUGHNESS) for area, gap in zip(areas, gaps, strict=True)))
+    return seats_between(_rings(hot), ring_width(hot), hot.oil().conductivity)
 
 
 class Clearances(NamedTuple):
@@ -100,17 +80,6 @@ def _clearances(hot: Scene, mounting: Any) -> tuple[Mapping[str, Any], Mapping[s
     running = hot.running_clearances(mounting)
     left = {name: play.play.operating - play.touching for name, play in running.items() if math.isfinite(play.touching)}
     return plays, left
-
-
-def course_of(scene: Scene) -> Course:
-    """Speed [rad/s] and load [N] over time: those of the schedule, else the operating point."""
-    thermal, operation = scene.thermal, scene.operation
-    assert thermal is not None and thermal.start is not None
-    schedule = thermal.start.schedule
-    times = [0.0] if schedule is None else schedule.time_s
-    speeds, loads = (None, None) if schedule is None else (schedule.speed, schedule.load_N)
-    speeds, loads = speeds or [turning_speed(scene)] * len(times), loads or [operation.radial_load_N] * len(times)
-    return Course(*(np.array(column, dtype=np.float64) for column in (times, speeds, loads)))
 
 
 def turning_speed(scene: Scene) -> float:
