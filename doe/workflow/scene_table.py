@@ -145,18 +145,20 @@ def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
 
 def _unknown(name: str) -> str:
     """The fault of a column that is no key, with the nearest one."""
-    known = {key.rpartition(".")[2]: key for key in reversed(dotted_keys())}
-    known |= {own: own for own in (NAME, SCENE, DESIGNATION, *SHORT)}
-    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=1)
-    fix = f"did you mean {known[near[0]]}?" if near else "rename or remove it"
+    own = (NAME, SCENE, DESIGNATION, *SHORT)
+    known = dict([*((key.rpartition(".")[2], key) for key in reversed(dotted_keys())), *zip(own, own, strict=True)])
+    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=len(own))
+    # Of keys that are equally near, such as those of both rings, the first one.
+    best = max(reversed(known), key=lambda key: difflib.SequenceMatcher(None, key, name[:LONGEST_NAME]).ratio())
+    fix = f"did you mean {known[best]}?" if near else "rename or remove it"
     return f"column {one_line(name, LONGEST_NAME)}: unknown key; {fix}"
 
 
 def dotted_keys() -> list[str]:
-    """All keys of a scene of rollers with their tables."""
+    """All keys of a scene of rollers, with their tables, that a cell can state: those of a value."""
     from rbdyn.scene.keys import keys
 
-    return [key.key for key in keys({"scene": Scene}) if "[]" not in key.key]
+    return [key.key for key in keys({"scene": Scene}) if "[]" not in key.key and not key.values.startswith("a list")]
 
 
 def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:

@@ -101,6 +101,7 @@ def test_a_part_of_another_table_is_refused(folder, monkeypatch):
 SLIPS = {
     "operation.inner_speed\n1000\n": "column operation.inner_speed: unknown key; did you mean operation.inner_speed_rpm?",
     "inner_speed_rpm\n1000\n": "column inner_speed_rpm: unknown key; did you mean operation.inner_speed_rpm?",
+    "speed_rpm\n1000\n": "column speed_rpm: unknown key; did you mean operation.inner_speed_rpm?",
     "seeds\n1\n": "column seeds: unknown key; did you mean seed?",
     "seed,numerics.seed\n1,2\n": "columns seed and numerics.seed: both state one value; keep one of them",
     "cage.mass_g\n30\n": "column cage.mass_g: --set cage.mass_g states it too; leave out one of them",
